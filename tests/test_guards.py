@@ -89,6 +89,29 @@ def test_every_path_in_the_architecture_exists() -> None:
     assert missing == []
 
 
+def test_the_drawing_of_a_step_is_the_step() -> None:
+    """What step.cpp calls, in its order; each stage is a file of its name that says what it reads and writes."""
+    drawing = (ROOT / "ARCHITECTURE.md").read_text().split("\n    step\n")[1].split("\n\n")[0]
+    drawn = re.findall(r"^[ │┌└─]+(\w+)", drawing, re.MULTILINE)
+    folder = ROOT / "engine/native/src/rigid"
+    told = re.sub(r"//.*", "", (folder / "step.cpp").read_text())
+
+    def calls(name: str) -> list[str]:
+        body = re.search(rf"^void RigidSystem::{name}\(\) {{\n(.*?)^}}", told, re.MULTILINE | re.DOTALL)
+        assert body is not None
+        return [call for call in re.findall(r"(\w+)\(\)", body.group(1)) if call in drawn]
+
+    order = [
+        inner for call in calls("step") for inner in (call, *(calls(call) if call.startswith("find") else ()))
+    ]
+    order.insert(order.index("solve_velocities") + 1, "impact")
+    assert [*order, "observe"] == drawn
+    assert "impact()" in (folder / "solve_velocities.cpp").read_text()
+    for stage in set(drawn) - {"find_velocities", "wake_met"}:
+        top = (folder / f"{stage}.cpp").read_text().split("#include")[0]
+        assert "reads:" in top and "writes:" in top, stage
+
+
 def test_a_new_shape_and_a_new_joint_touch_the_files_that_are_said() -> None:
     """The cone and the point on a line are found in those, and nowhere else in the engine."""
     section = (ROOT / "CONTRIBUTING.md").read_text().split("## Add a shape or a joint")[1].split("\n## ")[0]

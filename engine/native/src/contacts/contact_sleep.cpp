@@ -1,6 +1,6 @@
 // Bodies that sleep, as contacts see them: out of the search for pairs, with what their touches did kept to be read.
 //
-// What sleeps and when is decided in `rigid/rigid_sleep.cpp`. A sleeper stays in the search for those that are awake, at
+// What sleeps and when is decided in `rigid/sleep.cpp`. A sleeper stays in the search for those that are awake, at
 // rest and without forces: whatever gets a point with it wakes it, and that step is begun anew with its whole island.
 #include <algorithm>
 

@@ -33,7 +33,7 @@
 // win where both cannot be. An overlap the scene began with goes at the rate 4 Ups per step; one that comes from
 // curved paths, features that swung in or iterations that stopped early goes at once, in the step that makes it: there
 // the contacts have taken the energy that lifting the bodies back costs. What such a displacement of finite size
-// does to joints, momenta and energy is put right in `rigid/rigid_projection.cpp`.
+// does to joints, momenta and energy is put right in `rigid/project_positions.cpp`.
 //
 // Why a settled step cannot raise the energy (E kinetic and potential, constant force f, k = h M⁻¹ f): from
 // v₊ = v + k + M⁻¹ Gᵀ z and q₊ = q + h v₊ follows E₊ − E = z·G v₊ − ½ |v₊ − v|²_M. Of rigid contacts z·G v₊ = z·r

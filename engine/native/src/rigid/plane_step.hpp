@@ -2,7 +2,7 @@
 // rows a hinge.
 //
 // Where bodies, joints and loads lie in one plane of the world, all that leaves it stays zero, and the step is the
-// one of rigid_step.cpp without it, to rounding: the same rows with compliance and damping, the same turn. Of
+// one of step.cpp without it, to rounding: the same rows with compliance and damping, the same turn. Of
 // (G M⁻¹ Gᵀ + Sig) λ = right − G v, with v after the forces, few rows are left; they are factored in an envelope, and
 // refined by what the rows themselves still ask for. A pivot far below its diagonal tells of redundant rows, or of loads
 // far heavier than what carries them: such a step is left to the block factorisation, which is made for both.

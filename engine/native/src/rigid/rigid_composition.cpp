@@ -194,7 +194,7 @@ bool RigidSystem::composed_stage(double tau, std::size_t stage) {
     }
     for (const std::vector<int>* some : {&free_, &driven_})
         for (int i : *some)
-            if (!integrate(constants_[i], tau, live_.bodies[i])) return false;
+            if (!spook::integrate(constants_[i], tau, live_.bodies[i])) return false;
     live_.pending = 0.5 * tau;
     if (clock_) clock_->mark(Stage::integrate_positions);
     return true;

@@ -80,9 +80,9 @@ void RigidSystem::start_half_step() {
 /// The same with contacts, which have no accelerations to ask for: half of what a whole step would change. Where they last
 /// and surfaces are flat that is the same; an impact in it, or a gap that closes, is of order 1 in any case.
 void RigidSystem::start_half_step_touching() {
-    const Live start = live_;
+    const RigidState start = live_;
     const MixedSystem mixed = mixed_;
-    velocity_stage();
+    find_velocities();
     const LargeArray<BodyState> whole = live_.bodies;
     live_ = start;
     mixed_ = mixed;

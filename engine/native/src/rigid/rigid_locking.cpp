@@ -192,7 +192,7 @@ double RigidSystem::motion_of(const Loop& loop) const {
     return motion;
 }
 
-bool RigidSystem::stops(const Live::Watched& seen, double motion) const noexcept {
+bool RigidSystem::stops(const RigidState::Watched& seen, double motion) const noexcept {
     // What stands moves by rounding, and that may stop as it likes: it would be looked at in nearly every step.
     const double told = LITTLE * TAKEN * std::max(seen.motion, AT_REST * seen.given);
     return motion < 0.5 * seen.last && seen.last > told;
@@ -207,19 +207,19 @@ bool RigidSystem::wants_look() {
     };
     const auto watched = [this](const Loop& loop) { return loop.may_lock && live_.locked < 0; };
     for (std::size_t k = 0; k < loops_.size(); ++k) {
-        const Live::Watched& seen = live_.watched[k];
+        const RigidState::Watched& seen = live_.watched[k];
         if (watched(loops_[k]) && (live_.step >= seen.next || stops(seen, motion(loops_[k])))) return true;
     }
     for (std::size_t k = 0; k < loops_.size(); ++k) {
         if (!watched(loops_[k])) continue;
-        Live::Watched& seen = live_.watched[k];
+        RigidState::Watched& seen = live_.watched[k];
         seen.last = motion(loops_[k]);
         seen.motion = std::max(seen.motion, seen.last);
     }
     return false;
 }
 
-void RigidSystem::watch(Loop& loop, Live::Watched& seen) {
+void RigidSystem::watch(Loop& loop, RigidState::Watched& seen) {
     const double motion = motion_of(loop);
     const bool stopped = stops(seen, motion);
     const bool due = live_.step >= seen.next;

@@ -71,4 +71,10 @@ void displace(const BodyConstants& body, double h, Vec3 velocity, Vec3 angular_v
 /// I⁻¹ L in world axes at the state's orientation.
 Vec3 turned_by(const BodyConstants& body, const BodyState& state, Vec3 angular_momentum) noexcept;
 
+/// Twice the kinetic energy of a body, J.
+inline double twice_energy(const BodyConstants& body, const BodyState& s) noexcept {
+    return body.mass * dot(s.velocity, s.velocity) +
+           (body.particle ? 0.0 : dot(s.angular_momentum, s.angular_velocity));
+}
+
 }  // namespace spook

@@ -226,27 +226,6 @@ void RigidSystem::advance(std::int64_t steps) {
     deliver();
 }
 
-void RigidSystem::observe(Recorder& recorder, std::int64_t sample) {
-    if (clock_) clock_->start();
-    if (velocities_seen_ && (composed_ || half_step_)) {
-        // What is seen lives at the sample; what goes on does not.
-        LargeArray<BodyState> going;
-        if (half_step_) {
-            solve_ahead();
-            going = live_.bodies;
-            read_half_step();
-        } else {
-            going = live_.bodies;
-            read_composition();
-        }
-        recorder.sample(sample);
-        live_.bodies = std::move(going);
-    } else {
-        recorder.sample(sample);
-    }
-    if (clock_) clock_->mark(Stage::observe);
-}
-
 Health RigidSystem::health() const {
     if (live_.too_fast >= 0) {
         // Then no joint did it: with h |I⁻¹ L| above 1 (of a sphere) no turn has that angular momentum.

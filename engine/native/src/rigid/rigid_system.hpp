@@ -19,6 +19,7 @@
 #include "rigid/load_dependent_bounds.hpp"
 #include "rigid/locked_tree.hpp"
 #include "rigid/plane_step.hpp"
+#include "rigid/run_state.hpp"
 #include "rigid/sleep.hpp"
 #include "rigid/step_arrays.hpp"
 #include "run/quantities.hpp"
@@ -30,11 +31,6 @@ namespace spook {
 
 /// How a step's rows are solved: block is one factorisation, for bilateral rows; pivot and iterative know bounds.
 enum class RigidSolver { none, block, pivot, iterative };
-
-/// What mid-step velocities are averaged from.
-struct BodyMomenta {
-    Vec3 velocity, angular_momentum;
-};
 
 /// One scene with its state. One step of h, symplectic order:
 ///   forces → p = M v + h f;  contacts → impact;  joints → rows;  one solve → v₊, λ;
@@ -90,14 +86,7 @@ public:
     void set_clock(StageClock* clock) noexcept { clock_ = clock; }
     RigidSolver solver() const noexcept { return solver_; }
     void count(RunReport& report, std::int64_t steps) const;
-    /// The first step with a solve that left its rows further from their law than the method allows, the body it
-    /// concerns, and the largest such residual of the run.
-    struct Unsettled {
-        int body = -1;
-        std::int64_t step = 0;  // of h, counted from 1
-        double residual = 0.0;  // m/s
-        bool sunk = false;      // no row is off, but the body was left in another
-    };
+    using Unsettled = spook::Unsettled;
     const Unsettled& unsettled() const noexcept { return live_.unsettled; }
     std::vector<double> final_state();
 
@@ -130,45 +119,10 @@ public:
     }
     double penetration() const noexcept { return contacts_ ? contacts_->penetration() : 0.0; }
 
-private:
-    struct Live {
-        LargeArray<BodyState> bodies;
-        int too_fast = -1;       // the first body that turned too fast
-        int not_solved = -1;     // a body of a system that could not be factored
-        int contradicted = -1;   // a body held by rows that cannot hold together
-        std::int64_t step = 0;   // steps of h begun
-        std::int64_t moved = 0;  // steps of h after which positions are known
-        Unsettled unsettled;
-        bool by_rows = false;  // PGS over joints alone has failed: few are solved directly
-        Sleep sleep;
-        // Velocities at mid-step:
-        bool velocity_ready = false;         // the velocities of the coming step are found already
-        LargeArray<BodyMomenta> before;      // those of the step before
-        std::vector<double> last_violation;  // per row, where the step before began
-        // Compositions:
-        double pending = 0.0;  // s: half a stage still to be kicked
-        int locked = -1;       // a body of redundant rows that contradict each other by now
-        int lost = -1;         // a body of rows that no motion satisfies
-        struct Watched {       // of the redundant rows of a loop, see rigid_locking.cpp
-            double work = 0.0, motion = 0.0, last = 0.0;  // J: taken so far; the largest, and the last
-            double held = 0.0, load = 0.0;    // √(2 J): what they held back, and what the loads gave
-            double given = 0.0;               // 2 J: what the loads gave at the last look
-            std::int64_t next = 0, wait = 1;  // steps: of the next look, and to it
-        };
-        std::vector<Watched> watched;
-        std::int64_t looks = 0;  // at loops, for rows that lock
-        std::vector<int> named;  // joints that health() tells of
-        std::int64_t stage_steps = 0, newton_iterations = 0, halved_steps = 0;
-        // Stages × differences × unknowns: of the rows' forces [N], or of the paces of joint coordinates, from step
-        // to step; per stage: how many of them tell the next.
-        std::vector<double> history;
-        std::vector<int> guess_order;
-    };
-
 public:
     class Memory {
         friend class RigidSystem;
-        Live live;
+        RigidState live;
         LargeArray<JointSet::State> joints;
         std::vector<Break> breaks;
         RedundantRows::Memory redundancy;
@@ -204,11 +158,11 @@ private:
     void judge_loops();
     void take_probe(Loop& loop, double part);
     void watch_redundancy();
-    void watch(Loop& loop, Live::Watched& seen);
+    void watch(Loop& loop, RigidState::Watched& seen);
     double motion_of(const Loop& loop) const;
     double driven(const Loop& loop);
     bool find_repeated(Loop& loop);
-    bool stops(const Live::Watched& seen, double motion) const noexcept;
+    bool stops(const RigidState::Watched& seen, double motion) const noexcept;
     void note_locked(const Loop& loop);
     void note_projected();
     std::vector<double> shares(const Loop& loop) const;
@@ -216,7 +170,10 @@ private:
     void take_stages(const RigidScene& scene);
     void step();
     void deliver();
-    void velocity_stage();
+    void begin_step();
+    void begin_velocities();
+    void keep_first_joints();
+    void end_step();
     void find_velocities();
     void solve_ahead();
 
@@ -232,23 +189,26 @@ private:
     void bend_rows_back();
     void correct_curvature();
 
-    // rigid_sleep.cpp
+    // wake.cpp, sleep.cpp
     void take_sleep(const RigidScene& scene);
     void begin_sleep();
     bool asleep(int body) const noexcept { return live_.sleep.sleepers > 0 && live_.sleep.island[body] != 0; }
     bool rests(int block) const noexcept;
     bool rests(const std::vector<int>& parted) const;
     void leave_out_sleepers();
-    void velocities_beside_sleepers();
+    void leave_out_sleepers_for_now();
+    bool all_sleep() const noexcept;
+    void sleep_through();
+    bool wake_met();
     void keep_jacobians();
     bool is_moving(int body) const noexcept;
-    void wake_by_moving_bodies();
+    void wake();
     void wake(const std::vector<int>& met);
     void mark_moving(int body);
     void wake_joint(int joint);
     void note_places();
     double pace(int body) const noexcept;
-    void fall_asleep();
+    void sleep();
 
     // rigid_plane.cpp: steps by numbers of a plane
     bool may_lie_in_plane(const RigidScene& scene) const;
@@ -283,9 +243,9 @@ private:
     void fill_block_momenta();
     void take_block_solution();
     void apply_forces();
-    void kick_free_bodies();
+    void find_forces();
     void kick_free_body(int body) noexcept;
-    bool find_contacts();
+    void detect();
     bool meet_late();
     void fill_masses();
     void fill_momenta(bool forces);
@@ -315,9 +275,10 @@ private:
     void find_contradiction();
     int body_of(int row_block) const noexcept;
     int busiest_block() const noexcept;
+    void solve_velocities();
     void solve_mixed(bool touching);
     bool pivot_rows();
-    // rigid_projection.cpp: overlaps are removed by positions
+    // project_positions.cpp: overlaps are removed by positions
     void note_start_of_contacts();
     void project_overlaps();
     void project_limits();
@@ -336,7 +297,8 @@ private:
     }
 
     void integrate_body(int body);
-    void integrate_all();
+    void integrate();
+    void project_positions();
     void analyse_block();
     double* jacobian(int block, bool second) noexcept;
     /// The bodies of a block of rows as they follow each other: its first, its second, those beyond; and the Jacobian of
@@ -383,7 +345,7 @@ private:
     RigidSolver solver_ = RigidSolver::none;
 
     // The state.
-    Live live_;
+    RigidState live_;
     Memory saved_, before_solve_ahead_;  // the latter: before solve_ahead(), with contacts
     Memory before_waking_;               // before the velocities of a step in which some body may wake
     JointSet joints_;
@@ -452,8 +414,8 @@ private:
         Vec3 displacement;
         Quat turn;
     };
-    std::vector<Place> start_places_;  // per body: where it was as the step began
-    double residual_ = 0.0;            // largest an iterative solve stopped at, m/s
+    std::vector<Place> start_places_;                       // per body: where it was as the step began
+    double residual_ = 0.0, residual_before_waking_ = 0.0;  // largest an iterative solve stopped at, m/s
     // Beyond plain SPOOK; all per row of matrix_ unless said otherwise.
     bool composed_ = false, half_step_ = false, stiff_ = false, velocities_seen_ = false;
     LargeArray<BodyState> trial_;  // per body

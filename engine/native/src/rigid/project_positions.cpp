@@ -13,6 +13,9 @@
 //              bodies, by friction, or by letting them sink: it pays first. The rest is paid by the kinetic energy, all
 //              velocities shortened alike, which no row over resting bodies feels. What both cannot pay is not lifted.
 // Where this cannot be, half the way is tried, and a quarter, an eighth: overlaps may stay, energy may not rise.
+//
+// reads: places and velocities where the step ends, the contact cache, start_of_contacts_. writes: places, orientations and,
+// where energy or momenta ask for it, velocities of bodies; the penetration that the scene began with, as far as it is left.
 #include <algorithm>
 #include <cmath>
 
@@ -30,11 +33,6 @@ constexpr double rounding = 4e-16;      // of the energy
 constexpr int max_projections = 4;      // of a step
 constexpr std::size_t few_members = 8;  // bodies of an island: most are no larger
 
-double twice_energy(const BodyConstants& body, const BodyState& s) noexcept {
-    return body.mass * dot(s.velocity, s.velocity) +
-           (body.particle ? 0.0 : dot(s.angular_momentum, s.angular_velocity));
-}
-
 Vec3 solved(const Mat3& a, Vec3 b) noexcept {
     const Vec3 x{a.m[0], a.m[3], a.m[6]}, y{a.m[1], a.m[4], a.m[7]}, z{a.m[2], a.m[5], a.m[8]};
     const double determinant = dot(x, cross(y, z));
@@ -43,13 +41,11 @@ Vec3 solved(const Mat3& a, Vec3 b) noexcept {
 
 }  // namespace
 
-/// What the step is to be compared with.
-void RigidSystem::note_start_of_contacts() {
-    start_of_contacts_.resize(constants_.size());
-    for (int i : constrained_) {
-        const BodyState& s = live_.bodies[i];
-        start_of_contacts_[i] = {s.displacement, twice_energy(constants_[i], s)};
-    }
+void RigidSystem::project_positions() {
+    if (at_hand_) return;  // in a plane nothing overlaps
+    if (joints_.take_given()) project_limits();
+    if (touching_) project_overlaps();
+    if (clock_) clock_->mark(Stage::integrate_positions);
 }
 
 /// Parts what overlaps where the step ends; again as long as it helps, since a displacement is only right to first

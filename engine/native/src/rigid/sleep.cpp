@@ -1,4 +1,4 @@
-// Sleeping: bodies at rest are left out of the steps until something comes to them.
+// Stage: sleeping. Bodies at rest are left out of the steps until something comes to them.
 //
 // Bodies that are connected by contacts, joints or springs are an island; what does not move by itself joins none. An
 // island whose bodies all were slower than the method's sleep_speed, |v| + |w| r and as measured by where they got,
@@ -10,6 +10,9 @@
 //
 // Never asleep: bodies that displace a fluid, whose load or joint follows the time, whose joints have friction that
 // follows their load, and what touches a body that moves as it is told, or a surface that moves along itself.
+//
+// reads: velocities and places of bodies at both ends of the step, the contact cache, woken bodies, ties of joints and springs.
+// writes: live_.sleep, velocities of bodies that fall asleep, the contact stage's list of sleepers.
 #include <algorithm>
 #include <cmath>
 
@@ -20,8 +23,6 @@ namespace spook {
 namespace {
 
 constexpr double far = 1e3;  // m: as far out may a sleeper lie on a plane that begins to turn
-constexpr double rounding =
-    1e-6;  // of sleep_speed: a path that stands still leaves bodies that follow it such speeds
 
 }  // namespace
 
@@ -74,13 +75,6 @@ void RigidSystem::begin_sleep() {
     live_.sleep.quiet.assign(constants_.size(), 0);
 }
 
-/// Sleepers get no part of their forces.
-void RigidSystem::leave_out_sleepers() {
-    if (live_.sleep.sleepers == 0) return;
-    for (const int i : constrained_)
-        if (asleep(i)) share_[i] = 0.0;
-}
-
 /// Nothing is asked of a joint of sleepers: it holds what it held.
 bool RigidSystem::rests(int block) const noexcept {
     const JointBlock& of = joints_.blocks()[block];
@@ -106,101 +100,6 @@ void RigidSystem::keep_jacobians() {
     }
 }
 
-/// The velocities of a step that some bodies may sleep through.
-void RigidSystem::velocities_beside_sleepers() {
-    wake_by_moving_bodies();
-    while (live_.sleep.sleepers > 0) {
-        const auto stands = [this](int i) { return !is_moving(i); };
-        if (live_.sleep.sleepers == constrained_.size() &&
-            std::all_of(driven_.begin(), driven_.end(), stands)) {
-            contacts_->sleep_through();
-            touching_ = false;
-            return;
-        }
-        keep(before_waking_);
-        const double residual = residual_;
-        share_.assign(constants_.size(), 1.0);
-        leave_out_sleepers();
-        find_velocities();
-        share_.clear();
-        if (contacts_->woken().empty()) return;
-        const std::vector<int> woken = contacts_->woken();
-        go_back(before_waking_);
-        residual_ = residual;
-        wake(woken);
-    }
-    find_velocities();
-}
-
-/// Whether a body that moves as it is told does so.
-bool RigidSystem::is_moving(int i) const noexcept {
-    const BodyState& s = live_.bodies[i];
-    return constants_[i].motion == Motion::kinematic &&
-           norm(s.velocity) + sleep_rules_.reach[i] * norm(s.angular_velocity) >
-               rounding * method_.sleep_speed;
-}
-
-/// Wakes the bodies that a body that moves as it is told touches or holds.
-void RigidSystem::wake_by_moving_bodies() {
-    if (live_.sleep.sleepers == 0 || driven_.empty()) return;
-    std::vector<char> told(constants_.size(), 0);
-    bool some = false;
-    for (const int i : driven_) {
-        told[i] = is_moving(i);
-        some = some || told[i] != 0;
-        contacts_->mark_moving(i, told[i] != 0);
-    }
-    if (!some) return;
-    std::vector<int> met = contacts_->touching(told);
-    for (const auto& [a, b] : sleep_rules_.ties) {
-        if (told[a]) met.push_back(b);
-        if (told[b]) met.push_back(a);
-    }
-    wake(met);
-}
-
-/// Wakes the islands of some bodies; what is awake begins anew to be at rest.
-void RigidSystem::wake(const std::vector<int>& met) {
-    Sleep& sleep = live_.sleep;
-    std::vector<char> wakes(constants_.size() + 1, 0);
-    for (const int body : met) {
-        sleep.quiet[body] = 0;
-        wakes[sleep.island[body]] = 1;
-    }
-    wakes[0] = 0;
-    std::vector<int> woken;
-    for (const int i : constrained_)
-        if (wakes[sleep.island[i]]) woken.push_back(i);
-    if (woken.empty()) return;
-    for (std::size_t k = 0; k < joints_.blocks().size(); ++k) {  // rows start from what they held
-        const JointBlock& block = joints_.blocks()[k];
-        if (!rests(static_cast<int>(k))) continue;
-        if (wakes[sleep.island[block.first >= 0 && asleep(block.first) ? block.first : block.second]] == 0)
-            continue;
-        const JointSet::State& state = joints_.states[block.joint];
-        const double* multiplier = block.axial ? state.axial_multiplier.data() : state.multiplier.data();
-        std::copy_n(multiplier, block.size, mixed_.rows[k].multiplier.data());
-        mixed_.rows[k].state.fill(RowState::free);
-    }
-    for (const int i : woken) sleep.island[i] = 0, sleep.quiet[i] = 0;
-    sleep.sleepers -= woken.size();
-    contacts_->wake(woken);
-}
-
-/// What acts on a body has been changed from outside.
-void RigidSystem::mark_moving(int body) {
-    if (sleep_rules_.on() && body >= 0) wake({body});
-}
-
-void RigidSystem::wake_joint(int joint) {
-    for (std::size_t k = 0; k < joints_.blocks().size(); ++k) {
-        const JointBlock& block = joints_.blocks()[k];
-        if (block.joint != joint) continue;
-        mark_moving(block.first);
-        mark_moving(block.second);
-    }
-}
-
 /// Where bodies are as a step begins.
 void RigidSystem::note_places() {
     for (const int i : constrained_) start_places_[i] = {live_.bodies[i].displacement, live_.bodies[i].turn};
@@ -218,7 +117,8 @@ double RigidSystem::pace(int i) const noexcept {
 }
 
 /// The end of a step: what was met by a displaced body is awake, and islands that have been at rest fall asleep.
-void RigidSystem::fall_asleep() {
+void RigidSystem::sleep() {
+    if (!sleep_rules_.on()) return;
     Sleep& sleep = live_.sleep;
     if (!contacts_->woken().empty()) wake(contacts_->woken());
     sleep.slept += static_cast<std::int64_t>(sleep.sleepers);

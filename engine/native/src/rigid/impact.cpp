@@ -1,0 +1,59 @@
+// Stage: impacts. 0 <= nu ⟂ C v₊ + psi C v₋ >= 0 with friction against the slip, joints included and forces dropped; again as
+// long as some contact or stop with restitution is approached. The law, and why it cannot raise the energy: contacts/contact_impact.cpp.
+//
+// reads: points, masses and rows of joints. writes: velocities of bodies and velocities_, impulses of impacts, share_ (the part of
+// the forces still to act after an event), stops that were hit.
+#include <algorithm>
+#include <cmath>
+
+#include "rigid/rigid_system.hpp"
+
+namespace spook {
+
+namespace {
+
+constexpr double again = 1e-9;  // of a stop's rebound: slower than this it is not hit again in the step
+
+}  // namespace
+
+/// Bodies moved to the time of an event take the part of their forces that acts before it.
+void RigidSystem::lead_events() {
+    share_.assign(constants_.size(), 1.0);
+    leave_out_sleepers();
+    for (int i : constrained_) {
+        const double lead = contacts_->toi_fraction(i);
+        if (lead == 0.0) continue;
+        BodyState& s = live_.bodies[i];
+        const Vec3 twist = lead * h_ * constants_[i].torque;
+        const Vec3 dv = lead * kick(i), dw = turned_by(constants_[i], s, twist);
+        s.velocity += dv;
+        s.angular_momentum += twist;
+        s.angular_velocity += dw;
+        for (int k = 0; k < 3; ++k) velocities_[i][k] += dv[k], velocities_[i][3 + k] += dw[k];
+        share_[i] = 1.0 - lead;
+    }
+}
+
+/// Rows are those of the velocities before, and after it of those it leaves.
+void RigidSystem::impact() {
+    fill_momenta(false);
+    contacts_->impact(mixed_);
+    judge_contacts();
+    for (const int i : constrained_)
+        if (contacts_->toi_fraction(i) > 0.0) share_[i] = 1.0 - contacts_->toi_fraction(i);
+    take_velocities(true, [this](int k) { return !contacts_->has_rows(k); });
+    for (std::size_t k = 0; k < constrained_.size(); ++k)
+        if (contacts_->has_rows(static_cast<int>(k))) velocities_[constrained_[k]] = mixed_.velocity[k];
+    for (std::size_t k = 0; k < joints_.blocks().size(); ++k)
+        if (const StopRow& stop = mixed_.rows[k].stop; stop.answered || stop.limit_reached) {
+            JointSet::State& state = joints_.states[joints_.blocks()[k].joint];
+            const bool once = method_.impacts == ImpactOrder::simultaneous || stop.limit_reached;
+            state.rebounds = once ? unbounded : again * std::abs(stop.rebound);
+            if (!stop.answered) continue;
+            if (stop.rebound == 0.0) state.met = mixed_.rows[k].lower[stop.row] == 0.0 ? 1 : -1;
+        }
+    fill_rows();
+    if (clock_) clock_->mark(Stage::impact);
+}
+
+}  // namespace spook

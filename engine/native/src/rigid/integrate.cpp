@@ -1,0 +1,31 @@
+// Stage: places. q₊ = q + h v₊, and every orientation by the turn h w₊ of its body (rigid_state.hpp). Bodies of an event went with
+// v₋ until its time: what that makes of their way is added.
+//
+// reads: velocities of bodies, the contact stage's correction(). writes: places and orientations of bodies.
+#include "rigid/rigid_system.hpp"
+
+namespace spook {
+
+void RigidSystem::integrate() {
+    if (in_plane_ && half_step_ && !at_hand_) take_plane();  // also where its velocities were found in space
+    if (at_hand_) return move_in_plane();
+    if (!constrained_are_moved_)
+        for (int i : constrained_)
+            if (!asleep(i)) integrate_body(i);
+    constrained_are_moved_ = false;
+    for (int i : free_) integrate_body(i);
+    for (int i : driven_) integrate_body(i);
+    if (contacts_ && !contacts_->correction().empty()) {
+        const std::vector<Vec6>& extra = contacts_->correction();
+        for (std::size_t k = 0; k < constrained_.size(); ++k)
+            if (!asleep(constrained_[k]))
+                displace(constants_[constrained_[k]], h_, {extra[k][0], extra[k][1], extra[k][2]},
+                         {extra[k][3], extra[k][4], extra[k][5]}, live_.bodies[constrained_[k]]);
+    }
+}
+
+void RigidSystem::integrate_body(int i) {
+    if (!spook::integrate(constants_[i], h_, live_.bodies[i]) && live_.too_fast < 0) live_.too_fast = i;
+}
+
+}  // namespace spook

@@ -1,0 +1,63 @@
+// What a run of rigid bodies goes on from, beside its joints and contacts.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "linear/large_array.hpp"
+#include "linear/vec.hpp"
+#include "rigid/rigid_state.hpp"
+#include "rigid/sleep.hpp"
+
+namespace spook {
+
+/// What mid-step velocities are averaged from.
+struct BodyMomenta {
+    Vec3 velocity, angular_momentum;
+};
+
+/// The first step with a solve that left its rows further from their law than the method allows, the body it
+/// concerns, and the largest such residual of the run.
+struct Unsettled {
+    int body = -1;
+    std::int64_t step = 0;  // of h, counted from 1
+    double residual = 0.0;  // m/s
+    bool sunk = false;      // no row is off, but the body was left in another
+};
+
+/// Changes from step to step; copying it back goes back.
+struct RigidState {
+    LargeArray<BodyState> bodies;
+    int too_fast = -1;       // the first body that turned too fast
+    int not_solved = -1;     // a body of a system that could not be factored
+    int contradicted = -1;   // a body held by rows that cannot hold together
+    std::int64_t step = 0;   // steps of h begun
+    std::int64_t moved = 0;  // steps of h after which positions are known
+    Unsettled unsettled;
+    bool by_rows = false;  // PGS over joints alone has failed: few are solved directly
+    Sleep sleep;
+    // Velocities at mid-step:
+    bool velocity_ready = false;         // the velocities of the coming step are found already
+    LargeArray<BodyMomenta> before;      // those of the step before
+    std::vector<double> last_violation;  // per row, where the step before began
+    // Compositions:
+    double pending = 0.0;  // s: half a stage still to be kicked
+    int locked = -1;       // a body of redundant rows that contradict each other by now
+    int lost = -1;         // a body of rows that no motion satisfies
+    struct Watched {       // of the redundant rows of a loop, see rigid_locking.cpp
+        double work = 0.0, motion = 0.0, last = 0.0;  // J: taken so far; the largest, and the last
+        double held = 0.0, load = 0.0;                // √(2 J): what they held back, and what the loads gave
+        double given = 0.0;                           // 2 J: what the loads gave at the last look
+        std::int64_t next = 0, wait = 1;              // steps: of the next look, and to it
+    };
+    std::vector<Watched> watched;
+    std::int64_t looks = 0;  // at loops, for rows that lock
+    std::vector<int> named;  // joints that health() tells of
+    std::int64_t stage_steps = 0, newton_iterations = 0, halved_steps = 0;
+    // Stages × differences × unknowns: of the rows' forces [N], or of the paces of joint coordinates, from step
+    // to step; per stage: how many of them tell the next.
+    std::vector<double> history;
+    std::vector<int> guess_order;
+};
+
+}  // namespace spook
