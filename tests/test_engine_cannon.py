@@ -71,7 +71,7 @@ def test_a_pendulum_is_the_same_in_two_implementations_of_the_method() -> None:
     assert float(theirs["stretch"][0]) == pytest.approx(6.71786e-3, rel=1e-5)
 
 
-def test_a_short_chain_is_the_same_as_long_as_sweeps_solve_it() -> None:
+def test_a_short_chain_is_the_same_as_long_as_iterations_solve_it() -> None:
     ours, theirs = both(chain(3), 1.0)
 
     assert np.abs(ours["path"] - theirs["path"]).max() < 1e-9

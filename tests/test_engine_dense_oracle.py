@@ -137,7 +137,7 @@ def test_forcing_the_general_solver_changes_rounding_only() -> None:
 
 
 @pytest.mark.parametrize("kind", ["chain", "tree"])
-def test_sweeps_converge_to_the_dense_solve(kind: str) -> None:
+def test_iterations_converge_to_the_dense_solve(kind: str) -> None:
     sweeps = Method(solver="iterative", iterations=20_000, residual_tolerance=1e-15)
     assert_equal(KINDS[kind](np.random.default_rng(15)), sweeps, steps=10, tolerance=1e-9)
 

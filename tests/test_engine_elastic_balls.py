@@ -84,7 +84,7 @@ def flight(*masses: float) -> float:
 @pytest.mark.parametrize("impacts", IMPACTS)
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
-def test_balls_that_touch_as_they_fly_are_carried_by_nobody(
+def test_balls_that_touch_as_they_fly_are_carried_by_no_body(
     share: float, solver: str, impacts: Impacts
 ) -> None:
     """Two rise, one on top of the other, and meet a third: each half of the kick before the blow used to come after it."""
@@ -122,7 +122,7 @@ def test_a_ball_that_rises_along_a_wall_is_not_carried_by_it(
 @pytest.mark.parametrize("impacts", IMPACTS)
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
-def test_balls_locked_to_each_other_are_carried_by_nobody(
+def test_balls_locked_to_each_other_are_carried_by_no_body(
     share: float, solver: str, impacts: Impacts
 ) -> None:
     """One above the other they rise to a roof, and both turn round: a lock holds them together, and nobody up."""
@@ -158,7 +158,7 @@ def test_a_ball_that_has_left_the_floor_is_not_carried_by_it(share: float, solve
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("slope", [-0.3, 0.3, 1.0])
 @pytest.mark.parametrize("share", [0.2, 0.9])
-def test_a_ball_struck_on_a_slope_wins_nothing(
+def test_a_ball_hit_on_a_slope_wins_nothing(
     share: float, slope: float, solver: str, impacts: Impacts
 ) -> None:
     """It rolls up a plank that carries it, and one that comes down knocks it back."""
@@ -185,7 +185,7 @@ def test_a_ball_struck_on_a_slope_wins_nothing(
 @pytest.mark.parametrize("impacts", IMPACTS)
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
-def test_the_floor_carries_what_lies_on_it_until_a_blow_lifts_it(
+def test_the_floor_carries_what_lies_on_it_until_an_impact_lifts_it(
     share: float, solver: str, impacts: Impacts
 ) -> None:
     """A ball at rest, hit by a smaller one from below its middle: it falls from then on, and has not fallen before. Over
@@ -219,7 +219,7 @@ def test_the_floor_carries_what_lies_on_it_until_a_blow_lifts_it(
 @pytest.mark.parametrize("impacts", IMPACTS)
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("share", [0.2, 0.9])
-def test_what_loses_its_support_in_a_blow_wins_nothing_by_its_fall(
+def test_what_loses_its_support_in_an_impact_wins_nothing_by_its_fall(
     share: float, solver: str, impacts: Impacts
 ) -> None:
     """A ball leans on a wall and on another, which a third knocks away: it falls, with the kick of the whole step."""
@@ -242,7 +242,7 @@ def test_what_loses_its_support_in_a_blow_wins_nothing_by_its_fall(
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_a_blow_that_comes_before_the_expected_one_takes_nothing(solver: str) -> None:
+def test_an_impact_that_comes_before_the_expected_one_takes_nothing(solver: str) -> None:
     """Two would meet late in the step; a third, sent up by the floor, hits the lower one before: both had been led to the
     time of their own blow."""
     heavy, light = 5.0, 0.4
@@ -259,7 +259,7 @@ def test_a_blow_that_comes_before_the_expected_one_takes_nothing(solver: str) ->
 
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("share", [0.1, 0.3])
-def test_what_a_blow_lifts_falls_until_the_next_one(share: float, solver: str) -> None:
+def test_what_an_impact_lifts_falls_until_the_next_one(share: float, solver: str) -> None:
     """Struck up from the floor, and down by a roof in the same step: free from the first blow on."""
     small, speed = 0.5 * RADIUS, 6.0
     reach = math.sqrt((RADIUS + small) ** 2 - (RADIUS - small) ** 2)

@@ -120,7 +120,7 @@ def test_what_overlaps_where_a_step_ends_parts_however_it_is_turned(
 
 @pytest.mark.parametrize("friction", falling_pile.FRICTIONS)
 @pytest.mark.parametrize("seed", range(10))
-def test_sweeps_part_again_what_comes_down_elsewhere(seed: int, friction: float) -> None:
+def test_iterations_part_again_what_comes_down_elsewhere(seed: int, friction: float) -> None:
     """Parted once a step, five of these piles were left with up to 13 mm more than turns explain. Sweeps that count as settled
     may leave a speed for a step; one pile is left with .6 mm."""
     settled = Method(solver="iterative").unsettled_residual * falling_pile.TIME_STEP
@@ -138,7 +138,7 @@ def test_piles_overlap_by_no_more_than_what_turns_unforeseen(seed: int, friction
     ("seed", "restitution"),
     [(8, 0.0), (44, 0.0), (50, 0.1), (53, 0.1), (91, 0.0), (148, 0.0), (172, 0.1), (183, 0.0)],
 )
-def test_who_comes_down_on_another_is_no_slider_at_its_side(seed: int, restitution: float) -> None:
+def test_what_comes_down_on_another_is_no_slider_at_its_side(seed: int, restitution: float) -> None:
     """Taken for one that sweeps have left falling beside a tile, he would come to lie up to 10 mm in it."""
     friction = 0.0 if seed == 91 else 0.4
     fall = falling_pile.read(simulate, seed, restitution, friction, falling_pile.SWEEPS)
@@ -146,7 +146,7 @@ def test_who_comes_down_on_another_is_no_slider_at_its_side(seed: int, restituti
 
 
 @pytest.mark.parametrize("seed", [46, 61, 146, 233, 234, 256])
-def test_who_is_let_past_a_side_on_the_way_is_met_if_he_comes_there(seed: int) -> None:
+def test_a_side_skipped_between_iterations_is_met_if_the_body_gets_there(seed: int) -> None:
     """Between sweeps he was taken for one that slides by, as fast as he still fell; his velocity was the one that they ended
     with, and nobody asked again: he came to lie 3 to 80 mm in the other."""
     fall = falling_pile.read(simulate, seed, 0.0, 0.0, falling_pile.SWEEPS)

@@ -70,7 +70,7 @@ def test_what_is_lifted_out_of_an_overlap_has_paid_for_it(solver: str) -> None:
         assert result["depth"] < 1e-3
 
 
-def test_sweeps_that_stop_early_win_no_energy() -> None:
+def test_iterations_that_stop_early_win_no_energy() -> None:
     """Twenty boxes and fifty sweeps: the load is not carried at once, and what is missing was won back with more."""
     result = simulate(
         stack(20),
@@ -118,7 +118,7 @@ def test_a_stack_that_sinks_under_a_small_residual_is_unsettled() -> None:
     assert result.residual < 0.1
 
 
-def test_a_stack_that_sweeps_lift_apart_stands() -> None:
+def test_a_stack_that_iterations_lift_apart_stands() -> None:
     """The same through a hundred, which sank by .8 m in 45 steps, parted once a step. No overlap is more than what the
     allowed .1 m/s close in a step.
     """

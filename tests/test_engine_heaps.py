@@ -199,7 +199,7 @@ def test_a_heap_of_every_shape_costs_few_factorisations() -> None:
 
 @pytest.mark.parametrize("solver", ["direct", "iterative", "hybrid"])
 @pytest.mark.parametrize("count", [5, 6, 8, 24])
-def test_a_blow_that_goes_through_a_row_of_balls_in_one_step_keeps_the_momentum(
+def test_an_impact_that_goes_through_a_row_of_balls_in_one_step_keeps_the_momentum(
     count: int, solver: str
 ) -> None:
     """Each is found only once the one before it moves; the last one found lost its share of the blow (a sixth of it).
@@ -226,7 +226,7 @@ def test_a_blow_that_goes_through_a_row_of_balls_in_one_step_keeps_the_momentum(
     assert float(result["deep"]) < 1e-9 or solver == "iterative"
 
 
-def test_a_blow_goes_through_as_many_balls_as_it_reaches() -> None:
+def test_an_impact_goes_through_as_many_balls_as_it_reaches() -> None:
     """n = 120 balls in a row at gaps g, the first pushed so that the last moves on at half of d = g/h and meets no other.
 
     Each pair that meets is just closed at the end of the step, v_k − v_k+1 = d, so v_k = d (n − k + ½), and momentum is

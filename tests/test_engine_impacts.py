@@ -146,7 +146,7 @@ def test_impacts_among_many_bodies_keep_momentum_and_gain_no_energy(psi: float) 
 
 
 @pytest.mark.parametrize("gap", [0.0, 0.01])
-def test_a_blow_runs_through_a_row_of_balls(gap: float) -> None:
+def test_an_impact_runs_through_a_row_of_balls(gap: float) -> None:
     """Successive impacts, or gaps: the last ball leaves with the speed of the first. Touching and simultaneous,
     Newton's law for all at once gives −.6 and .4 for the rest."""
     row = [ball(f"b{k}", k * (0.2 + gap), 0.0, 1.0, 1.0) for k in range(1, 5)]
@@ -167,7 +167,7 @@ def test_a_blow_runs_through_a_row_of_balls(gap: float) -> None:
 
 @pytest.mark.parametrize("solver", ["direct", "iterative"])
 @pytest.mark.parametrize("h", [1e-3, 1 / 4000])
-def test_balls_held_by_joints_go_on_after_a_blow_as_it_left_them(h: float, solver: str) -> None:
+def test_balls_held_by_joints_go_on_after_an_impact_as_it_left_them(h: float, solver: str) -> None:
     """Equal balls on arms as long as they are thick exchange their spins. Led to the blow's time they were moved, not turned;
     the joints answered that with a speed in the next step, 8 % of the spin at any time step.
 
@@ -208,7 +208,7 @@ def test_balls_held_by_joints_go_on_after_a_blow_as_it_left_them(h: float, solve
 
 @pytest.mark.parametrize("solver", ["direct", "iterative"])
 @pytest.mark.parametrize("seed", [3, 21, 39])
-def test_momentum_is_kept_where_successive_blows_come_to_no_end(seed: int, solver: str) -> None:
+def test_momentum_is_kept_where_successive_impacts_come_to_no_end(seed: int, solver: str) -> None:
     """Eight balls of .01 to 100 kg in a row: after hundreds of blows in one step the rest is one blow of fifteen pairs,
     of which seven are enough. Elimination met pivots that were rounding: momentum changed by up to 154 %, told completed."""
     masses = 10.0 ** np.random.default_rng(seed).uniform(-2.0, 2.0, 8)
@@ -249,7 +249,7 @@ def meetings(
 @pytest.mark.parametrize("solver", ["direct", "iterative"])
 @pytest.mark.parametrize("ends", [1, 2])
 @pytest.mark.parametrize("seed", range(24))
-def test_successive_blows_come_in_the_order_of_their_times(seed: int, ends: int, solver: str) -> None:
+def test_successive_impacts_come_in_the_order_of_their_times(seed: int, ends: int, solver: str) -> None:
     """Rows of up to seven balls with gaps of 1e-9 to 1e-4 m, struck from one end or both: blows follow each other within a
     step, and which comes first decides who leaves with what. All pairs that approached were answered at once: 16 of
     24 rows struck from one end left otherwise, by up to their whole speed."""

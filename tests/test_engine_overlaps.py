@@ -65,7 +65,7 @@ def test_a_box_sunk_into_the_ground_rises_and_rests() -> None:
 @pytest.mark.parametrize("floor", [Plane(), Box((4.0, 4.0, 1.0))])
 @pytest.mark.parametrize("shape", [Capsule(0.05, 1.0), Box((0.1, 0.3, 1.0))])
 @pytest.mark.parametrize("solver", ["direct", "iterative", "hybrid"])
-def test_an_end_that_is_struck_down_within_a_step_does_not_sink(
+def test_an_end_that_is_hit_down_within_a_step_does_not_sink(
     solver: str, shape: Capsule | Box, floor: Plane | Box
 ) -> None:
     """A bar lies still with one end on the floor, the other 4 mm above it, out of reach, until a ball hits that end."""

@@ -110,7 +110,7 @@ def test_forces_act_at_every_step() -> None:
     assert P2.simulate(lifted, time_step=0.01, steps=100, observe=speed)["speed"][2] == pytest.approx(9.81)
 
 
-def test_locks_let_a_long_beam_fall_with_sweeps_as_they_come() -> None:
+def test_locks_let_a_long_beam_fall_with_iterations_as_they_come() -> None:
     assert peer_scenes.sag(defaults) > 1.0
 
 

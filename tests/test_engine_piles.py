@@ -27,7 +27,7 @@ from spook_tracker.scalar_tests import pile
 STEP = 1.0 / 60.0
 
 
-def test_a_pile_whose_sweeps_converge_does_not_overlap() -> None:
+def test_a_pile_whose_iterations_converge_does_not_overlap() -> None:
     """Every pair that is pushed together has its rows in the same solve: none sinks in, from the drop to rest."""
     result = simulate(
         pile.scene(40),
@@ -41,7 +41,7 @@ def test_a_pile_whose_sweeps_converge_does_not_overlap() -> None:
 
 
 @pytest.mark.parametrize("sweeps", [1, 5])
-def test_a_pile_with_few_sweeps_still_carries_its_weight(sweeps: int) -> None:
+def test_a_pile_with_few_iterations_still_carries_its_weight(sweeps: int) -> None:
     """Whatever such a run says of its residual: nothing sinks in far, and no step wins energy."""
     found = pile.read(simulate, 160, Method(solver="iterative", iterations=sweeps), steps=120, last=30)
     assert found.overlap < 0.02 * pile.RADIUS
@@ -61,7 +61,7 @@ def test_every_step_of_the_nightly_pile_settles() -> None:
     assert result["depth"] < 1e-3
 
 
-def test_a_heap_of_boxes_by_few_sweeps_sinks_in_no_further_than_a_residual_leads() -> None:
+def test_a_heap_of_boxes_by_few_iterations_sinks_in_no_further_than_a_residual_leads() -> None:
     """Ten layers: sweeps leave up to .1 m/s of a speed, and that leads so far in a step. Parted once they sank by .2 m."""
     heap = pile.scene(300)
     boxes = tuple(replace(body, shape=Box((0.5, 0.5, 0.5))) for body in heap.bodies[1:])

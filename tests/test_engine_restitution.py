@@ -156,7 +156,7 @@ def test_a_ball_bounces_where_the_map_of_its_steps_says() -> None:
 
 @pytest.mark.parametrize("solver", ["direct", "iterative", "hybrid"])
 @pytest.mark.parametrize("psi", [0.3, 0.6, 0.9])
-def test_a_blow_ahead_in_the_step_gives_back_what_it_meets_with(psi: float, solver: str) -> None:
+def test_an_impact_ahead_in_the_step_gives_back_what_it_meets_with(psi: float, solver: str) -> None:
     """Met with v² + 2 g d below the start of the step, given back ψ times as fast, and slower by 2 g d up there again."""
     rubber = Material(restitution=psi)
     capsule = RigidBody(

@@ -133,7 +133,7 @@ def test_a_body_that_hangs_in_the_bight_is_held_by_both_sides() -> None:
 
 
 @pytest.mark.parametrize("compliance", [0.0, 1e-6])
-def test_sweeps_and_contacts_come_to_the_same_a_step_late(compliance: float) -> None:
+def test_iterations_and_contacts_come_to_the_same_a_step_late(compliance: float) -> None:
     scene = hung(3.0, 1.0, compliance=compliance)
     ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, -9.0))
     block = RigidBody(name="block", mass=1.0, shape=Box((1.0, 1.0, 1.0)), position=(9.0, 0.0, -8.5))
@@ -150,7 +150,7 @@ def test_sweeps_and_contacts_come_to_the_same_a_step_late(compliance: float) -> 
         np.testing.assert_allclose(np.diff(result["v"][25:, 2]) / H, falls, rtol=1e-5)
 
 
-def test_a_weight_in_a_wall_is_parted_from_it_and_its_wire_pulls_as_before() -> None:
+def test_a_weight_in_a_wall_is_separated_from_it_and_its_wire_pulls_as_before() -> None:
     """Positions that part overlaps leave rows alone that hold no place: friction is no lock."""
     ball = RigidBody(name="one", mass=1.0, shape=Sphere(0.1), position=(0.0, 0.0, 0.0))
     wall = RigidBody(name="wall", motion="static", shape=Box((1.0, 9.0, 9.0)), position=(0.59, 0.0, 0.0))

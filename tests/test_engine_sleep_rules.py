@@ -57,7 +57,7 @@ def told(name: str, x: float, z: float, **options: Any) -> RigidBody:
 # --- who is at rest -----------------------------------------------------------------------------------------
 
 
-def test_who_loses_its_hold_in_a_step_does_not_fall_asleep_in_it() -> None:
+def test_what_loses_its_hold_in_a_step_does_not_fall_asleep_in_it() -> None:
     """It stood still in the very step that broke the lock it hung on: asleep it would hang there for ever."""
     holds = Lock(name="holds", between=(WORLD, "hangs"), at=(0.0, 0.0, 6.0), strength=5.0)
     built = scene(FLOOR, box("hangs", 0.0, 5.0), constraints=(holds,))
@@ -67,7 +67,7 @@ def test_who_loses_its_hold_in_a_step_does_not_fall_asleep_in_it() -> None:
     assert math.isclose(run.state["hangs"][9], -30.0 * GRAVITY * TIME_STEP, rel_tol=1e-5)
 
 
-def test_who_is_parted_from_what_it_overlaps_is_not_at_rest() -> None:
+def test_what_is_separated_from_what_it_overlaps_is_not_at_rest() -> None:
     """It goes without a velocity: a box from the floor, and a bar that two blocks turn about its middle."""
     run = held(scene(FLOOR, box("sunk", 0.0, 0.4)), sleepy(**AT_ONCE))
     while not asleep(run):
@@ -90,7 +90,7 @@ def test_who_is_parted_from_what_it_overlaps_is_not_at_rest() -> None:
     assert abs(math.acos(turned[-1]) - math.acos(turned[-2])) < 0.02 * TIME_STEP
 
 
-def test_who_comes_back_to_where_it_was_within_a_step_is_not_at_rest() -> None:
+def test_what_comes_back_to_where_it_was_within_a_step_is_not_at_rest() -> None:
     """A ball that meets a wall in the middle of a step."""
     elastic = Material(restitution=1.0)
     ball = RigidBody(
@@ -112,7 +112,7 @@ def test_who_comes_back_to_where_it_was_within_a_step_is_not_at_rest() -> None:
 
 
 @pytest.mark.parametrize("belt_first", [True, False])
-def test_nobody_sleeps_on_a_surface_that_moves_along_itself(belt_first: bool) -> None:
+def test_no_body_sleeps_on_a_surface_that_moves_along_itself(belt_first: bool) -> None:
     """Though it stands still against a post."""
     belt = still("belt", 0.0, -0.5, material=ROUGH, surface_velocity=(1.0, 0.0, 0.0))
     rides = box("rides", 0.0, 0.5, material=ROUGH)
@@ -176,7 +176,7 @@ def test_wires_and_springs_that_pull_aside_tie_sleepers(kind: str) -> None:
     assert wakes_as_a_whole(held(built, sleepy(), 60), 3, 120)
 
 
-def test_who_was_woken_is_at_rest_no_sooner_than_anybody() -> None:
+def test_a_woken_body_is_at_rest_no_sooner_than_any_other() -> None:
     """Two boxes that touch: one is pulled away, and the other sleeps again half a second later; who is set while awake
     begins anew."""
     bodies = (box("a", 0.0, 0.0), box("b", 1.0, 0.0))
@@ -223,7 +223,7 @@ def test_a_kinematic_body_that_holds_sleepers_wakes_them_in_the_step_it_goes(kin
 
 
 @pytest.mark.parametrize("first", [True, False])
-def test_a_kinematic_body_wakes_whom_it_leaves_whichever_is_listed_first(first: bool) -> None:
+def test_a_kinematic_body_wakes_what_it_leaves_whichever_is_listed_first(first: bool) -> None:
     table = told("table", 0.0, -0.5, shape=Box((4.0, 4.0, 1.0)), material=ROUGH)
     bodies = (table, box("a", 0.0, 0.5)) if first else (box("a", 0.0, 0.5), table)
     run = held(scene(*bodies), sleepy(), 60)
@@ -274,7 +274,7 @@ def test_forces_of_a_joint_that_fell_asleep_before_anything_touched_are_read_whe
         assert np.array_equal(pull, run["pull"])
 
 
-def test_who_fell_asleep_turning_slowly_wakes_without_that_turn() -> None:
+def test_what_fell_asleep_turning_slowly_wakes_without_that_turn() -> None:
     turns = box("turns", 0.0, 5.0, angular_velocity=(0.0, 0.0, 0.01))
     run = held(scene(FLOOR, turns, weighs=False, forces=(Load(name="push", body="turns"),)), sleepy(), 40)
     assert asleep(run) == 1

@@ -146,7 +146,7 @@ def test_a_sleeper_that_is_hit_gets_the_momentum(solver: str) -> None:
     assert math.isclose(run.state["target"][7], 0.6, rel_tol=1e-12)
 
 
-def test_a_blow_runs_through_a_row_of_sleepers() -> None:
+def test_an_impact_runs_through_a_row_of_sleepers() -> None:
     """Newton's cradle, successive blows: the last leaves with all the speed, the others sleep again."""
     balls = [
         RigidBody(
@@ -220,7 +220,7 @@ def test_a_support_pulled_away_wakes_in_the_same_step() -> None:
         assert math.isclose(run.state[f"box {k}"][9], -GRAVITY * TIME_STEP, rel_tol=1e-12)
 
 
-def test_a_support_that_follows_the_time_wakes_and_nobody_sleeps_on_what_moves() -> None:
+def test_a_support_that_follows_the_time_wakes_and_nothing_sleeps_on_what_moves() -> None:
     late = Ramp(start=1.0, end=2.0, start_value=-0.5, end_value=0.5)
     run = held(scene(table(path=(0.0, 0.0, late)), *stack()), sleepy(), 60)
     assert asleep(run) == 3

@@ -125,7 +125,7 @@ def test_a_load_so_light_that_it_gives_little_speed_in_a_step_is_not_slept_over(
     assert math.isclose(run.state["sled"][7], 0.1, rel_tol=1e-9)
 
 
-def test_a_joint_that_breaks_leaves_nobody_asleep() -> None:
+def test_a_joint_that_breaks_leaves_no_body_asleep() -> None:
     """A box hangs on a breakable lock, asleep with another: the load that breaks the lock wakes it, and it falls."""
     hangs = box("hangs", 0.0, 5.0)
     holds = Lock(name="holds", between=(WORLD, "hangs"), at=(0.0, 0.0, 6.0), strength=30.0)

@@ -90,7 +90,7 @@ def test_balls_thrown_at_a_wall_keep_their_energy_whether_they_rise_or_fall(
 @pytest.mark.parametrize("h", STEPS)
 @pytest.mark.parametrize("way", [1.0, -1.0])
 @pytest.mark.parametrize("psi", [0.3, 1.0])
-def test_a_single_blow_is_the_same_in_either_order(psi: float, way: float, h: float) -> None:
+def test_a_single_impact_is_the_same_in_either_order(psi: float, way: float, h: float) -> None:
     material = Material(restitution=psi)
     ends = []
     for impacts in ("simultaneous", "successive"):
@@ -112,7 +112,7 @@ def test_a_single_blow_is_the_same_in_either_order(psi: float, way: float, h: fl
 
 @pytest.mark.parametrize("solver", SUCCESSIVE)
 @pytest.mark.parametrize("seed", range(8))
-def test_a_kinematic_body_strikes_a_row_as_a_ball_of_any_mass_would(seed: int, solver: str) -> None:
+def test_a_kinematic_body_hits_a_row_as_a_ball_of_any_mass_would(seed: int, solver: str) -> None:
     rng, h = np.random.default_rng(100 + seed), STEPS[seed % 3]
     count, speed = int(rng.integers(2, 5)), float(rng.uniform(0.5, 3.0))
     masses = np.concatenate(((1e15,), 10.0 ** rng.uniform(-0.7, 0.7, count)))
@@ -145,7 +145,7 @@ def test_a_kinematic_body_strikes_a_row_as_a_ball_of_any_mass_would(seed: int, s
 
 @pytest.mark.parametrize("first", [0.2, 0.8])
 @pytest.mark.parametrize("solver", SUCCESSIVE)
-def test_blows_at_both_ends_of_a_locked_pair_come_in_their_order(solver: str, first: float) -> None:
+def test_impacts_at_both_ends_of_a_locked_pair_come_in_their_order(solver: str, first: float) -> None:
     """A joint is all that hangs them together: what strikes one end changes what strikes the other later in the step."""
     h, masses = STEPS[0], np.array((0.5, 2.0, 1.5))
     speeds = np.array((3.0, 0.0, -2.0))

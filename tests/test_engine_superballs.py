@@ -38,7 +38,7 @@ def floor(material: Material) -> RigidBody:
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("model", ["cone", "box", "scaled_box"])
 @pytest.mark.parametrize(("mu", "returned"), [(5.0, 1.0), (5.0, 0.6), (0.2, 1.0), (0.0, 1.0)])
-def test_a_blow_turns_the_slip_round_as_far_as_friction_holds(
+def test_an_impact_turns_the_slip_round_as_far_as_friction_holds(
     solver: str, model: str, mu: float, returned: float
 ) -> None:
     """Half a ball's mass over 7/2 takes up the slip: the impulse is (1 + psi_t) 2/7 of it, at most mu (1 + psi) u."""

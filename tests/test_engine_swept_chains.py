@@ -58,7 +58,7 @@ def chain(masses: tuple[float, ...], depth: float | None) -> Scene:
 
 @pytest.mark.parametrize(("h", "depth"), [(1 / 240, None), (1e-3, None), (1e-3, 0.3)])
 @pytest.mark.parametrize("masses", [(0.1, 0.1, 10.0, 10.0), (10.0, 0.1, 0.1, 10.0), (0.1, 0.1, 10.0)])
-def test_a_swept_chain_gains_no_more_than_its_rows_may_be_off(
+def test_an_iterated_chain_gains_no_more_than_its_rows_may_be_off(
     masses: tuple[float, ...], depth: float | None, h: float
 ) -> None:
     """In truth its energy stays, or is lost on the floor. A row that is .1 m/s off, of speeds u and more, gives or takes 2

@@ -311,7 +311,7 @@ def test_the_order_in_which_any_heap_is_written_does_not_matter(seed: int) -> No
     assert left_when_shuffled(heap(np.random.default_rng(seed), 0.05)) < 1e-9
 
 
-def test_the_order_of_a_compound_s_parts_does_not_matter_to_a_blow() -> None:
+def test_the_order_of_a_compound_s_parts_does_not_matter_to_an_impact() -> None:
     """Eight feet, four on each of two slabs: however the feet are listed, those of a slab share its blow alike,
     to the last digits: it was 7e-14."""
     rough = Material(friction=0.5, restitution=0.5)

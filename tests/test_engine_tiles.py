@@ -127,7 +127,7 @@ def test_nothing_is_felt_of_edges_that_lie_on_each_other(slider: str, solver: st
 
 
 @pytest.mark.parametrize("slider", SLIDERS)
-def test_sweeps_that_have_not_settled_meet_no_edge(slider: str) -> None:
+def test_iterations_that_have_not_settled_meet_no_edge(slider: str) -> None:
     """Between sweeps a body sinks, and rocks: then its far end would meet the side of the next tile. By ten of them a
     tenth of a metre per second may be left, at an arm of .3 m."""
     for heading, y in (
@@ -154,7 +154,7 @@ def test_sweeps_that_have_not_settled_meet_no_edge(slider: str) -> None:
         ("ball", 0.24985000000025, 6.52310164925814, 1e-4, 2.5333040246491105, 0.5, 10, 1 / 60),
     ],
 )
-def test_who_sinks_before_sweeps_hold_him_meets_no_edge(
+def test_a_body_that_sinks_before_iterations_hold_it_meets_no_edge(
     slider: str,
     y: float,
     speed: float,
@@ -195,7 +195,7 @@ def test_who_sinks_before_sweeps_hold_him_meets_no_edge(
         ("cylinder along", 0.0, -2.7, 1 / 60, 200),
     ],
 )
-def test_sweeps_over_tiles_that_can_move_meet_no_edge(
+def test_iterations_over_tiles_that_can_move_meet_no_edge(
     slider: str, heading: float, y: float, h: float, sweeps: int
 ) -> None:
     """The tile that holds a body sinks a little beside the next one, between sweeps and by what they leave: its side was
@@ -208,7 +208,7 @@ def test_sweeps_over_tiles_that_can_move_meet_no_edge(
 
 @pytest.mark.parametrize("sweeps", [10, 50])
 @pytest.mark.parametrize("slider", ["box", "cylinder", "pyramid"])
-def test_sweeps_over_tiles_that_can_move_meet_an_edge_that_stands_out(slider: str, sweeps: int) -> None:
+def test_iterations_over_tiles_that_can_move_meet_an_edge_that_stands_out(slider: str, sweeps: int) -> None:
     """Settled sweeps may leave .1 m/s, which leads 1.7 mm in a step: an edge far lower than that is no fall, and is met."""
     high = 1e-4
     tiles = [
@@ -254,7 +254,7 @@ def test_an_edge_that_stands_out_is_met(slider: str, solver: str) -> None:
 
 @pytest.mark.parametrize("solver", ["direct", "iterative", "hybrid"])
 @pytest.mark.parametrize("speed", [0.01, 0.05, 0.5])
-def test_a_wall_of_two_parts_holds_who_touches_it(solver: str, speed: float) -> None:
+def test_a_wall_of_two_parts_holds_what_touches_it(solver: str, speed: float) -> None:
     """A box leans on the floor and on two boxes side by side, and is pushed along: neither is let pass for the other."""
     walls = [
         RigidBody(
@@ -299,7 +299,7 @@ def campaign() -> Any:
     return module
 
 
-def test_where_sweeps_run_away_the_step_is_solved_directly(campaign: Any) -> None:
+def test_where_iterations_run_away_the_step_is_solved_directly(campaign: Any) -> None:
     """550 t fall on the point of a cone of 40 kg: each run of sweeps leaves far more speed than the one before, without end.
     The step ran into its time limit, meeting everything on that way."""
     scene, rate, method = campaign.heap(101833, wide=True)
@@ -318,7 +318,7 @@ def test_where_sweeps_run_away_the_step_is_solved_directly(campaign: Any) -> Non
 @pytest.mark.parametrize(("solver", "left"), [("direct", 1e-12), ("hybrid", 1e-12), ("iterative", 0.1)])
 @pytest.mark.parametrize("restitution", [0.0, 0.6])
 @pytest.mark.parametrize("slider", SLIDERS)
-def test_who_falls_onto_tiles_lands_on_their_plane(
+def test_what_falls_onto_tiles_lands_on_their_plane(
     slider: str, restitution: float, solver: str, left: float
 ) -> None:
     """Swept to the end of the step it would be through the first tile, and at the side of the next: one landing in ten was

@@ -60,7 +60,7 @@ def test_what_is_reported_is_what_is_judged(scene: Scene, sweeps: int) -> None:
 @pytest.mark.parametrize(
     ("count", "sweeps", "sunk"), [(100, 5, False), (200, 5, False), (100, 50, True), (200, 200, True)]
 )
-def test_tall_stacks_on_sweeps_are_no_answer(count: int, sweeps: int, sunk: bool) -> None:
+def test_tall_stacks_on_iterations_are_no_answer(count: int, sweeps: int, sunk: bool) -> None:
     """It names the first step and the body: a row is off by more than allowed, or boxes sank step after step, and which."""
     size, deep = 1.0, Maximum(quantity=Penetration())
     result = simulate(
@@ -80,7 +80,7 @@ def test_tall_stacks_on_sweeps_are_no_answer(count: int, sweeps: int, sunk: bool
 
 
 @pytest.mark.parametrize(("sweeps", "settled"), [(1, False), (2, True), (10, True)])
-def test_sweeps_go_on_for_sixteen_times_the_work_not_the_turns(sweeps: int, settled: bool) -> None:
+def test_iterations_go_on_for_sixteen_times_the_work_not_the_turns(sweeps: int, settled: bool) -> None:
     """Where few bodies of a heap are off, a sweep costs little, and sixteen turns were far from what they may cost."""
     method = Method(solver="iterative", iterations=sweeps)
     result = simulate(pile.scene(300), time_step=TIME_STEP, steps=60, method=method)
@@ -89,7 +89,7 @@ def test_sweeps_go_on_for_sixteen_times_the_work_not_the_turns(sweeps: int, sett
     assert (result.residual <= method.unsettled_residual) == settled
 
 
-def test_joints_that_sweeps_do_not_settle_are_given_up_after_four_times_as_many() -> None:
+def test_joints_that_iterations_do_not_settle_are_given_up_after_four_times_as_many() -> None:
     """Eighty locked boxes held at one end: more sweeps do not help, and all joints would be swept each time."""
     method = Method(solver="iterative", iterations=50)
     result = simulate(beam(time_step=TIME_STEP), time_step=TIME_STEP, steps=20, method=method)
@@ -122,7 +122,7 @@ def test_solves_that_settled_leave_no_residual_to_speak_of() -> None:
 
 
 @pytest.mark.parametrize(("seed", "counted"), [(9, 1), (10, 0)])
-def test_a_blow_whose_points_contradict_each_other_is_counted(seed: int, counted: int) -> None:
+def test_an_impact_whose_points_contradict_each_other_is_counted(seed: int, counted: int) -> None:
     """In heap 9 four corners of a box are to leave at speeds that no rigid motion has; in heap 10 nothing is."""
     result = simulate(heap(np.random.default_rng(seed), 0.05), time_step=0.01, steps=30)
 

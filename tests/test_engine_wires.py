@@ -92,7 +92,7 @@ def test_a_slack_rope_is_not_there() -> None:
 
 @pytest.mark.parametrize("restitution", [0.0, 0.5, 1.0])
 @pytest.mark.parametrize("phase", [0.0, 0.25, 0.7])
-def test_a_rope_that_snaps_taut_is_a_blow(restitution: float, phase: float) -> None:
+def test_a_rope_that_snaps_taut_is_an_impact(restitution: float, phase: float) -> None:
     """Momentum stays, the parting speed u becomes −e u, ½ µ u² (1 − e²) is lost."""
     one, two, u = 3.0, 2.0, 4.0
     scene = Scene(

@@ -31,9 +31,7 @@ RIGID = f"{F}.test_the_rigid_prototype_gives_the_first_step_of_the_door_and_the_
 A = "tests.test_scalar_tests_arm_limits"
 LAGS = f"{M}.test_cranks_and_pins_lag_as_damped_rows_do_and_run_ahead_by_the_turn_of_a_step"
 CLIMB = f"{C}.test_a_driven_vehicle_climbs_by_newton_and_slips_when_its_friction_is_used_up"
-BLOW = (
-    "tests.test_scalar_tests_rocking_limits.test_a_step_that_holds_a_blow_keeps_as_much_as_the_limits_allow"
-)
+BLOW = "tests.test_scalar_tests_rocking_limits.test_a_step_that_holds_an_impact_keeps_as_much_as_the_limits_allow"
 METACENTRE = f"{M}.test_a_small_roll_rights_itself_with_its_metacentre_and_a_little_more"
 SEARCH = f"{F}.test_a_search_is_as_exact_as_its_resolution"
 RODS = f"{F}.test_loaded_rods_swing_as_their_modes_do_step_by_step"

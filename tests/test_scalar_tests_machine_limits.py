@@ -270,7 +270,7 @@ def test_cranks_and_pins_lag_as_damped_rows_do_and_run_ahead_by_the_turn_of_a_st
     )
 
 
-def test_a_slider_with_play_flies_and_strikes_where_an_integration_with_events_says() -> None:
+def test_a_slider_with_play_flies_and_hits_where_an_integration_with_events_says() -> None:
     """Pin and slider as masses on a line: pressed at a wall until the force would pull, free until the gap has closed."""
     b, s = loose_bearing, slider_crank
     crank, rod = s.CRANK, s.ROD

@@ -164,7 +164,7 @@ def worst(speed: float, h: float, floors: tuple[float, ...] = (0.0,)) -> float:
     )
 
 
-def test_a_step_that_holds_a_blow_keeps_as_much_as_the_limits_allow() -> None:
+def test_a_step_that_holds_an_impact_keeps_as_much_as_the_limits_allow() -> None:
     r, s = rocking_block, shaken_block
     limits = {m.name: m.limit for m in measurement("rocking_block", "plain").metrics}
     off = worst(r.speed(r.START), r.TIME_STEP)

@@ -178,7 +178,7 @@ def test_a_compliant_contact_gives_back_no_more_than_it_was_given(
 
 @pytest.mark.parametrize("solver", ["direct", "hybrid"])
 @pytest.mark.parametrize("boxes", [2, 5])
-def test_who_parts_is_not_pushed_into_a_third_that_nothing_touches(boxes: int, solver: str) -> None:
+def test_what_parts_is_not_pushed_into_a_third_that_nothing_touches(boxes: int, solver: str) -> None:
     """A row along x, .1 mm between all, the first 4 mm inside a wall. Parting takes .8 mm in the first step: the next
     one was entered by .74 mm, since only pairs that touch had a say."""
     side, gap = 0.2, 1e-4

@@ -130,7 +130,7 @@ def test_a_ball_pushed_onto_a_wall_that_turns_meets_it_as_it_stands_then(solver:
 
 @pytest.mark.parametrize("mass", [1.0, 1000.0])
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_the_far_end_of_a_bell_that_is_hit_meets_whom_its_arc_leads_to(solver: str, mass: float) -> None:
+def test_the_far_end_of_a_bell_that_is_hit_meets_what_its_arc_leads_to(solver: str, mass: float) -> None:
     """One end of a dumbbell is hit; the other, nearly at rest at first, swings round its middle towards a ball between them,
     which it does not approach where the step begins. Both rows as they stand, with arms as they were then, give the rest."""
     radius, half, gap, push = 0.1, 0.5, 0.002, 40.0

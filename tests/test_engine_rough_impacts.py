@@ -148,7 +148,9 @@ def test_the_end_of_a_rod_grips_where_it_rebounds(solver: str, tilt: float, slip
 
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize(("tilt", "slip", "mu"), [(0.8, -0.5, 2.0), (1.2, -1.0, 1.0)])
-def test_a_blow_elsewhere_is_none_of_its_business(solver: str, tilt: float, slip: float, mu: float) -> None:
+def test_an_impact_elsewhere_is_none_of_its_business(
+    solver: str, tilt: float, slip: float, mu: float
+) -> None:
     """Newton's law would raise this rod's energy, and is tempered; what a ball 30 m away loses in the same step is not
     there to be won."""
     rough = Material(restitution=0.8, friction=mu)
@@ -169,7 +171,7 @@ def test_a_blow_elsewhere_is_none_of_its_business(solver: str, tilt: float, slip
 
 
 @pytest.mark.parametrize("seed", range(12))
-def test_rough_blows_among_unequal_bodies_never_raise_the_energy(seed: int) -> None:
+def test_rough_impacts_among_unequal_bodies_never_raise_the_energy(seed: int) -> None:
     """Corners hit at a slant, restitutions from 0 to 1 mixed, friction up to 2, masses over six decades: Newton's
     law alone raises the energy of some of these; no step may."""
     rng = np.random.default_rng(seed)
@@ -290,7 +292,7 @@ def test_a_seam_of_two_faces_is_no_obstacle(h: float, shape: Sphere | Box) -> No
     [(50, seed) for seed in (0, 5, 10, 11, 12, 18, 36, 106, 113)]
     + [(5, seed) for seed in (24, 58, 121, 128, 189)],
 )
-def test_sweeps_see_no_step_where_tiles_go_on(sweeps: int, seed: int) -> None:
+def test_iterations_see_no_step_where_tiles_go_on(sweeps: int, seed: int) -> None:
     """Tiles of random lengths in one plane, leaning so that nothing is exact: before its sweeps have settled a box sinks a
     little, and met the side of the next tile with that speed. Two slides in five ended so. Five sweeps leave a speed that
     the next step sank by: one slide in nine was thrown up."""
@@ -337,7 +339,7 @@ def test_sweeps_see_no_step_where_tiles_go_on(sweeps: int, seed: int) -> None:
 
 @pytest.mark.parametrize("shape", [Sphere(0.1), Box((0.2, 0.2, 0.2))], ids=["balls", "boxes"])
 @pytest.mark.parametrize("solver", SOLVERS)
-def test_who_is_set_in_motion_by_a_plastic_blow_rebounds_in_the_same_step(
+def test_what_is_set_in_motion_by_a_plastic_impact_rebounds_in_the_same_step(
     solver: str, shape: Sphere | Box
 ) -> None:
     """One hits a second and stays with it, 1/2 v; both hit a third, psi = 1/2: with 2 u + w = v and w - u = v/4 they go
@@ -454,7 +456,7 @@ def test_an_unsettled_solve_is_said_and_keeps_its_values() -> None:
     assert settled.completed
 
 
-def test_a_blow_that_sweeps_leave_unsettled_is_said() -> None:
+def test_an_impact_that_iterations_leave_unsettled_is_said() -> None:
     """Two sweeps do not share a blow among forty balls in a row; where they rest, afterwards, no row is off."""
     elastic = Material(restitution=1.0)
     row = [ball(f"b{k}", (0.2 * k, 0, 0), (0, 0, 0), material=elastic) for k in range(1, 41)]

@@ -28,7 +28,7 @@ from spook_tracker.engine import (
     Velocity,
     simulate,
 )
-from tests.test_engine_blows import SOLVERS, STEPS, ball, floor
+from tests.test_engine_rough_impacts import SOLVERS, STEPS, ball, floor
 
 
 @pytest.mark.parametrize("h", STEPS)
@@ -72,7 +72,7 @@ def test_a_stop_returns_its_own_restitution(h: float, psi: float) -> None:
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("kind", [Hinge, Prismatic])
 @pytest.mark.parametrize("phase", [-0.5, 0.0, 0.5])
-def test_a_stop_knows_of_no_blow_far_away(kind: type, phase: float, solver: str, h: float) -> None:
+def test_a_stop_knows_of_no_impact_far_away(kind: type, phase: float, solver: str, h: float) -> None:
     """A ball that rebounds 50 m away in the very step took all of the stop's rebound: rows were assembled again after it,
     and the stop seemed closed long since; in the blow it took part as one without restitution."""
     turns, speed, elastic = kind is Hinge, 2.0, Material(restitution=1.0)
@@ -110,7 +110,7 @@ def test_a_stop_knows_of_no_blow_far_away(kind: type, phase: float, solver: str,
 @pytest.mark.parametrize("shape", [Sphere(0.1), Box((0.2, 0.2, 0.2))], ids=["balls", "boxes"])
 @pytest.mark.parametrize("gap", [1e-4, 0.003, 0.1])
 @pytest.mark.parametrize(("psi", "after"), [(1.0, (1.0, 3.0)), (0.0, (1.0, 1.0))])
-def test_who_comes_back_from_a_stop_meets_what_follows(
+def test_what_comes_back_from_a_stop_meets_what_follows(
     psi: float, after: tuple[float, float], gap: float, shape: Sphere | Box, solver: str, h: float
 ) -> None:
     """A slider at 3 m/s comes back from its stop and meets its like, which follows at 1 m/s. psi = 1: they exchange -1 and
@@ -221,7 +221,7 @@ def test_what_rides_on_a_slider_stays_between_its_own_ends(psi: float, solver: s
 @pytest.mark.parametrize("h", STEPS)
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("psi", [0.3, 1.0])
-def test_who_is_stopped_without_rebound_is_met_by_what_follows(psi: float, solver: str, h: float) -> None:
+def test_what_is_stopped_without_rebound_is_met_by_what_follows(psi: float, solver: str, h: float) -> None:
     """A slider at 3 m/s ends at its stop 1.3 steps after the start; at 1.7 steps its follower, at 2.5 m/s, meets it there
     and rebounds from both. They did not see each other, and overlapped by what the follower goes in half a step."""
     bounces = Material(restitution=psi)
@@ -324,7 +324,7 @@ def test_what_rebounds_between_near_ends_stays_between_them(range_: float, solve
 
 @pytest.mark.parametrize("solver", ["direct", "iterative"])
 @pytest.mark.parametrize("seed", range(8))
-def test_blows_without_end_beside_a_stop_add_no_energy(seed: int, solver: str) -> None:
+def test_impacts_without_end_beside_a_stop_add_no_energy(seed: int, solver: str) -> None:
     """A light slider between its elastic stop and heavy balls that come on: over a hundred blows in a step, the last of which
     answers all at once. The stop is not to rebound once more after it."""
     rng, h = np.random.default_rng(seed), STEPS[0]
