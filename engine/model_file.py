@@ -48,6 +48,7 @@ class ModelFile:
     watched: tuple[Watched, ...]
     keyframe: str = ""  # its name, or its number; "": as the file describes it
     drive: Drive = Drive()
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)  # m/s², for engines whose loaders do not read it
     assets: Mapping[str, str] = field(default_factory=dict, metadata={"definition": False})  # name → path
 
 

@@ -23,6 +23,7 @@ MOST_FILES = 3_000
 DEEPEST = 200  # elements within elements; engines read models recursively
 MOST_WATCHED = 8
 TIME_STEP = 0.002  # s, of MJCF that names none; also what MuJoCo gives a URDF
+GRAVITY = (0.0, 0.0, -9.81)  # m/s², of a file that names none
 ROOTS = (".git", "tracker.toml", "pyproject.toml", "package.xml")  # whose folder is a whole
 INSTALLED = ("site-packages", "dist-packages")  # whose folders are wholes
 FILES_OF = {  # element: attributes that name files
@@ -63,6 +64,7 @@ class Reading:
     bodies: int = 0  # that move
     stands_free: bool = False  # everything that moves is free: nothing but contacts carries it
     driven: bool = False  # it has actuators
+    gravity: tuple[float, float, float] = GRAVITY  # m/s²
     assets: dict[str, Path] = field(default_factory=dict)  # a URDF's meshes, by the name after the last slash
 
 
@@ -186,6 +188,7 @@ class _Reader:
             _step(steps[-1], self.path) if steps else TIME_STEP,
             keyframes=tuple(key.get("name") or str(place) for place, key in enumerate(keys)),
             driven=any(len(actuators) for actuators in root.findall("actuator")),
+            gravity=_gravity([o.get("gravity") for o in root.findall("option")], self.path),
         )
 
     def expand(self, element: ElementTree.Element, main: Path, file: Path, within: tuple[Path, ...]) -> None:
@@ -294,7 +297,8 @@ class _Reader:
                 self.first(
                     mesh.text.removeprefix("model://"), [self.path.parent, self.path.parent.parent], self.path
                 )
-        return self.found("SDF", bodies, _step(step, self.path) if step else 0.001)
+        gravity = _gravity([root.findtext(".//gravity")], self.path)
+        return self.found("SDF", bodies, _step(step, self.path) if step else 0.001, gravity=gravity)
 
     def found(
         self,
@@ -304,6 +308,7 @@ class _Reader:
         keyframes: tuple[str, ...] = (),
         assets: dict[str, Path] | None = None,
         driven: bool = False,
+        gravity: tuple[float, float, float] = GRAVITY,
     ) -> Reading:
         every = list(_moving(bodies, "", (), False))
         if not every:
@@ -323,6 +328,7 @@ class _Reader:
             stands_free=all(body.free for body in tops),
             assets=assets or {},
             driven=driven,
+            gravity=gravity,
         )
 
     def digest(self) -> str:
@@ -353,6 +359,16 @@ def _step(text: str | None, path: Path) -> float:
     if not 0.0 < step <= 1.0:
         raise ModelError(f"{path}: its time step is {step:g} s")
     return step
+
+
+def _gravity(texts: list[str | None], path: Path) -> tuple[float, float, float]:
+    """The last one that is named."""
+    named = [text for text in texts if text]
+    try:
+        x, y, z = map(float, named[-1].split()) if named else GRAVITY
+    except ValueError:
+        raise ModelError(f"{path}: its gravity is {named[-1][:60]!r}, which is no three numbers") from None
+    return x, y, z
 
 
 def _gather(element: ElementTree.Element, into: _Body) -> None:

@@ -6,43 +6,31 @@ is; a time step other than its own is set in the compiled model.
 
 from __future__ import annotations
 
-import hashlib
-import pickle
-import subprocess
-import sys
 import time
-from collections import deque
 from collections.abc import Callable
-from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import mujoco
 import numpy as np
-import numpy.typing as npt
 
-from spook_tracker.engine.errors import EngineError
 from spook_tracker.engine.model_file import Drive, ModelRun, Watched
+from spook_tracker.engine.peers.model_loop import Array, LoadedModel, elsewhere
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result
 
-Array = npt.NDArray[np.float64]
 BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 READS = ("MJCF", "URDF")
 DAMPING = ("dof_damping", "dof_dampingpoly", "tendon_damping", "tendon_dampingpoly")  # of joints and tendons
-CALM = 1e-3  # of the size a second: nothing faster, nothing turning faster than that at its rim
-CALM_FOR = 0.5  # s
-LOOK = 0.02  # s between two looks at whether all is calm
 LOADS = 3  # times a file is loaded to tell how long it takes
-ELSEWHERE_LIMIT = 120.0  # s
 
 
 def run_model(run: ModelRun, time_step: float, duration: float, time_limit: float | None) -> Result:
     """Load the file, drive it for `duration` [s] and read what is asked for."""
     mujoco.set_mju_user_warning(_unheard)
     if run.elsewhere:
-        return _elsewhere(run, time_step, duration, time_limit)
+        return elsewhere(__name__, run, time_step, duration, time_limit)
     began = time.perf_counter()
     try:
         first = load(run)
@@ -74,25 +62,12 @@ def _line(error: Exception) -> str:
     return " ".join(str(error).split())[:240]
 
 
-def _elsewhere(run: ModelRun, time_step: float, duration: float, time_limit: float | None) -> Result:
-    """The same in a process of its own."""
-    asked = pickle.dumps((replace(run, elsewhere=False), time_step, duration, time_limit))
-    done = subprocess.run(
-        [sys.executable, "-m", __name__], input=asked, capture_output=True, timeout=ELSEWHERE_LIMIT
-    )
-    if done.returncode:
-        raise EngineError(
-            f"mujoco died in a process of its own: {done.stderr.decode(errors='replace')[-200:]}"
-        )
-    found: Result = pickle.loads(done.stdout)
-    return found
-
-
-class _Simulation:
+class _Simulation(LoadedModel):
     """One model with its data."""
 
     def __init__(self, run: ModelRun, model: Any, time_step: float, time_limit: float | None) -> None:
-        self.run, self.model, self.step, self.limit = run, model, time_step, time_limit
+        super().__init__(run, time_step, time_limit)
+        self.model = model
         model.opt.timestep = time_step
         _set(model, run)
         self.data = mujoco.MjData(model)
@@ -101,12 +76,9 @@ class _Simulation:
         self.bodies = np.array([self._body(one) for one in run.model.watched], dtype=int)
         mujoco.mj_forward(model, self.data)
         self.moving = np.flatnonzero(np.asarray(model.body_weldid) != 0)
-        self.size = self._size()
+        self.size, self.freedom = self._size(), model.nv
         self.drive = _driven(run.model.drive, model, self.data)
-        self.random = np.random.default_rng(run.seed)
-        self.done = 0
-        self.seconds = self.cpu = self.worst = 0.0
-        self.failure = ""
+        self.varies = self.drive.varies
 
     def _key(self, name: str) -> int:
         found = int(mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, name))
@@ -139,99 +111,54 @@ class _Simulation:
         size = 2.0 * float(np.max(np.linalg.norm(places - places.mean(axis=0), axis=1) + reach))
         return size if np.isfinite(size) and size > 0.0 else float(m.stat.extent)
 
-    def result(self, duration: float, load_seconds: float) -> Result:
-        run, total = self.run, round(duration / self.step)
-        looks = {total}
-        marks = {min(total, round(at / self.step)) for at in run.samples}
-        if run.until_settled:
-            every = max(1, round(LOOK / self.step))
-            looks |= set(range(every, total, every))
-        positions, turns, energies, violations = [], [], [], []
-        recent: deque[tuple[int, Array]] = deque()
-        calm_since: int | None = None
-        settled, creep = float("nan"), np.full(len(self.bodies), np.nan)
-        status: Any = "completed"
-        for mark in sorted(marks | looks):
-            self.advance(mark)
-            if self.failure:
-                status = "timed_out" if self.failure.startswith("stopped") else "diverged"
-                break
-            self.read()
-            if mark in marks:
-                positions.append(self.data.xpos[self.bodies].copy())
-                turns.append(self.data.xquat[self.bodies].copy())
-                violations.append(self.violation())
-                if run.conservative:
-                    mujoco.mj_energyPos(self.model, self.data)
-                    mujoco.mj_energyVel(self.model, self.data)
-                    energies.append(np.array(self.data.energy))
-            if not run.until_settled:
-                continue
-            recent.append((mark, self.data.xpos[self.bodies].copy()))
-            calm_since = (calm_since if calm_since is not None else mark) if self.calm() else None
-            while (mark - recent[0][0]) * self.step > CALM_FOR + 1e-9:
-                recent.popleft()
-            since, there = recent[0]
-            if mark > since:
-                creep = np.linalg.norm(recent[-1][1] - there, axis=1) / ((mark - since) * self.step)
-            if calm_since is not None and (mark - calm_since) * self.step >= CALM_FOR - 1e-9:
-                settled = calm_since * self.step
-                break
-        if not run.samples and status == "completed":
-            positions.append(self.data.xpos[self.bodies].copy())
-            turns.append(self.data.xquat[self.bodies].copy())
-        found = self.told(status, positions, turns, settled, creep, load_seconds)
-        more = {"violation": np.array(violations)} | (
-            {"energy": np.array(energies)} if run.conservative else {}
-        )
-        return replace(found, observables={**found.observables, **more})
+    def take(self, count: int) -> None:
+        mujoco.mj_step(self.model, self.data, count)
 
-    def advance(self, to: int) -> None:
-        """Step to that many steps; in one call where nothing changes on the way."""
-        m, d, run = self.model, self.data, self.run
-        stepwise = bool(run.push) or run.timed or self.drive.varies
-        while self.done < to and not self.failure:
-            count = min(to - self.done, 200)
-            began, begun = time.perf_counter(), time.process_time()
-            if stepwise:
-                pushes = (
-                    run.push * self.size * self.random.uniform(-1.0, 1.0, (count, m.nv)) if run.push else None
-                )
-                last = began
-                for k in range(count):
-                    self.drive.apply(d)
-                    if pushes is not None:
-                        d.qvel += pushes[k]
-                    mujoco.mj_step(m, d)
-                    if run.timed:
-                        now = time.perf_counter()
-                        self.worst, last = max(self.worst, now - last), now
-            else:
-                mujoco.mj_step(m, d, count)
-            self.seconds += time.perf_counter() - began
-            self.cpu += time.process_time() - begun
-            self.done += count
-            for kind in BAD:
-                if d.warning[getattr(mujoco.mjtWarning, kind)].number:
-                    self.failure = f"mujoco reset a state it calls bad ({kind[7:].lower()}) before {self.done * self.step:.4g} s"
-            if not np.isfinite(d.qpos).all():
-                self.failure = f"a place is not finite after {self.done * self.step:.4g} s"
-            if self.limit is not None and self.seconds > self.limit and self.done < to:
-                self.failure = (
-                    f"stopped after {self.limit:g} s, at {self.done * self.step:.4g} s of simulated time"
-                )
+    def push(self, change: Array) -> None:
+        self.data.qvel += change
+
+    def control(self) -> None:
+        self.drive.apply(self.data)
+
+    def trouble(self) -> str:
+        for kind in BAD:
+            if self.data.warning[getattr(mujoco.mjtWarning, kind)].number:
+                return f"mujoco reset a state it calls bad ({kind[7:].lower()})"
+        return "" if np.isfinite(self.data.qpos).all() else "a place is not finite"
 
     def read(self) -> None:
         mujoco.mj_kinematics(self.model, self.data)
         mujoco.mj_comPos(self.model, self.data)
         mujoco.mj_comVel(self.model, self.data)
 
-    def speeds(self, bodies: Any) -> tuple[Array, Array]:
-        """Of the centres of mass [m/s], and of turning [rad/s]."""
-        m, d = self.model, self.data
+    def poses(self) -> tuple[Array, Array]:
+        return self.data.xpos[self.bodies], self.data.xquat[self.bodies]
+
+    def speeds(self) -> tuple[Array, Array]:
+        m, d, bodies = self.model, self.data, self.moving
         spin = d.cvel[bodies, :3]
         arm = d.xipos[bodies] - d.subtree_com[np.asarray(m.body_rootid)[bodies]]
         return np.linalg.norm(d.cvel[bodies, 3:] + np.cross(spin, arm), axis=1), np.linalg.norm(spin, axis=1)
+
+    def state(self) -> Array:
+        d = self.data
+        return np.concatenate([d.qpos, d.qvel, np.asarray(d.act)])
+
+    def at_sample(self) -> dict[str, Any]:
+        found: dict[str, Any] = {"violation": self.violation()}
+        if self.run.conservative:
+            mujoco.mj_energyPos(self.model, self.data)
+            mujoco.mj_energyVel(self.model, self.data)
+            found["energy"] = self.data.energy
+        return found
+
+    def at_end(self) -> dict[str, Any]:
+        overlap, carried = self.contacts()
+        found: dict[str, Any] = {"overlap": np.array(overlap), "load": np.array(carried)}
+        if self.run.timed:
+            arena = getattr(self.data, "narena", float("nan"))
+            found["megabytes"] = np.array((mujoco.mj_sizeModel(self.model) + arena) / 1e6)
+        return found
 
     def violation(self) -> float:
         """The largest of equality constraints and of joint limits, as they were at the start of the last step."""
@@ -241,64 +168,6 @@ class _Simulation:
         limit = kinds == int(mujoco.mjtConstraint.mjCNSTR_LIMIT_JOINT)
         held = np.concatenate([np.abs(places[equal]), np.maximum(0.0, -places[limit]), [0.0]])
         return float(held.max())
-
-    def calm(self) -> bool:
-        moving, turning = self.speeds(self.moving)
-        return bool(max(moving.max(), 0.5 * self.size * turning.max()) < CALM * self.size)
-
-    def told(
-        self,
-        status: Any,
-        positions: list[Array],
-        turns: list[Array],
-        settled: float,
-        creep: Array,
-        load: float,
-    ) -> Result:
-        m, d, count = self.model, self.data, len(self.bodies)
-        overlap, carried = self.contacts() if status == "completed" else (0.0, 0.0)
-        values: dict[str, Any] = {
-            "position": np.array(positions).reshape(-1, count, 3),
-            "orientation": np.array(turns).reshape(-1, count, 4),
-            "size": np.array(self.size),
-            "overlap": np.array(overlap),
-            "load": np.array(carried),
-        }
-        if status == "completed":
-            values["speed"] = self.speeds(self.bodies)[0]
-            values["fastest"] = np.array(self.speeds(self.moving)[0].max())
-        if self.run.until_settled:
-            values |= {"settled": np.array(settled), "creep": creep}
-        if self.run.timed:
-            each = self.cpu / max(1, self.done)
-            values |= {
-                "load_seconds": np.array(load),
-                "step_seconds": np.array(each),
-                "worst_step_seconds": np.array(self.worst),
-                "real_time_factor": np.array(self.step / each if each else np.inf),
-                "megabytes": np.array(
-                    (mujoco.mj_sizeModel(m) + d.narena) / 1e6 if hasattr(d, "narena") else np.nan
-                ),
-            }
-        state = np.concatenate([d.qpos, d.qvel, np.asarray(d.act)])
-        names = [one.label for one in self.run.model.watched]
-        return Result(
-            status=status,
-            failure=self.failure,
-            failed_body=None,
-            failed_step=self.done if self.failure else None,
-            time_step=self.step,
-            steps=self.done,
-            seconds=self.seconds,
-            cpu_seconds=self.cpu,
-            observables=values,
-            sample_times={},
-            final_state=dict(zip(names, np.hstack([d.xpos[self.bodies], d.xquat[self.bodies]]), strict=True)),
-            counters={},
-            state_hash=hashlib.sha256(np.ascontiguousarray(state).tobytes()).hexdigest()[:16],
-            stages=(),
-            stage_seconds={"setup": load},
-        )
 
     def contacts(self) -> tuple[float, float]:
         """The deepest overlap [m] of the last step, and what contacts with the world carry over the weight of all that moves."""
@@ -393,8 +262,3 @@ def holding(model: Any, data: Any) -> Array:
     limited = np.asarray(model.actuator_ctrllimited).astype(bool)
     low, high = np.asarray(model.actuator_ctrlrange).T if model.nu else (np.zeros(0), np.zeros(0))
     return np.where(limited, np.clip(wanted, low, high), wanted)
-
-
-if __name__ == "__main__":
-    asked_for = pickle.loads(sys.stdin.buffer.read())
-    sys.stdout.buffer.write(pickle.dumps(run_model(*asked_for)))

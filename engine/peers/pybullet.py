@@ -22,6 +22,7 @@ from spook_tracker.engine.peers.joint_tree import (
     fixed,
     turn_of,
 )
+from spook_tracker.engine.peers.pybullet_file import READS, run_model
 from spook_tracker.engine.peers.pybullet_model import HALF_HINGE, Model
 from spook_tracker.engine.peers.stepped import Kept, quiet, stepped
 from spook_tracker.engine.protocol import Capabilities, Configuration, Task
@@ -38,6 +39,8 @@ class PyBullet:
     """The adapter."""
 
     name = "pybullet"
+    reads = READS
+    run_model = staticmethod(run_model)
     capabilities = Capabilities(
         shapes=frozenset({Sphere, Box, Capsule, Plane}),
         joints=frozenset({Distance, Lock, Ball, Hinge, Prismatic}),

@@ -119,6 +119,7 @@ def _test(name: str, said: Mapping[str, Any], reading: Reading, folder: Path, or
         format=reading.format,
         digest=reading.digest,
         time_step=reading.time_step,
+        gravity=reading.gravity,
         watched=_watched(said.get("watch"), reading, origin),
         keyframe=_keyframe(said.get("keyframe", ""), reading, origin),
         drive=_drive(said.get("control", "zero"), folder, origin),

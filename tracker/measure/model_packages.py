@@ -84,6 +84,7 @@ def _stepped(engine: str, path: Path) -> Looked:
         format=reading.format,
         digest=reading.digest,
         time_step=reading.time_step,
+        gravity=reading.gravity,
         watched=reading.watched,
         assets={name: str(file) for name, file in reading.assets.items()},
     )

@@ -1,0 +1,255 @@
+"""How a loaded model is run, whatever the engine: stepped, pushed, read at the samples, looked at until it is calm."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import subprocess
+import sys
+import time
+from abc import ABC, abstractmethod
+from collections import deque
+from dataclasses import replace
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from spook_tracker.engine.errors import EngineError
+from spook_tracker.engine.model_file import ModelRun
+from spook_tracker.engine.result import Result
+
+Array = npt.NDArray[np.float64]
+CALM = 1e-3  # of the size a second: nothing faster, nothing turning faster than that at its rim
+CALM_FOR = 0.5  # s
+LOOK = 0.02  # s between two looks at whether all is calm
+ELSEWHERE_LIMIT = 120.0  # s
+CHUNK = 200  # steps between two looks at the clock and at what failed
+
+
+def elsewhere(
+    module: str, run: ModelRun, time_step: float, duration: float, time_limit: float | None
+) -> Result:
+    """What `run_model` of that module gives in a process of its own."""
+    asked = pickle.dumps((replace(run, elsewhere=False), time_step, duration, time_limit))
+    command = [sys.executable, "-m", __name__, module]
+    done = subprocess.run(command, input=asked, capture_output=True, timeout=ELSEWHERE_LIMIT)
+    if done.returncode:
+        last = done.stderr.decode(errors="replace").strip()[-200:]
+        raise EngineError(f"the model's run died in a process of its own: {last}")
+    found: Result = pickle.loads(done.stdout)
+    return found
+
+
+def resident() -> float:
+    """Memory this process has now [MB]; 0 where nobody says."""
+    try:
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+    except OSError:
+        return 0.0
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+class LoadedModel(ABC):
+    """One model in an engine, at its start. A subclass sets `size` and says how to step and what to read."""
+
+    size: float  # m, of what moves
+    freedom: int  # numbers in a push
+
+    def __init__(self, run: ModelRun, time_step: float, time_limit: float | None) -> None:
+        self.run, self.step, self.limit = run, time_step, time_limit
+        self.random = np.random.default_rng(run.seed)
+        self.done = 0  # steps
+        self.seconds = self.cpu = self.worst = 0.0
+        self.failure = ""
+
+    varies = False  # whether controls change from step to step
+
+    @abstractmethod
+    def take(self, count: int) -> None:
+        """So many steps, in the engine's own loop where it has one."""
+
+    @abstractmethod
+    def push(self, change: Array) -> None:
+        """Change the velocities by that, (freedom,) m/s or rad/s."""
+
+    @abstractmethod
+    def control(self) -> None:
+        """Set the controls for the next step, where they vary."""
+
+    @abstractmethod
+    def trouble(self) -> str:
+        """Why the state is no good; empty if it is."""
+
+    @abstractmethod
+    def read(self) -> None:
+        """Bring what is read up to the last step."""
+
+    @abstractmethod
+    def poses(self) -> tuple[Array, Array]:
+        """Places (B, 3) m and orientations (B, 4) of the watched bodies."""
+
+    @abstractmethod
+    def speeds(self) -> tuple[Array, Array]:
+        """Of everything that moves: of centres of mass [m/s], and of turning [rad/s]."""
+
+    @abstractmethod
+    def state(self) -> Array:
+        """Whatever the next step depends on, for its hash."""
+
+    def at_sample(self) -> dict[str, Any]:
+        """What else is read at each sample."""
+        return {}
+
+    def at_end(self) -> dict[str, Any]:
+        """What else is read of the last state."""
+        return {}
+
+    def result(self, duration: float, load_seconds: float) -> Result:
+        """Run for `duration` [s], or until all is calm, and read what is asked for."""
+        run, total = self.run, round(duration / self.step)
+        marks = {min(total, round(at / self.step)) for at in run.samples}
+        looks = {total}
+        if run.until_settled:
+            every = max(1, round(LOOK / self.step))
+            looks |= set(range(every, total, every))
+        samples: dict[str, list[Any]] = {"position": [], "orientation": []}
+        calm = _Calm(self.step)
+        for mark in sorted(marks | looks):
+            self.advance(mark)
+            if self.failure:
+                break
+            self.read()
+            if mark in marks or (mark == total and not marks):
+                self.sample(samples)
+            if run.until_settled and calm.at(mark, self.poses()[0], self.is_calm()):
+                break
+        return self.told(samples, calm, load_seconds)
+
+    def sample(self, samples: dict[str, list[Any]]) -> None:
+        places, turns = self.poses()
+        for name, value in {"position": places, "orientation": turns, **self.at_sample()}.items():
+            samples.setdefault(name, []).append(np.array(value, dtype=float))
+
+    def is_calm(self) -> bool:
+        moving, turning = self.speeds()
+        return bool(max(moving.max(), 0.5 * self.size * turning.max()) < CALM * self.size)
+
+    def advance(self, to: int) -> None:
+        """Step to that many steps; in one call where nothing changes on the way."""
+        run = self.run
+        stepwise = bool(run.push) or run.timed or self.varies
+        while self.done < to and not self.failure:
+            count = min(to - self.done, CHUNK)
+            pushes = None
+            if run.push:
+                pushes = run.push * self.size * self.random.uniform(-1.0, 1.0, (count, self.freedom))
+            began, begun = time.perf_counter(), time.process_time()
+            if stepwise:
+                self.one_by_one(count, pushes)
+            else:
+                self.take(count)
+            self.seconds += time.perf_counter() - began
+            self.cpu += time.process_time() - begun
+            self.done += count
+            if trouble := self.trouble():
+                self.failure = f"{trouble} before {self.done * self.step:.4g} s"
+            elif self.limit is not None and self.seconds > self.limit and self.done < to:
+                self.failure = (
+                    f"stopped after {self.limit:g} s, at {self.done * self.step:.4g} s of simulated time"
+                )
+
+    def one_by_one(self, count: int, pushes: Array | None) -> None:
+        last = time.perf_counter()
+        for k in range(count):
+            self.control()
+            if pushes is not None:
+                self.push(pushes[k])
+            self.take(1)
+            if self.run.timed:
+                now = time.perf_counter()
+                self.worst, last = max(self.worst, now - last), now
+
+    def told(self, samples: dict[str, list[Any]], calm: _Calm, load: float) -> Result:
+        count = len(self.run.model.watched)
+        status: Any = "completed"
+        if self.failure:
+            status = "timed_out" if self.failure.startswith("stopped") else "diverged"
+        values: dict[str, Any] = {name: np.array(read) for name, read in samples.items()}
+        values["position"] = values["position"].reshape(-1, count, 3)
+        values["orientation"] = values["orientation"].reshape(-1, count, 4)
+        values["size"] = np.array(self.size)
+        if not self.failure:
+            values |= self.at_end() | {"fastest": np.array(self.speeds()[0].max())}
+        if self.run.until_settled:
+            values |= {"settled": np.array(calm.settled), "creep": calm.creep(count)}
+        if self.run.timed:
+            each = self.cpu / max(1, self.done)
+            values |= {
+                "load_seconds": np.array(load),
+                "step_seconds": np.array(each),
+                "worst_step_seconds": np.array(self.worst),
+                "real_time_factor": np.array(self.step / each if each else np.inf),
+            }
+        names = [one.label for one in self.run.model.watched]
+        return Result(
+            status=status,
+            failure=self.failure,
+            failed_body=None,
+            failed_step=self.done if self.failure else None,
+            time_step=self.step,
+            steps=self.done,
+            seconds=self.seconds,
+            cpu_seconds=self.cpu,
+            observables=values,
+            sample_times={},
+            final_state=dict(zip(names, np.hstack(self.poses()), strict=True)),
+            counters={},
+            state_hash=hashlib.sha256(np.ascontiguousarray(self.state()).tobytes()).hexdigest()[:16],
+            stages=(),
+            stage_seconds={"setup": load},
+        )
+
+
+class _Calm:
+    """Since when all is calm, and how far the watched bodies crept while it was."""
+
+    def __init__(self, step: float) -> None:
+        self.step = step
+        self.recent: deque[tuple[int, Array]] = deque()
+        self.since: int | None = None
+        self.settled = float("nan")
+
+    def at(self, mark: int, places: Array, calm: bool) -> bool:
+        """Whether all has been calm long enough, by this look."""
+        self.recent.append((mark, np.array(places)))
+        self.since = (mark if self.since is None else self.since) if calm else None
+        while (mark - self.recent[0][0]) * self.step > CALM_FOR + 1e-9:
+            self.recent.popleft()
+        if self.since is not None and (mark - self.since) * self.step >= CALM_FOR - 1e-9:
+            self.settled = self.since * self.step
+        return self.settled == self.settled
+
+    def creep(self, count: int) -> Array:
+        """Speed [m/s] of each watched body over the last half second."""
+        if len(self.recent) < 2:
+            return np.full(count, np.nan)
+        (first, before), (last, after) = self.recent[0], self.recent[-1]
+        speed: Array = np.linalg.norm(after - before, axis=1) / ((last - first) * self.step)
+        return speed
+
+
+def _answer(module: str) -> None:
+    """The other end of `elsewhere`; what an engine prints goes where it disturbs nobody."""
+    answers = os.dup(1)
+    os.dup2(2, 1)
+    asked = pickle.loads(sys.stdin.buffer.read())
+    with os.fdopen(answers, "wb") as pipe:
+        pipe.write(pickle.dumps(import_module(module).run_model(*asked)))
+
+
+if __name__ == "__main__":
+    _answer(sys.argv[1])
