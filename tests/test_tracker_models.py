@@ -16,9 +16,10 @@ from sqlalchemy.exc import IntegrityError
 
 from spook_tracker.tracker.document.errors import DatabaseError
 from spook_tracker.tracker.document.json_form import Number
+from spook_tracker.tracker.document.outside import clean_text
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store import models, rows
-from spook_tracker.tracker.store.border import checked, clean_text
+from spook_tracker.tracker.store.border import checked
 from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.identity import identity
 from spook_tracker.tracker.store.record import record

@@ -78,7 +78,11 @@ def test_pytest_benchmark_keeps_every_repeat_and_the_commit() -> None:
         "bench/test_step.py::test_step": (0.5, "s", "smaller"), "bench/test_step.py::test_few": (2.0, "s", "smaller"),
     }  # fmt: skip
     assert run.samples[0].timing.seconds == (0.6, 0.5, 0.7)
-    assert (run.engine.name, run.engine.git_hash, run.machine.fingerprint) == ("ours", COMMIT, "desk")
+    assert (run.engine.name, run.engine.git_hash, run.machine.fingerprint) == (
+        "ours",
+        COMMIT,
+        "machine 49be417a",
+    )
 
 
 def test_google_benchmark_in_seconds_without_its_aggregates() -> None:

@@ -171,3 +171,46 @@ def test_another_engine_asked_beside_theirs_is_not_held_to_their_limits(tmp_path
 def test_a_test_that_two_catalogues_have_is_refused() -> None:
     with pytest.raises(Exception, match="both have a test 'fall'"):
         Questions(catalogue="toy_questions,toy_questions:CATALOGUE", engine="toy_engine").tests()
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        ("time_limit = " + "9" * 400, "time_limit is a whole number of more than 19 digits"),
+        ("workers = " + "9" * 5000, "cannot be read"),
+        ("[limits]\n" + '"a/*" = ' + "9" * 400, "a/* is a whole number of more than 19 digits"),
+        ("x = " + "[" * 5000 + "]" * 5000, "it is nested too deeply"),
+        ("time_limit = nan", "time_limit must be a number, not nan"),
+        ("home_page = 'javascript:alert(1)'", "is no address of the web"),
+    ],
+)
+def test_settings_that_no_number_and_no_address_can_be_are_one_sentence(content, said, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "tracker.toml").write_text(content)
+
+    done = CliRunner().invoke(main, ["nightly", "--quick"], prog_name="tracker")
+
+    assert done.exit_code == 2
+    assert said in done.stderr
+    assert "defect" not in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("option", ["--time-limit", "--limit"])
+def test_what_is_no_number_is_no_limit(option, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    done = CliRunner().invoke(main, ["run", option, "nan"], prog_name="tracker")
+
+    assert done.exit_code == 2
+    assert "nan is no number of seconds" in done.stderr
+
+
+def test_a_home_page_that_is_no_address_is_refused_before_anything_is_measured(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+
+    done = CliRunner().invoke(main, ["nightly", "--home-page", "javascript:alert(1)"], prog_name="tracker")
+
+    assert done.exit_code == 2
+    assert "is no address of the web; write https://" in done.stderr
+    assert not list(tmp_path.iterdir())

@@ -133,6 +133,15 @@ def _readable(context: click.Context, option: click.Parameter, colour: str) -> s
     return colour
 
 
+def _web_address(context: click.Context, option: click.Parameter, address: str) -> str:
+    """Before anything is measured: what is no address of the web becomes no link."""
+    from spook_tracker.tracker.document.wording import web_address
+
+    if address and not web_address(address):
+        raise click.BadParameter(f"{address[:80]!r} is no address of the web; write https://…")
+    return address
+
+
 def website_options(command: Command) -> Command:
     """--title, --home-page and --colour: whose website it is."""
     for option in (
@@ -140,6 +149,7 @@ def website_options(command: Command) -> Command:
             "--home-page",
             metavar="URL",
             default="",
+            callback=_web_address,
             help="Address of your project, for the foot of every page.",
         ),
         click.option(
@@ -183,12 +193,22 @@ def documents_option(command: Command) -> Command:
     )(command)
 
 
+class Seconds(click.FloatRange):
+    """Of a range: what is not a number is in none."""
+
+    def convert(self, value: Any, option: click.Parameter | None, context: click.Context | None) -> Any:
+        found = super().convert(value, option, context)
+        if found != found:
+            self.fail(f"{value} is no number of seconds", option, context)
+        return found
+
+
 def limit_option(command: Command) -> Command:
     """--limit SECONDS, so that a slow engine does not hold up a night."""
     return click.option(
         "--limit",
         metavar="SECONDS",
-        type=click.FloatRange(min=0.0, min_open=True),
+        type=Seconds(min=0.0, min_open=True),
         help="Time of one simulation; by default 10 s for another engine.",
     )(command)
 
@@ -209,7 +229,7 @@ def workers_option(command: Command) -> Command:
             metavar="SECONDS",
             default=TIME_LIMIT,
             show_default=True,
-            type=click.FloatRange(0.1, 1e6),
+            type=Seconds(0.1, 1e6),
             help="For one piece of work; what takes longer is ended and recorded as timed out.",
         ),
         click.option(

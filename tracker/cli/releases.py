@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from spook_tracker.tracker.cli.options import (
+    Seconds,
     catalogue_option,
     database_option,
     example,
@@ -40,7 +41,7 @@ MEGABYTE = 1e6
 @click.option("--newest", type=click.IntRange(min=1), metavar="N", help="Only the newest N of them.")
 @click.option(
     "--budget",
-    type=click.FloatRange(min=0.0),
+    type=Seconds(min=0.0),
     metavar="MINUTES",
     help="Begin no release after that; the next call goes on.",
 )

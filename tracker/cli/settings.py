@@ -94,15 +94,18 @@ def read(here: Path) -> Settings:
         return Settings()
     try:
         said = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise SettingsError(f"{file} cannot be read: {error}") from None
+    except (OSError, ValueError) as error:  # of TOML, of UTF-8, of a number with too many digits
+        raise SettingsError(f"{file} cannot be read: {error!s:.300}") from None
+    except RecursionError:
+        raise SettingsError(f"{file} cannot be read: it is nested too deeply") from None
+    _refuse_endless(file, said)
     limits, models, build = said.pop("limits", {}), said.pop("model", []), said.pop(TABLE, None)
     for name, value in said.items():
         if name not in KINDS:
             raise SettingsError(
                 f"{file}: there is no setting {name!r}; it knows {', '.join(KINDS)}, limits, model, build"
             )
-        if type(value) not in KINDS[name]:
+        if type(value) not in KINDS[name] or value != value:
             raise SettingsError(f"{file}: {name} must be {WORDS[KINDS[name][-1]]}, not {value!r}")
     if models:
         own = str(file.relative_to(here) if file.is_relative_to(here) else file)
@@ -114,6 +117,18 @@ def read(here: Path) -> Settings:
         build=None if build is None else build_of(build, file),
         folder=file.parent,
     )
+
+
+def _refuse_endless(file: Path, said: Any, name: str = "") -> None:
+    """SettingsError for a number with more digits than anything here holds."""
+    if isinstance(said, dict):
+        for key, value in said.items():
+            _refuse_endless(file, value, key)
+    elif isinstance(said, list):
+        for value in said:
+            _refuse_endless(file, value, name)
+    elif isinstance(said, int) and abs(said) >= 2**63:
+        raise SettingsError(f"{file}: {name} is a whole number of more than 19 digits")
 
 
 def defaults(group: click.Group, settings: Settings) -> dict[str, Any]:

@@ -47,6 +47,14 @@ def clean(text: str) -> str:
     return text.translate(_SEEN)
 
 
+def clean_text(text: str) -> str:
+    """Text that every database and every JSON takes: NUL and lone surrogates become U+FFFD, all else stays as it is."""
+    text = text.replace("\0", "\N{REPLACEMENT CHARACTER}")
+    return (
+        text if text.isascii() else text.encode("utf-16-le", "surrogatepass").decode("utf-16-le", "replace")
+    )
+
+
 def inert(text: str) -> str:
     """Lines that a terminal only shows and no CI service runs; our own colours stay."""
     if not text.isprintable():

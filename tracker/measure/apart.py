@@ -29,6 +29,7 @@ from spook_tracker.tracker.document.json_form import decode, encode
 from spook_tracker.tracker.document.run_document import RunDocument, Sample, SeriesDefinition
 from spook_tracker.tracker.measure import again
 from spook_tracker.tracker.measure import run as here
+from spook_tracker.tracker.measure.fitting import written
 from spook_tracker.tracker.measure.questions import EngineUnavailable, Questions, RunError
 from spook_tracker.tracker.measure.run import Interrupted, Progress, Request, Watch
 
@@ -224,6 +225,8 @@ def serve() -> None:
     what, source, request, more = pickle.loads(base64.b64decode(order.readline()))
 
     def tell(news: News) -> None:
+        if isinstance(news, Done):
+            news = Done(msgspec.Raw(written(news.document)), news.asked)  # type: ignore[arg-type]
         channel.write(encode(news) + b"\n")
         channel.flush()
 

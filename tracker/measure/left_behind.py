@@ -51,7 +51,7 @@ def end_session(session: int) -> None:
 
 def end_group(group: int) -> None:
     """Kill every process of a group that has a process of ours, or had one that is not yet taken away."""
-    if os.name == "posix" and group != os.getpgrp():
+    if os.name == "posix" and group not in (0, os.getpgrp()):
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(group, signal.SIGKILL)
 

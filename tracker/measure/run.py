@@ -23,6 +23,7 @@ import spook_tracker.tracker.measure.executors as executors
 import spook_tracker.tracker.measure.trajectory as motion
 import spook_tracker.tracker.measure.workers as crew
 from spook_tracker.scalar_tests.case import ScalarTest
+from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import (
     Asked,
     EngineVersion,
@@ -38,6 +39,7 @@ from spook_tracker.tracker.document.run_document import (
 )
 from spook_tracker.tracker.measure import ladder as ladders
 from spook_tracker.tracker.measure.cards import engine_version, test_card
+from spook_tracker.tracker.measure.fitting import fitted, fitted_figure, unfit
 from spook_tracker.tracker.measure.machine import machine
 from spook_tracker.tracker.measure.question import (
     Measured,
@@ -48,6 +50,7 @@ from spook_tracker.tracker.measure.question import (
     judged_sample,
     measure,
     metric_series,
+    sentence,
     study,
 )
 from spook_tracker.tracker.measure.questions import PEER_TIME_LIMIT as PEER_TIME_LIMIT
@@ -184,14 +187,13 @@ def _document(
     trajectories: list[Trajectory] = []
     for part in (part for task in tasks for part in parts[task.position]):
         if isinstance(part, FigureData):
-            figures.append(part)
-        elif isinstance(part, MapData):
-            maps.append(part)
-        elif isinstance(part, Trajectory):
-            trajectories.append(part)
+            figures.append(fitted_figure(part))
+        elif isinstance(part, MapData | Trajectory):
+            if not unfit(part):  # a map that is not there is told of as lost
+                (maps if isinstance(part, MapData) else trajectories).append(part)  # type: ignore[arg-type]
         elif not isinstance(part, ladders.ErrorPoints):  # those are among the timed series
             measured.extend(part)
-    measured += timed[0]
+    measured = [(series, fitted(sample)) for series, sample in (*measured, *timed[0])]
     _refuse_doubles(series.key for series, _ in measured)
     engine = source.module()
     return RunDocument(
@@ -255,8 +257,17 @@ def _tasks(tests: Mapping[str, ScalarTest], request: Request) -> Iterator[Task]:
             position += 1
 
 
-def perform(source: Questions, task: Task) -> tuple[Any, ...]:
-    """Do one piece of work in this process."""
+def perform(source: Questions, task: Task) -> tuple[Any, ...] | crew.Lost:
+    """Do one piece of work in this process; whatever it throws costs this piece alone."""
+    try:
+        return _performed(source, task)
+    except TrackerError:
+        raise
+    except Exception as error:
+        return crew.Lost("crashed", sentence(f"the answer cannot be taken: {type(error).__name__}: {error}"))
+
+
+def _performed(source: Questions, task: Task) -> tuple[Any, ...]:
     test, simulate = source.tests()[task.test], source.simulate()
     first = task.index[0]
     if task.kind == "measure":

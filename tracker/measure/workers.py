@@ -24,6 +24,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any, Generic, Literal, TypeVar
 
+import spook_tracker.tracker.measure.left_behind as left_behind
 from spook_tracker.tracker.measure.bounds import MEMORY, TIME_LIMIT
 
 START_LIMIT = 120.0  # s in which a new process has read its program, on a machine however busy
@@ -87,6 +88,7 @@ def answers(
                 yield piece, answer
     finally:
         for worker in crew:
+            left_behind.end_group(worker.process.pid or 0)
             worker.process.kill()
         for worker in crew:
             worker.end()
@@ -138,6 +140,7 @@ class _Worker(Generic[Piece]):
         return Lost("timed_out", why, self.place.value)
 
     def end(self) -> None:
+        left_behind.end_group(self.process.pid or 0)  # with whatever the piece has started
         self.process.kill()
         self.process.join()
         self.process.close()
@@ -165,6 +168,7 @@ def _serve(
     """The life of a worker: a piece, its answer, the next piece."""
     global _place
     _place = place
+    _alone()
     _never_outlive(lifeline, parent)
     warnings.simplefilter("ignore")  # what a worker has to say, it says in samples
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the supervisor decides what an interruption means
@@ -182,6 +186,16 @@ def _serve(
         except Exception as error:
             answer = ("raised", error)
         pipe.send(answer)
+
+
+def _alone() -> None:
+    """A process group of its own, and no stream of ours: what an adapter starts ends with it and holds nobody up."""
+    if os.name == "posix":
+        os.setpgid(0, 0)
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    os.close(nothing)
+    os.dup2(2, 1)
 
 
 def _never_outlive(lifeline: Connection, parent: int) -> None:

@@ -18,6 +18,7 @@ from msgspec import inspect
 
 from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.document.json_form import boxed, builtins, convert, decode
+from spook_tracker.tracker.document.outside import clean_text
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store.rows import moment
 
@@ -25,21 +26,12 @@ MAX_BYTES = 32 * 1024 * 1024  # of one document
 MAX_SAMPLES = 100_000  # of one document, and as many series
 MAX_TEXT = 65_536  # characters of one text
 MAX_INTEGER = 2**63 - 1  # what a column holds
-REPLACEMENT = "\N{REPLACEMENT CHARACTER}"
 NUL = rb"\u0000"  # as JSON has to write it
 FITTING = (
     inspect.FloatType, inspect.BoolType, inspect.NoneType, inspect.BytesType, inspect.LiteralType,
     inspect.CustomType,
 )  # fmt: skip
 ESCAPE = re.compile(rb"\\(?:u([0-9a-fA-F]{4})|.)", re.DOTALL)  # one escape of a JSON text
-
-
-def clean_text(text: str) -> str:
-    """Text every database takes: NUL and lone surrogates become U+FFFD, all else stays as it is."""
-    if text.isascii():
-        return text.replace("\0", REPLACEMENT)
-    text = text.replace("\0", REPLACEMENT)
-    return text.encode("utf-16-le", "surrogatepass").decode("utf-16-le", "replace")
 
 
 def _cleaned(part: Any, place: str) -> Any:

@@ -7,6 +7,7 @@ transactions that lock at once (a lock taken late fails at once, whatever the ti
 from __future__ import annotations
 
 import os
+import re
 import sqlite3
 import time
 from collections.abc import Iterator
@@ -35,6 +36,7 @@ def database_url(given: str | None = None) -> URL:
     if "\0" in chosen:
         raise DatabaseError("the name of the database holds a character that no file can have")
     if "://" not in chosen:
+        _refuse_secrets(chosen)
         return URL.create("sqlite", database=chosen)
     try:
         url = make_url(chosen)
@@ -48,18 +50,50 @@ def database_url(given: str | None = None) -> URL:
         raise DatabaseError(f"{url.get_backend_name()} is not supported; use sqlite or postgresql")
     if url.drivername not in DRIVERS:
         raise DatabaseError(f"{url.drivername} is not supported; write {url.get_backend_name()}:// alone")
-    if "@" in (url.host or ""):  # the end of a password, which is not repeated
-        raise DatabaseError("the database URL has more than one @; in a password it is written %40")
+    if url.get_backend_name() == "sqlite":
+        if url.host or url.username or url.password:
+            raise DatabaseError("a SQLite URL names no host and no user: write sqlite:///FILE")
+        _refuse_secrets(url.database or "")
+    elif _misread(url):  # the end of a password, which is not repeated
+        raise DatabaseError(
+            "the database URL cannot be read: in a password @ is written %40, / %2F, ? %3F, # %23"
+        )
     if url.get_backend_name() == "sqlite" and url.query:
         raise DatabaseError("a SQLite URL takes no options: what stands behind its ? would be ignored")
     return url
 
 
+CONNECTS = re.compile(  # what PostgreSQL's own programs take where we want a URL
+    r"(?:^|\s)(?:host|hostaddr|port|dbname|user|password|passfile|service|ssl\w+)\s*=|^\s*postgres\w*[:+]",
+    re.IGNORECASE,
+)
+
+
+def _refuse_secrets(path: str) -> None:
+    """DatabaseError, which does not repeat it, if what would be the name of a file is meant for a server."""
+    if Path(path).exists():
+        return
+    if CONNECTS.search(path) or re.search(r":[^/]*@", path):
+        raise DatabaseError(
+            "the database looks like a server's, with a password perhaps, and is no URL: write "
+            "postgresql://USER:PASSWORD@HOST/NAME, or for a file of such a name make it first"
+        )
+
+
+def _misread(url: URL) -> bool:
+    """Whether a part of a password has become part of something else."""
+    parts = (url.username, url.host, url.database, *url.query)
+    return any(sign in (part or "") for part in parts for sign in "@=") or any(
+        "@" in value for value in url.query.values() if isinstance(value, str)
+    )
+
+
 def shown(url: URL) -> str:
-    """The database as it may be printed: no password."""
+    """The database as it may be printed: made of what may be, so that no form of a password is among it."""
     if url.get_backend_name() == "sqlite":
         return url.database or "memory"
-    return url.difference_update_query(["password", "sslpassword"]).render_as_string()
+    place = f"{url.host or ''}{f':{url.port}' if url.port else ''}"
+    return f"postgresql://{place}/{url.database or ''}"
 
 
 def connected(url: URL, readonly: bool) -> Engine:

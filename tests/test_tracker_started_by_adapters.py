@@ -1,0 +1,123 @@
+"""What an adapter starts ends with the worker it runs in, and holds open nothing that somebody reads."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+HERE = Path(__file__).parent
+STARTS = """
+import os, subprocess, sys, time
+from toy_engine import build_info
+import toy_engine
+MARK = [sys.executable, "-c", "import time; time.sleep(300)", "{mark}"]
+def simulate(*asked, **more):
+    subprocess.Popen(MARK)  # as the peers for Node do: it has the streams of whoever started it
+    open("started", "w").close()
+    {then}
+    return toy_engine.simulate(*asked, **more)
+"""
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+
+
+def left(mark: str) -> list[int]:
+    """Processes that were started with this word."""
+    found = []
+    for place in Path("/proc").glob("[0-9]*/cmdline"):
+        try:
+            words = place.read_bytes().split(b"\0")
+        except OSError:
+            continue
+        if mark.encode() in words:
+            found.append(int(place.parent.name))
+    return found
+
+
+def gone(mark: str) -> bool:
+    end = time.monotonic() + 10
+    while left(mark) and time.monotonic() < end:
+        time.sleep(0.05)
+    return not left(mark)
+
+
+@pytest.fixture
+def mark(tmp_path: Path):
+    word = f"started-in-{tmp_path.name}-{os.getpid()}"
+    yield word
+    for pid in left(word):
+        os.kill(pid, signal.SIGKILL)
+
+
+def start(folder: Path, mark: str, then: str, *options: str) -> subprocess.Popen[str]:
+    (folder / "starting.py").write_text(STARTS.format(mark=mark, then=then))
+    command = [sys.executable, "-m", "spook_tracker", "run", "fall", "--engine", "starting"]
+    command += ["--catalogue", "toy_questions", "--no-record", "--workers", "1", *options]
+    return subprocess.Popen(
+        command, cwd=folder, env={**os.environ, "PYTHONPATH": str(HERE)}, text=True,
+        stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+    )  # fmt: skip
+
+
+ENDS = {
+    "answers": ("pass", (), 0),
+    "hangs": ("time.sleep(300)", ("--time-limit", "1"), 1),
+    "dies": ("os._exit(0)", (), 1),
+}
+
+
+@pytest.mark.parametrize("how", ENDS)
+def test_a_command_ends_with_all_that_an_engine_has_started(how: str, tmp_path: Path, mark: str) -> None:
+    then, options, code = ENDS[how]
+    process = start(tmp_path, mark, then, *options)
+
+    told, _ = process.communicate(timeout=60)  # returns once nobody holds the output open
+
+    assert (tmp_path / "started").exists(), told
+    assert process.returncode == code, told
+    assert gone(mark)
+
+
+@pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
+def test_a_command_that_is_ended_leaves_nobody_behind(how: signal.Signals, tmp_path: Path, mark: str) -> None:
+    process = start(tmp_path, mark, "time.sleep(300)")
+    end = time.monotonic() + 60
+    while not (tmp_path / "started").exists() and time.monotonic() < end:
+        time.sleep(0.05)
+    assert left(mark)
+
+    process.send_signal(how)
+    process.communicate(timeout=30)
+
+    assert gone(mark)
+
+
+def test_what_an_engine_prints_is_a_complaint_and_no_result(tmp_path: Path, mark: str) -> None:
+    (tmp_path / "loud.py").write_text(
+        "import os\nfrom toy_engine import build_info\nimport toy_engine\n"
+        "def simulate(*a, **m):\n    os.write(1, b'LOUD\\n')\n    return toy_engine.simulate(*a, **m)\n"
+    )
+    command = [
+        sys.executable,
+        "-m",
+        "spook_tracker",
+        "run",
+        "fall",
+        "--engine",
+        "loud",
+        "--catalogue",
+        "toy_questions",
+    ]
+
+    done = subprocess.run(
+        [*command, "--no-record"], cwd=tmp_path, env={**os.environ, "PYTHONPATH": str(HERE)},
+        capture_output=True, text=True, check=False, timeout=60,
+    )  # fmt: skip
+
+    assert "LOUD" not in done.stdout
+    assert "LOUD" in done.stderr
