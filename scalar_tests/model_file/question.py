@@ -9,7 +9,7 @@ from functools import partial
 from spook_tracker.engine.errors import SceneError
 from spook_tracker.engine.model_file import ModelFile
 from spook_tracker.scalar_tests.case import Example, Measurement, Metric, ScalarTest, Simulate
-from spook_tracker.scalar_tests.model_file import books, cost, ladder, motion, rest
+from spook_tracker.scalar_tests.model_file import books, cost, figures, ladder, motion, rest
 from spook_tracker.scalar_tests.model_file.facts import LONGEST_REST, PUSH, Asked
 
 Measure = Callable[[Asked, Simulate], Mapping[str, float]]
@@ -85,6 +85,7 @@ def test_of(
             part("repeated", cost.REPEATABILITY, cost.repeatability, "three times the same"),
             part("cost", cost.COST, cost.cost, "the clock looked at after each step"),
         ),
+        figures=figures.figures(asked),
         ladders=(ladder.ladder(asked),),
         stability=ladder.studies(asked, driven),
         example=_no_scene,

@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from typing import Any
 
+from spook_tracker.tracker.cli.release_models import model_page, only_models, without_models
 from spook_tracker.tracker.judge.comparison_document import Change
 from spook_tracker.tracker.judge.release_notes import (
     Changelog,
@@ -84,7 +85,13 @@ def page(
     engine: str, history: Any, runs: Sequence[Any], steps: Sequence[Step], changelog: Changelog | None
 ) -> str:
     """The same as a page in Markdown. Every number in it comes from the recorded runs."""
+    models = model_page(engine, history.cards(runs[-1].id), steps)
     names = sorted({series.partition("/")[0] for run in runs for series in history.samples(run.id)})
+    if only_models(names, steps):
+        against = [] if changelog is None else _against(check(steps, changelog), changelog)
+        lines = [f"# What {len(runs)} releases of {engine} changed of models", "", *against, *models]
+        return "\n".join(lines).rstrip() + "\n"
+    names = [name for name in names if not any(name in step.alike for step in steps)]
     versions = " ".join(run.engine.version for run in runs)
     again = f"tracker backfill --engine {engine} {versions} --limit 5 {' '.join(f'--test={name}' for name in names)}"
     lines = [
@@ -113,8 +120,8 @@ def page(
     ]
     if changelog is not None:
         lines += _against(check(steps, changelog), changelog)
-    lines += ["## Every change", ""]
-    for step in steps:
+    lines += [*models, "## Every change", ""]
+    for step in without_models(steps):
         if step.changes:
             lines += [f"### {step.release}, after {step.before}", ""]
             lines += [*_change_table(step.changes), ""]

@@ -1,0 +1,63 @@
+"""How far every watched body goes, drawn over time, and how fast pushes of the last bits grow."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from spook_tracker.scalar_tests.case import Drawing, Figure, Simulate
+from spook_tracker.scalar_tests.model_file.facts import PUSH, UNPREDICTABLE, Asked, apart, simulated
+from spook_tracker.scalar_tests.sweep import line
+
+SAMPLES = 201
+
+
+def _times(asked: Asked) -> tuple[float, ...]:
+    return tuple(asked.duration * k / (SAMPLES - 1) for k in range(SAMPLES))
+
+
+def places(asked: Asked, simulate: Simulate) -> Drawing:
+    """Distance of each watched body from its start."""
+    times = _times(asked)
+    there = np.asarray(simulated(simulate, asked, asked.duration, samples=times).partial["position"])
+    moved = np.linalg.norm(there - there[:1], axis=-1)
+    return Drawing(
+        curves=tuple(
+            line(body.label, times[: len(moved)], moved[:, k]) for k, body in enumerate(asked.model.watched)
+        ),
+        x_label="time [s]",
+        y_label="distance from its start [m]",
+    )
+
+
+def growth(asked: Asked, simulate: Simulate) -> Drawing:
+    """Distance between a run and the same with pushes of the last bits, of the body that is furthest off."""
+    times = _times(asked)
+    run, *pushed = (
+        simulated(simulate, asked, asked.duration, samples=times, push=push, seed=seed)
+        for push, seed in ((0.0, 0), (PUSH, 1), (PUSH, 2))
+    )
+    size = float(run["size"])
+    found = [(seed, apart(run, other, size)) for seed, other in enumerate(pushed, start=1)]
+    shown = [
+        line(f"seed {seed}", times[: len(grown)], np.where(grown > 0.0, grown, np.nan))
+        for seed, grown in found
+    ]
+    limit = line("predictable up to here", times, np.full(len(times), UNPREDICTABLE * size), "limit")
+    return Drawing(
+        curves=(*shown, limit),
+        x_label="time [s]",
+        y_label="distance between the runs [m]",
+        y_scale="log",
+        note=f"Pushes of {PUSH:g} of the size in every step. Where they have grown to a hundredth of it nothing about "
+        "places can be predicted.",
+    )
+
+
+def figures(asked: Asked) -> tuple[Figure, ...]:
+    """Both."""
+    return (
+        Figure(name="places", title="Where the watched bodies go", draw=partial(places, asked)),
+        Figure(name="growth", title="How fast pushes of the last bits grow", draw=partial(growth, asked)),
+    )

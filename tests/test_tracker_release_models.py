@@ -1,0 +1,57 @@
+"""The page of models: what changed, what only rounded, what stayed to the bit, per release."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+from spook_tracker.tracker.cli.release_models import model_page, only_models, without_models
+from spook_tracker.tracker.judge.compare import ComparedRun, compare
+from spook_tracker.tracker.judge.release_notes import Step, alike, visible
+from tests.test_tracker_model_files import KNOWN, _side
+from tests.test_tracker_verdict import sample, series
+
+
+def _step(values: dict[str, tuple[float, float]]) -> Step:
+    """From one release to the next: a value of each model before and after."""
+    runs = []
+    for side in (0, 1):
+        samples = {}
+        for model, pair in values.items():
+            key = f"{model}/motion/ball.place@1s/h=0.002"
+            definition = series(
+                key=key,
+                test=model,
+                metric="ball.place@1s",
+                better="inside",
+                role="reported",
+                sensitivity=KNOWN,
+            )
+            samples[key] = (definition, sample(pair[side], state=f"{model}{pair[side]!r}"))
+        runs.append(ComparedRun(side=_side(str(side)), samples=samples))
+    changes = compare(*runs).changes
+    return Step(
+        release="2.0", before="1.0", changes=tuple(filter(visible, changes)), asked=3, alike=alike(changes)
+    )
+
+
+STEP = _step({"falls": (0.1, 0.102), "rounds": (0.1, 0.1 + 9e-15), "stays": (0.1, 0.1)})
+CARDS = [SimpleNamespace(name="falls", parameters=(("file", "/home/me/lib/site-packages/robots/falls.xml"),))]
+
+
+def test_each_model_is_said_to_have_changed_rounded_or_stayed() -> None:
+    page = "\n".join(model_page("mujoco", CARDS, [STEP]))
+
+    assert "| falls | `robots/falls.xml` | **changed**, 1 of 1 values |" in page
+    assert "| rounds | `` | rounding, 1 of 1 values |" in page
+    assert "| stays | `` | same bits |" in page
+    assert "3 models. 2.0: 1 changed, 1 rounded, 1 the same bits." in page
+    assert "- **falls**: moves otherwise from 1 s on: ball by 0.002 m at 1 s (2e+02 times" in page
+
+
+def test_models_stand_apart_from_other_tests() -> None:
+    (rest,) = without_models([STEP])
+
+    assert rest.changes == ()
+    assert only_models(["falls", "stays"], [STEP])
+    assert not only_models(["falls", "pendulum"], [STEP])
+    assert model_page("mujoco", CARDS, []) == []
