@@ -4,6 +4,11 @@ from __future__ import annotations
 
 import itertools
 import math
+import pickle
+import subprocess
+import sys
+import time
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 
@@ -118,6 +123,47 @@ def test_a_model_answers_with_the_same_bits_in_another_process(tmp_path: Path) -
     asked = Asked(model=_model(tmp_path, BOX), duration=0.2)
 
     assert cost.repeatability(asked, _simulate()) == {"differing_runs": 0.0}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends a process with its parent")
+def test_a_run_elsewhere_ends_with_whoever_asked_for_it(tmp_path: Path) -> None:
+    code = (
+        "import pickle, sys; from spook_tracker.engine.find import find; "
+        "run, h = pickle.load(open(sys.argv[1], 'rb')); find('mujoco').simulate(run, time_step=h, duration=1e6)"
+    )
+    model = _model(tmp_path, BOX)
+    (tmp_path / "asked").write_bytes(pickle.dumps((ModelRun(model=model, elsewhere=True), model.time_step)))
+    parent = subprocess.Popen([sys.executable, "-c", code, str(tmp_path / "asked")])
+    children = Path(f"/proc/{parent.pid}/task/{parent.pid}/children")
+
+    def at_work() -> str:
+        for child in children.read_text().split():
+            with suppress(OSError):
+                told = Path(f"/proc/{child}/cmdline").read_text(), Path(f"/proc/{child}/maps").read_text()
+                if "model_loop" in told[0] and "mujoco" in told[1]:
+                    return child
+        return ""
+
+    try:
+        child = _until(at_work)
+    finally:
+        parent.kill()
+        parent.wait()
+
+    _until(
+        lambda: (
+            not Path(f"/proc/{child}").exists() or "Z" in Path(f"/proc/{child}/stat").read_text().split()[2]
+        )
+    )
+
+
+def _until(true, seconds: float = 60.0):
+    """What it becomes, once it is something."""
+    ends = time.monotonic() + seconds
+    while not (found := true()):
+        assert time.monotonic() < ends
+        time.sleep(0.05)
+    return found
 
 
 @pytest.mark.parametrize(
