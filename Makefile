@@ -5,6 +5,7 @@ DB     ?= sqlite:///tracker.db
 OUT    ?= public
 WORKERS ?= auto  # of the tests in Python: as many as there are cores
 BIN    := $(VENV)/bin
+export PIP_BUILD_CONSTRAINT ?= $(CURDIR)/.ci/build-constraints.txt
 
 .PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-smooth bench-replay pictures looks heaps campaign campaign-wide mutants mutants-tonight past mutation detectors pairs aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-threads sanitize-python FORCE
 help:

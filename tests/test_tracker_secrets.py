@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 import pytest
@@ -52,7 +51,7 @@ def test_what_is_no_url_is_refused_unrepeated_and_makes_no_file(
 
     assert done.exit_code == 2
     assert SECRET not in done.output
-    assert os.listdir(tmp_path) == []
+    assert not list(tmp_path.iterdir())
     with pytest.raises(DatabaseError):
         database_url(url)
 
