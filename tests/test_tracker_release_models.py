@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import re
+from pathlib import Path
 from types import SimpleNamespace
 
 from spook_tracker.tracker.cli.release_models import model_page, only_models, without_models
 from spook_tracker.tracker.judge.compare import ComparedRun, compare
-from spook_tracker.tracker.judge.release_notes import Step, alike, visible
+from spook_tracker.tracker.judge.release_notes import Step, alike, read_changelog, visible
 from tests.test_tracker_model_files import KNOWN, _side
 from tests.test_tracker_verdict import sample, series
 
@@ -55,3 +57,14 @@ def test_models_stand_apart_from_other_tests() -> None:
     assert only_models(["falls", "stays"], [STEP])
     assert not only_models(["falls", "pendulum"], [STEP])
     assert model_page("mujoco", CARDS, []) == []
+
+
+def test_the_page_of_models_answers_every_entry_of_its_changelog() -> None:
+    docs = Path(__file__).parent.parent / "docs"
+    page = (docs / "mujoco-models.md").read_text(encoding="utf-8")
+    told_there = re.findall(r"^- (\S+), item (\d+): (.+?)\. Seen in", page, re.MULTILINE)
+    asked = read_changelog(docs / "mujoco-models-changelog.toml").entries
+
+    assert sorted(told_there) == sorted((entry.release, str(entry.item), entry.says) for entry in asked)
+    assert len(re.findall(r"^\| \w+ \| `[^`]+\.xml` \|", page, re.MULTILINE)) >= 30
+    assert "- **box_on_box**: box rests 0.000108 m higher" in page
