@@ -103,16 +103,16 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     for (std::size_t b = 0; b < bodies; ++b)
         predicted_[b] = supported_[b] || jointed_[b] || solver_index_[b] < 0 ? velocity[b] : free_velocity[b];
     const std::size_t closed_points = points_.size();
-    if (!initial_penetration_known_) note_initial_penetrations();
+    if (!state_.initial_penetration_known) note_initial_penetrations();
     if (find_impacts(predicted_, false) > 0) {
         find_events();
         move_impacts_to_start(closed_points, predicted_);
     }
     if (points_.empty()) {
-        cache_.clear();
+        state_.cache.clear();
         return false;
     }
-    counters_.contacts += points_.size();
+    state_.counters.contacts += points_.size();
     order_points();
     measure_points();
     return true;
@@ -239,7 +239,7 @@ void ContactStage::add_point(const Contact& contact, const Pose& first, const Po
     point.toi = toi;
     point.begun = contact.point.gap;
     if (oriented_) orient(point, first, second);
-    if (!asleep_.empty()) wake_sleepers(contact);
+    if (!state_.asleep.empty()) wake_sleepers(contact);
 }
 
 /// Where friction differs with the direction its bound is an ellipse about the direction's shadow on the surface. In

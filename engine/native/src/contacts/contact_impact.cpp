@@ -161,7 +161,7 @@ void ContactStage::solve_impact(MixedSystem& hit, std::size_t joints, std::vecto
         settled = settled && report.converged;
     }
     const double enough = options_.solver == SolverKind::direct ? 0.0 : options_.residual_tolerance;
-    if (report.finite && change > std::max(enough, tolerated * fastest)) ++counters_.unsettled;
+    if (report.finite && change > std::max(enough, tolerated * fastest)) ++state_.counters.unsettled;
     if (report.finite && !settled) judge_impact(hit, friction, model);
 }
 
@@ -282,7 +282,7 @@ bool ContactStage::is_impact(const Point& point) const noexcept {
 }
 
 void ContactStage::impact(MixedSystem& system) {
-    ++counters_.impacts;
+    ++state_.counters.impacts;
     ++impact_rounds_;
     residual_ = unsettled_by_ = 0.0;
     unsettled_body_ = -1;
@@ -394,7 +394,7 @@ void ContactStage::after_impact(const MixedSystem& system) {
             std::for_each(points_.begin() + known, points_.end(),
                           [this](Point& p) { move_to_last_impact(p); });
         move_impacts_to_start(known, next);
-        counters_.contacts += points_.size() - known;
+        state_.counters.contacts += points_.size() - known;
         order_points();
     }
     const bool successive = options_.impacts == ImpactOrder::successive;

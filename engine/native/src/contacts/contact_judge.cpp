@@ -135,9 +135,9 @@ void ContactStage::blame_sunk() {
     double worst = sunk;
     for (const Point& point : points_) {
         if (point.toi >= 0.0 || point.before < 0.0) continue;
-        const auto given = initial_penetration_.find(point.contact.key >> feature_bits);
+        const auto given = state_.initial_penetration.find(point.contact.key >> feature_bits);
         const double known =
-            elastic_depth(point) + (given == initial_penetration_.end() ? 0.0 : given->second);
+            elastic_depth(point) + (given == state_.initial_penetration.end() ? 0.0 : given->second);
         const double share = (-point.contact.point.gap - known) / moving_size(point.contact);
         if (!(share > worst)) continue;
         worst = share;

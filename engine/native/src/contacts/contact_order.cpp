@@ -106,13 +106,13 @@ void ContactStage::order_points() {
     order_by_key(points_, toi_points_, places_);
     std::size_t old = 0;
     for (Point& point : points_) {
-        while (old < cache_.size() && cache_[old].contact.key < point.contact.key) ++old;
-        if (old == cache_.size() || cache_[old].contact.key != point.contact.key) continue;
-        point.before = cache_[old].normal;
-        point.compression_before = cache_[old].compression;
+        while (old < state_.cache.size() && state_.cache[old].contact.key < point.contact.key) ++old;
+        if (old == state_.cache.size() || state_.cache[old].contact.key != point.contact.key) continue;
+        point.before = state_.cache[old].normal;
+        point.compression_before = state_.cache[old].compression;
         if (point.solved) continue;
-        std::copy_n(cache_[old].tangent, 2, point.tangents);
-        if (resists_turning_) std::copy_n(cache_[old].turning, 3, own_extras(point).turning);
+        std::copy_n(state_.cache[old].tangent, 2, point.tangents);
+        if (resists_turning_) std::copy_n(state_.cache[old].turning, 3, own_extras(point).turning);
     }
     ordered_ = points_.size();
 }

@@ -103,13 +103,13 @@ bool ContactStage::find_more(bool over) {
 
 /// Hands the points found since `known` to the PGS solver, with what they did in the step before.
 void ContactStage::take_in(std::size_t known) {
-    counters_.contacts += points_.size() - known;
+    state_.counters.contacts += points_.size() - known;
     for (std::size_t k = known; k < points_.size(); ++k) {
         Point& point = points_[k];
         const auto old =
-            std::lower_bound(cache_.begin(), cache_.end(), point.contact.key,
+            std::lower_bound(state_.cache.begin(), state_.cache.end(), point.contact.key,
                              [](const CachedContact& t, std::uint64_t key) { return t.contact.key < key; });
-        if (old == cache_.end() || old->contact.key != point.contact.key) continue;
+        if (old == state_.cache.end() || old->contact.key != point.contact.key) continue;
         point.before = old->normal;
         point.compression_before = old->compression;
         std::copy_n(old->tangent, 2, point.tangents);
@@ -202,7 +202,7 @@ void ContactStage::warm_start_by_pgs(MixedSystem& system, std::size_t known, int
     const double enough = warm_started * speed;
     const FrictionReport report =
         pgs_.run(warm_start_iterations, enough, enough, [this](bool over) { return find_more(over); });
-    counters_.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
+    state_.counters.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
     late_impact_ = false;  // by velocities on the way: the solve will tell
     std::fill(predicted_sinking_.begin(), predicted_sinking_.end(), 0.0);
     if (!report.finite) return;
@@ -240,7 +240,7 @@ bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
             report =
                 pgs_.run(options_.iterations, options_.residual_tolerance,
                          focus * options_.unsettled_residual, [this](bool over) { return find_more(over); });
-            counters_.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
+            state_.counters.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
             if ((report.finite && is_settled(system)) || report.converged) break;
             const bool grows = residual_ > std::exchange(last, residual_) && system.rows.empty();
             if (!report.finite || (grows && runs_away(system))) {
@@ -268,11 +268,11 @@ bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
         if (again) take_in(known);
     }
     if (report.finite && pass_other_ends(system, system.rows.size())) return true;
-    unfinished = report.finite && !report.converged && (by_rows_ || unsettled_body_ >= 0) &&
+    unfinished = report.finite && !report.converged && (state_.by_rows || unsettled_body_ >= 0) &&
                  !system.rows.empty() && system.rows.size() + points_.size() <= few_rows;
-    by_rows_ = by_rows_ || unfinished;
+    state_.by_rows = state_.by_rows || unfinished;
     if (unfinished) return true;
-    counters_.unsettled += !report.converged;
+    state_.counters.unsettled += !report.converged;
 
     std::vector<double>& share = arrays_.share;
     share.clear();
@@ -289,7 +289,7 @@ bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
     mark_rows(system);  // by joints; of contacts those that push, or did in an impact
     for (std::size_t b = 0; b < solver_index_.size(); ++b)
         if (solver_index_[b] >= 0 && event_time_[b] >= 0.0) has_rows_[solver_index_[b]] = 1;
-    cache_.clear();
+    state_.cache.clear();
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
         double impulse[3];
@@ -306,7 +306,7 @@ bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
             if (solver_index_[body] >= 0) has_rows_[solver_index_[body]] = 1;
     }
     if (report.finite) correct_events(system);
-    order_by_key(cache_, unordered_, places_);
+    order_by_key(state_.cache, unordered_, places_);
     return report.finite;
 }
 

@@ -15,27 +15,27 @@ Vec3 ContactStage::force(int body, int other) const noexcept {
         if (other >= 0 && (first ? cached.contact.second : cached.contact.first) != other) return;
         sum += (first ? 1.0 : -1.0) * cached.impulse;
     };
-    for (const CachedContact& cached : cache_) add(cached);
-    for (const CachedContact& cached : sleeping_cache_) add(cached);
+    for (const CachedContact& cached : state_.cache) add(cached);
+    for (const CachedContact& cached : state_.sleeping) add(cached);
     return (1.0 / options_.time_step) * sum;
 }
 
 int ContactStage::count() const noexcept {
     const auto active = [](const CachedContact& cached) { return cached.active; };
-    return static_cast<int>(std::count_if(cache_.begin(), cache_.end(), active) +
-                            std::count_if(sleeping_cache_.begin(), sleeping_cache_.end(), active));
+    return static_cast<int>(std::count_if(state_.cache.begin(), state_.cache.end(), active) +
+                            std::count_if(state_.sleeping.begin(), state_.sleeping.end(), active));
 }
 
 double ContactStage::penetration() const noexcept {
     double depth = 0.0;
-    for (const CachedContact& cached : cache_) depth = std::max(depth, -cached.contact.point.gap);
-    for (const CachedContact& cached : sleeping_cache_) depth = std::max(depth, -cached.contact.point.gap);
+    for (const CachedContact& cached : state_.cache) depth = std::max(depth, -cached.contact.point.gap);
+    for (const CachedContact& cached : state_.sleeping) depth = std::max(depth, -cached.contact.point.gap);
     return depth;
 }
 
 void ContactStage::points(int most, double* out) const noexcept {
     double* const end = out + CONTACT_NUMBERS * most;
-    auto kept = sleeping_cache_.begin();
+    auto kept = state_.sleeping.begin();
     const auto tell = [&](const CachedContact& cached) {
         if (out == end || !cached.active) return;
         put(out, cached.contact.point.position);
@@ -44,11 +44,11 @@ void ContactStage::points(int most, double* out) const noexcept {
         out[9] = cached.friction;
         out += CONTACT_NUMBERS;
     };
-    for (const CachedContact& cached : cache_) {
-        for (; kept != sleeping_cache_.end() && kept->contact.key < cached.contact.key; ++kept) tell(*kept);
+    for (const CachedContact& cached : state_.cache) {
+        for (; kept != state_.sleeping.end() && kept->contact.key < cached.contact.key; ++kept) tell(*kept);
         tell(cached);
     }
-    for (; kept != sleeping_cache_.end(); ++kept) tell(*kept);
+    for (; kept != state_.sleeping.end(); ++kept) tell(*kept);
     std::fill(out, end, std::numeric_limits<double>::quiet_NaN());
 }
 

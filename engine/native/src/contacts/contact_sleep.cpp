@@ -9,43 +9,43 @@
 namespace spook {
 
 void ContactStage::put_to_sleep(const std::vector<int>& bodies) {
-    asleep_.resize(solver_index_.size(), 0);
+    state_.asleep.resize(solver_index_.size(), 0);
     for (const int body : bodies) {
-        asleep_[body] = 1;
+        state_.asleep[body] = 1;
         detection_.set_asleep(body, true);
     }
     const auto stay =
-        std::stable_partition(cache_.begin(), cache_.end(), [this](const CachedContact& cached) {
+        std::stable_partition(state_.cache.begin(), state_.cache.end(), [this](const CachedContact& cached) {
             return !sleeps(cached.contact.first) && !sleeps(cached.contact.second);
         });
-    const auto old = static_cast<std::ptrdiff_t>(sleeping_cache_.size());
-    sleeping_cache_.insert(sleeping_cache_.end(), stay, cache_.end());
-    cache_.erase(stay, cache_.end());
+    const auto old = static_cast<std::ptrdiff_t>(state_.sleeping.size());
+    state_.sleeping.insert(state_.sleeping.end(), stay, state_.cache.end());
+    state_.cache.erase(stay, state_.cache.end());
     std::inplace_merge(
-        sleeping_cache_.begin(), sleeping_cache_.begin() + old, sleeping_cache_.end(),
+        state_.sleeping.begin(), state_.sleeping.begin() + old, state_.sleeping.end(),
         [](const CachedContact& a, const CachedContact& b) { return a.contact.key < b.contact.key; });
 }
 
 void ContactStage::wake(const std::vector<int>& bodies) {
     for (const int body : bodies) {
-        asleep_[body] = 0;
+        state_.asleep[body] = 0;
         detection_.set_asleep(body, false);
     }
     const auto woken = std::stable_partition(
-        sleeping_cache_.begin(), sleeping_cache_.end(), [this](const CachedContact& cached) {
+        state_.sleeping.begin(), state_.sleeping.end(), [this](const CachedContact& cached) {
             return sleeps(cached.contact.first) || sleeps(cached.contact.second);
         });
-    const auto old = static_cast<std::ptrdiff_t>(cache_.size());
-    cache_.insert(cache_.end(), woken, sleeping_cache_.end());
-    sleeping_cache_.erase(woken, sleeping_cache_.end());
+    const auto old = static_cast<std::ptrdiff_t>(state_.cache.size());
+    state_.cache.insert(state_.cache.end(), woken, state_.sleeping.end());
+    state_.sleeping.erase(woken, state_.sleeping.end());
     std::inplace_merge(
-        cache_.begin(), cache_.begin() + old, cache_.end(),
+        state_.cache.begin(), state_.cache.begin() + old, state_.cache.end(),
         [](const CachedContact& a, const CachedContact& b) { return a.contact.key < b.contact.key; });
 }
 
 std::vector<int> ContactStage::touching(const std::vector<char>& is_moving) const {
     std::vector<int> found;
-    for (const CachedContact& cached : sleeping_cache_) {
+    for (const CachedContact& cached : state_.sleeping) {
         if (is_moving[cached.contact.first]) found.push_back(cached.contact.second);
         if (is_moving[cached.contact.second]) found.push_back(cached.contact.first);
     }
@@ -69,16 +69,14 @@ void ContactStage::sleep_through() {
     correction_.clear();
 }
 
-/// What sleeps is what slept then.
-void ContactStage::lie_as(const Memory& memory) {
-    sleeping_cache_ = memory.kept;
+/// What sleeps is what slept then, for the search as well.
+void ContactStage::lie_as(const State& state) {
     woken_.clear();
-    if (asleep_.empty() && memory.asleep.empty()) return;
-    asleep_.resize(solver_index_.size(), 0);
+    if (state_.asleep.empty() && state.asleep.empty()) return;
+    state_.asleep.resize(solver_index_.size(), 0);
     for (std::size_t b = 0; b < solver_index_.size(); ++b) {
-        const bool slept = !memory.asleep.empty() && memory.asleep[b] != 0;
+        const bool slept = !state.asleep.empty() && state.asleep[b] != 0;
         if (slept == sleeps(static_cast<int>(b))) continue;
-        asleep_[b] = slept;
         detection_.set_asleep(static_cast<int>(b), slept);
     }
 }

@@ -191,7 +191,7 @@ FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>
         still_right(system, points, model))
         return {};
     // What a resting solve leaves, the next step sees; what an impact leaves stays.
-    const bool exact = &islands == &impact_solver_ || by_rows_;
+    const bool exact = &islands == &impact_solver_ || state_.by_rows;
     const double enough = exact ? o.residual_tolerance : o.unsettled_residual;
     const bool warm_started = warm_started_ && &islands == &resting_solver_;
     const bool direct = o.solver == SolverKind::direct;
@@ -204,10 +204,10 @@ FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>
         return pgs_or_direct(o, model, enough, island, own, solver);
     };
     const FrictionReport report = islands.run(system, points, std::cref(solve), answered);
-    counters_.friction_rounds += report.rounds;
-    counters_.pivots += report.pivots;
-    counters_.pgs_iterations += report.pgs_iterations;
-    counters_.unsettled += !report.converged;
+    state_.counters.friction_rounds += report.rounds;
+    state_.counters.pivots += report.pivots;
+    state_.counters.pgs_iterations += report.pgs_iterations;
+    state_.counters.unsettled += !report.converged;
     return report;
 }
 
@@ -337,7 +337,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
             if (pass_other_ends(system, joints)) return true;
             break;
         }
-        counters_.contacts += points_.size() - known;
+        state_.counters.contacts += points_.size() - known;
         for (std::size_t k = 0; k < system.rows.size() - joints; ++k)
             store_solution(system.rows[joints + k], points_[k]);
         if (joints == 0 && options_.solver == SolverKind::direct) warm_start_by_pgs(system, known, round);
@@ -360,7 +360,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
                 z *= share[std::max(system.rows[k].first, system.rows[k].second)];
     }
 
-    cache_.clear();
+    state_.cache.clear();
     for (std::size_t k = 0; k < points_.size(); ++k) {
         Point& point = points_[k];
         const Vec3 along = store_solution(system.rows[joints + k], point);
@@ -398,7 +398,7 @@ Vec3 ContactStage::store_solution(const RowBlock& block, Point& point) {
 /// Takes down what a point did: its normal impulse, and that along the surface.
 ContactStage::CachedContact& ContactStage::cache_contact(const MixedSystem& system, const Point& point,
                                                          double normal, Vec3 along) {
-    CachedContact& cached = cache_.emplace_back();
+    CachedContact& cached = state_.cache.emplace_back();
     const Vec3 n = point.contact.point.normal;
     cached.contact = point.contact;
     cached.normal = normal;

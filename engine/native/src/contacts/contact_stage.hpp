@@ -182,7 +182,7 @@ public:
         double friction = 0.0;           // mu of the pair, along its direction if it has one
         bool active = false;             // pushes, or closed
     };
-    const std::vector<CachedContact>& cached_contacts() const noexcept { return cache_; }
+    const std::vector<CachedContact>& cached_contacts() const noexcept { return state_.cache; }
 
     // contact_sleep.cpp: bodies that sleep have no pairs with each other, nor with what stands still.
     /// These fall asleep where they are, and every body that touches them: what their touches did stays, to be read.
@@ -201,32 +201,33 @@ public:
     bool conveys(const Contact& contact) const;
     double radius(int body) const noexcept { return detection_.radius()[body]; }  // m, of its surface
 
-    /// All that a later step depends on.
-    struct Memory {
-        std::vector<CachedContact> cached_contacts, kept;
-        std::vector<char> asleep;
+    /// What a later step depends on: copying it back goes back.
+    struct State {
+        std::vector<CachedContact> cache;     // of the last step until the end of solve()
+        std::vector<CachedContact> sleeping;  // of sleepers
+        std::vector<char> asleep;             // by body; empty while none has slept
         ContactCounters counters;
-        IslandSolver::BackoffOf resting, impact, projection;
-        DepthOfPair given;
-        bool begun = false, by_rows = false;
+        DepthOfPair initial_penetration;  // by pair: overlap the scene began with, as far as it is left, m
+        bool initial_penetration_known = false;  // whether it has been looked for
+        bool by_rows = false;  // PGS over few joints and contacts has failed: they are solved directly
     };
-    void keep(Memory& memory) const {
-        memory.cached_contacts = cache_, memory.kept = sleeping_cache_, memory.asleep = asleep_,
-        memory.counters = counters_;
-        resting_solver_.backoff(memory.resting);
-        impact_solver_.backoff(memory.impact);
-        projection_solver_.backoff(memory.projection);
-        memory.given = initial_penetration_, memory.begun = initial_penetration_known_,
-        memory.by_rows = by_rows_;
+    /// That, and what the solvers of islands have learnt of how long to wait.
+    struct Snapshot {
+        State state;
+        IslandSolver::BackoffOf resting, impact, projection;
+    };
+    void keep(Snapshot& kept) const {
+        kept.state = state_;
+        resting_solver_.backoff(kept.resting);
+        impact_solver_.backoff(kept.impact);
+        projection_solver_.backoff(kept.projection);
     }
-    void remember(const Memory& memory) {
-        cache_ = memory.cached_contacts, counters_ = memory.counters;
-        lie_as(memory);
-        initial_penetration_ = memory.given, initial_penetration_known_ = memory.begun,
-        by_rows_ = memory.by_rows;
-        resting_solver_.set_backoff(memory.resting);
-        impact_solver_.set_backoff(memory.impact);
-        projection_solver_.set_backoff(memory.projection);
+    void go_back(const Snapshot& kept) {
+        lie_as(kept.state);
+        state_ = kept.state;
+        resting_solver_.set_backoff(kept.resting);
+        impact_solver_.set_backoff(kept.impact);
+        projection_solver_.set_backoff(kept.projection);
     }
 
     /// Force [N] on `body` from `other` (or from all if −1), mean over the step.
@@ -239,7 +240,7 @@ public:
     /// coefficient of friction. The first `most` of them in order of bodies; NaN where there are fewer.
     void points(int most, double* out) const noexcept;
 
-    ContactCounters counters() const noexcept { return counters_; }
+    ContactCounters counters() const noexcept { return state_.counters; }
     BlockLdlt::Counters factor_counters() const noexcept;
     double residual() const noexcept {
         return residual_;
@@ -252,9 +253,9 @@ public:
 private:
     using Point = StepContact;
     void add_point(const Contact& contact, const Pose& first, const Pose& second, double toi);
-    void lie_as(const Memory& memory);
+    void lie_as(const State& state);
     void wake_sleepers(const Contact& contact);
-    bool sleeps(int body) const noexcept { return asleep_[body] != 0; }
+    bool sleeps(int body) const noexcept { return state_.asleep[body] != 0; }
     void orient(Point& point, const Pose& first, const Pose& second);
     PairMaterial material(const Contact& contact) const noexcept {
         return combined(materials_[contact.first], materials_[contact.second]);
@@ -406,6 +407,7 @@ private:
     bool is_closed(const Contact& contact, double gap) const noexcept;
     bool is_closed(const Contact& contact) const noexcept { return is_closed(contact, contact.point.gap); }
 
+    State state_;
     Detection detection_;
     std::shared_ptr<Team> team_;  // of several threads, or none
     SharedValues<SurfaceMaterial> materials_;
@@ -431,11 +433,8 @@ private:
     std::vector<Pose> projected_poses_;  // where bodies were at the last of them
     bool moved_far_ = false;             // the last may not have been enough, see moves_far()
     std::vector<char> reconsidered_;     // which bodies are, by body; empty: for every body
-    DepthOfPair initial_penetration_;    // by pair: overlap the scene began with, as far as it is left, m
-    bool initial_penetration_known_ = false;  // whether it is known
-    bool by_rows_ = false;       // PGS over few joints and contacts has failed: they are solved directly
-    bool ran_away_ = false;      // in this solve: islands that are not too large are solved directly
-    std::vector<Vec6> next_;     // velocities between iterations, per body of the scene
+    bool ran_away_ = false;              // in this solve: islands that are not too large are solved directly
+    std::vector<Vec6> next_;             // velocities between iterations, per body of the scene
     std::vector<char> changed_;  // bodies with another than at the look before: the rest was judged then
     std::size_t handed_over_ = 0, ordered_ = 0;  // points the PGS solver has; points in order
     Unanswered unanswered_;
@@ -475,12 +474,9 @@ private:
     LargeArray<Point> points_, toi_points_;
     std::vector<ContactExtras> extras_;                                             // of points, in no order
     std::vector<std::pair<std::uint64_t, std::size_t>> places_, projected_places_;  // of points, by key
-    std::vector<CachedContact> cache_;           // of the last step until the end of solve()
-    std::vector<CachedContact> sleeping_cache_;  // of sleepers
-    std::vector<char> asleep_;                   // by body; empty while none has slept
-    std::vector<int> woken_;                     // sleepers met in this step
-    std::vector<double> margin_, search_;        // where bodies may get, and where they are looked for, m
-    std::vector<char> has_rows_;                 // moving bodies with rows, by unknown
+    std::vector<int> woken_;               // sleepers met in this step
+    std::vector<double> margin_, search_;  // where bodies may get, and where they are looked for, m
+    std::vector<char> has_rows_;           // moving bodies with rows, by unknown
     std::vector<Vec6> prescribed_;  // velocities of bodies that do not move by themselves, zero for the rest
     std::vector<Vec6> correction_;
     bool impact_needed_ = false;
@@ -494,7 +490,6 @@ private:
     bool sunk_ = false;
     bool joint_is_worst_ = false;  // of what the last iterations have left
     int unsettled_body_ = -1;
-    ContactCounters counters_;
 };
 
 }  // namespace spook

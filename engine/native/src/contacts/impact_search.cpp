@@ -131,7 +131,7 @@ bool ContactStage::meets(const std::vector<Vec6>& next, bool stop_hit, bool rebo
     }
     if (found > 0) move_impacts_to_start(closed_points, next);
     if (points_.empty()) return false;
-    counters_.contacts += points_.size();
+    state_.counters.contacts += points_.size();
     order_points();
     return true;
 }

@@ -96,31 +96,31 @@ bool ContactStage::is_externally_driven(const Contact& contact) const {
 
 /// Takes down how deep pairs overlap where the run begins: nothing but the scene has brought them there.
 void ContactStage::note_initial_penetrations() {
-    initial_penetration_known_ = true;
+    state_.initial_penetration_known = true;
     for (const Point& point : points_) {
         const double excess = -point.contact.point.gap - elastic_depth(point);
         if (!(excess > 0.0)) continue;
-        double& given = initial_penetration_[point.contact.key >> feature_bits];
+        double& given = state_.initial_penetration[point.contact.key >> feature_bits];
         given = std::max(given, excess);
     }
 }
 
 /// Takes down what is left of it, at most what it was.
 void ContactStage::update_initial_penetrations() {
-    if (initial_penetration_.empty()) return;
+    if (state_.initial_penetration.empty()) return;
     DepthOfPair& left = arrays_.left;
     left.clear();
-    for (const CachedContact& cached : sleeping_cache_)
-        if (const auto given = initial_penetration_.find(cached.contact.key >> feature_bits);
-            given != initial_penetration_.end())
+    for (const CachedContact& cached : state_.sleeping)
+        if (const auto given = state_.initial_penetration.find(cached.contact.key >> feature_bits);
+            given != state_.initial_penetration.end())
             left[given->first] = given->second;
     for (const PenetrationRecord& record : penetrations_) {
-        const auto given = initial_penetration_.find(record.contact.key >> feature_bits);
-        if (!(record.depth > 0.0) || given == initial_penetration_.end()) continue;
+        const auto given = state_.initial_penetration.find(record.contact.key >> feature_bits);
+        if (!(record.depth > 0.0) || given == state_.initial_penetration.end()) continue;
         double& depth = left[given->first];
         depth = std::max(depth, std::min(record.depth, given->second));
     }
-    initial_penetration_ = left;
+    state_.initial_penetration = left;
 }
 
 /// Whether a point parts by so much that its bodies may come down elsewhere, or push others aside, and one displacement is
@@ -177,7 +177,7 @@ void ContactStage::find_neighbours(const std::vector<Pose>& poses, double margin
         const auto inside = [&](int b) { return reached[b] != 0 && reached[b] < round; };
         ++round;
         grown_.clear();
-        for (const CachedContact& cached : cache_) {
+        for (const CachedContact& cached : state_.cache) {
             const int a = cached.contact.first, b = cached.contact.second;
             if (inside(a)) reach(b);
             if (inside(b)) reach(a);
@@ -187,9 +187,9 @@ void ContactStage::find_neighbours(const std::vector<Pose>& poses, double margin
             if (!inside(a) && !inside(b)) continue;
             const std::uint64_t key = pair_of(pair);
             const auto cached = std::lower_bound(
-                cache_.begin(), cache_.end(), key,
+                state_.cache.begin(), state_.cache.end(), key,
                 [](const CachedContact& t, std::uint64_t k) { return t.contact.key >> feature_bits < k; });
-            if (cached != cache_.end() && cached->contact.key >> feature_bits == key) continue;
+            if (cached != state_.cache.end() && cached->contact.key >> feature_bits == key) continue;
             scratch_.clear();
             detection_.collide_pair(pair, poses[a], poses[b], margin, scratch_);
             if (scratch_.empty()) continue;
@@ -304,7 +304,7 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, bool again) {
         });
     if (!again) find_neighbours(poses, margin);
     find_neighbour_overlaps(poses, margin);
-    if (!asleep_.empty())
+    if (!state_.asleep.empty())
         for (const PenetrationRecord& record : penetrations_) wake_sleepers(record.contact);
     return deepest;
 }
@@ -315,18 +315,18 @@ double ContactStage::look_for_overlaps(const std::vector<Pose>& poses, double ma
     penetrations_.clear();
     double deepest = 0.0;
     unsigned seen = 0;
-    for (std::size_t from = 0, end = 0; from < cache_.size(); from = end) {
-        const std::uint64_t key = cache_[from].contact.key >> feature_bits;
-        const int a = cache_[from].contact.first, b = cache_[from].contact.second;
-        const double rounding = slack(cache_[from].contact);
+    for (std::size_t from = 0, end = 0; from < state_.cache.size(); from = end) {
+        const std::uint64_t key = state_.cache[from].contact.key >> feature_bits;
+        const int a = state_.cache[from].contact.first, b = state_.cache[from].contact.second;
+        const double rounding = slack(state_.cache[from].contact);
         double most_compression = 0.0;
         bool overlapped = false;
-        for (; end < cache_.size() && cache_[end].contact.key >> feature_bits == key; ++end) {
-            most_compression = std::max(most_compression, cache_[end].compression);
-            overlapped = overlapped || cache_[end].contact.point.gap < -rounding;
+        for (; end < state_.cache.size() && state_.cache[end].contact.key >> feature_bits == key; ++end) {
+            most_compression = std::max(most_compression, state_.cache[end].compression);
+            overlapped = overlapped || state_.cache[end].contact.point.gap < -rounding;
         }
-        if (from + ahead < cache_.size()) {
-            const Contact& later = cache_[from + ahead].contact;
+        if (from + ahead < state_.cache.size()) {
+            const Contact& later = state_.cache[from + ahead].contact;
             for (const int body : {later.first, later.second}) prefetch(poses[body]), prefetch(poses_[body]);
         }
         if (!is_reconsidered(a, b)) continue;
@@ -340,10 +340,10 @@ double ContactStage::look_for_overlaps(const std::vector<Pose>& poses, double ma
             double compression = 0.0;
             if (materials_[a].compliance + materials_[b].compliance > 0.0) compression = most_compression;
             for (std::size_t k = from; k < end; ++k)
-                if (cache_[k].contact.key == contact.key) compression = cache_[k].compression;
+                if (state_.cache[k].contact.key == contact.key) compression = state_.cache[k].compression;
             double excess = -contact.point.gap - compression - rounding;
-            if (again && excess > 0.0 && initial_penetration_.contains(key))
-                excess = std::max(0.0, excess - initial_penetration_.at(key));
+            if (again && excess > 0.0 && state_.initial_penetration.contains(key))
+                excess = std::max(0.0, excess - state_.initial_penetration.at(key));
             if (excess > deepest && (margin == 0.0 || !is_still())) deepest = excess;
             if (margin > 0.0) add_penetration(contact, poses, excess);
         }
@@ -354,8 +354,8 @@ double ContactStage::look_for_overlaps(const std::vector<Pose>& poses, double ma
 /// How fast the bodies of an overlap are to part in the step, m/s; of points apart, how fast they may close.
 double ContactStage::separation_speed(const PenetrationRecord& record, bool again) const {
     const double h = options_.time_step, excess = record.depth;
-    const auto given = initial_penetration_.find(record.contact.key >> feature_bits);
-    if (again || !(excess > 0.0) || given == initial_penetration_.end()) return excess / h;
+    const auto given = state_.initial_penetration.find(record.contact.key >> feature_bits);
+    if (again || !(excess > 0.0) || given == state_.initial_penetration.end()) return excess / h;
     const double slow = std::min(excess, given->second);
     return regularise(0.0, record.damping, h).violation_gain * slow + (excess - slow) / h;
 }
@@ -363,7 +363,7 @@ double ContactStage::separation_speed(const PenetrationRecord& record, bool agai
 /// Which bodies are to be seen as one: contacts that pushed aside are known; contacts that push, whose laws a turn of some of
 /// their bodies would break, joints and the ground are added.
 void ContactStage::note_projected(const MixedSystem& projection) {
-    for (const CachedContact& cached : cache_)
+    for (const CachedContact& cached : state_.cache)
         if (cached.normal > 0.0 || cached.impact > 0.0)
             arrays_.projected.tie(solver_index_[cached.contact.first], solver_index_[cached.contact.second]);
     for (const RowBlock& block : projection.rows) arrays_.projected.tie(block);
@@ -380,11 +380,11 @@ void ContactStage::note_projected(const MixedSystem& projection) {
         return projection_.islands
             .of_body[std::max(solver_index_[contact.first], solver_index_[contact.second])];
     };
-    for (const CachedContact& cached : cache_)
+    for (const CachedContact& cached : state_.cache)
         if (is_externally_driven(cached.contact) && island(cached.contact) >= 0)
             projection_.externally_driven[island(cached.contact)] = 1;
     for (const PenetrationRecord& record : penetrations_)
-        if (record.depth > 0.0 && initial_penetration_.contains(record.contact.key >> feature_bits) &&
+        if (record.depth > 0.0 && state_.initial_penetration.contains(record.contact.key >> feature_bits) &&
             island(record.contact) >= 0)
             projection_.externally_driven[island(record.contact)] = 1;
 }
@@ -398,10 +398,10 @@ bool ContactStage::project_positions(const MixedSystem& system, std::size_t join
     else reconsidered_.clear();
     projection_.deepest = find_overlaps(poses, again);
     if (!(projection_.deepest > 0.0)) {
-        if (!again) initial_penetration_.clear();
+        if (!again) state_.initial_penetration.clear();
         return false;
     }
-    if (!again) ++counters_.corrections;
+    if (!again) ++state_.counters.corrections;
     const bool fresh = again && keep_projected(poses);
     if (again && !fresh && !(projection_.deepest < 0.5 * last)) return false;
     MixedSystem& projection = projection_system_;
@@ -474,7 +474,7 @@ bool ContactStage::project_by_pgs(MixedSystem& projection, bool again) {
     }
     const FrictionReport report =
         projection_pgs_.run(options_.iterations, options_.residual_tolerance, 0.0, nullptr);
-    counters_.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
+    state_.counters.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
     if (!report.finite) return false;
     projection_pgs_.write(projection);
     for (std::size_t k = 0; k < penetrations_.size(); ++k) {
@@ -486,7 +486,7 @@ bool ContactStage::project_by_pgs(MixedSystem& projection, bool again) {
 }
 
 void ContactStage::apply_balancing_impulse(int island, Vec3 momentum) noexcept {
-    for (CachedContact& cached : cache_) {
+    for (CachedContact& cached : state_.cache) {
         const int first = solver_index_[cached.contact.first], second = solver_index_[cached.contact.second];
         if (std::min(first, second) >= 0 || projection_.islands.of_body[std::max(first, second)] != island)
             continue;

@@ -1,8 +1,8 @@
 // Stage: contact points. Pairs that are closed where the step begins, and pairs that will touch within it along v (supported
 // bodies) or v + dv_ext (free ones): where, when and in which order, see contacts/contact_stage.hpp.
 //
-// reads: places and velocities of bodies, dv_ext. writes: the contact stage's points, poses_, velocities_, free_velocities_,
-// touching_, start_of_contacts_; sleepers that were met.
+// reads: places and velocities of bodies, dv_ext. writes: the contact stage's points, scratch_.poses, scratch_.velocities, scratch_.free_velocities,
+// touching_, scratch_.start_of_contacts; sleepers that were met.
 #include "rigid/rigid_system.hpp"
 
 namespace spook {
@@ -10,28 +10,28 @@ namespace spook {
 void RigidSystem::detect() {
     if (!contacts_) return;
     const std::size_t count = constants_.size();
-    poses_.resize(count);
-    velocities_.resize(count);
-    free_velocities_.resize(count);
+    scratch_.poses.resize(count);
+    scratch_.velocities.resize(count);
+    scratch_.free_velocities.resize(count);
     for (int i = 0; i < bodies(); ++i) {
         const BodyState& s = live_.bodies[i];
-        poses_[i] = {position_of(i), axes(constants_[i], s)};
+        scratch_.poses[i] = {position_of(i), axes(constants_[i], s)};
         const Vec3 v = s.velocity, w = s.angular_velocity;
-        velocities_[i] = free_velocities_[i] = {v.x, v.y, v.z, w.x, w.y, w.z};
+        scratch_.velocities[i] = scratch_.free_velocities[i] = {v.x, v.y, v.z, w.x, w.y, w.z};
         if (!constants_[i].moves()) continue;
         const Vec3 dv = kick(i);
-        for (int k = 0; k < 3; ++k) free_velocities_[i][k] += dv[k];
+        for (int k = 0; k < 3; ++k) scratch_.free_velocities[i][k] += dv[k];
         if (dot(constants_[i].torque, constants_[i].torque) > 0.0 && !constants_[i].particle) {
             const Vec3 dw = turned_by(constants_[i], s, twist(i));
-            for (int k = 0; k < 3; ++k) free_velocities_[i][3 + k] += dw[k];
+            for (int k = 0; k < 3; ++k) scratch_.free_velocities[i][3 + k] += dw[k];
         }
     }
-    touching_ = contacts_->detect(poses_, velocities_, free_velocities_);
+    touching_ = contacts_->detect(scratch_.poses, scratch_.velocities, scratch_.free_velocities);
     if (touching_) note_start_of_contacts();
     if (clock_) clock_->mark(Stage::collision);
 }
 
-/// In a step that began without contacts, whether bodies meet because of what joints make of their velocities, next_:
+/// In a step that began without contacts, whether bodies meet because of what joints make of their velocities, scratch_.next:
 /// cast along their own they do not. Then the step is to be solved with contacts.
 bool RigidSystem::meet_late() {
     const auto any = [this](auto is) {
@@ -39,7 +39,7 @@ bool RigidSystem::meet_late() {
     };
     const bool stop_hit = any([](const RowBlock& block) { return block.stop.hit; }),
                rebounds = any([](const RowBlock& block) { return block.stop.rebound != 0.0; });
-    if (!contacts_->meets(next_, stop_hit, rebounds)) return false;
+    if (!contacts_->meets(scratch_.next, stop_hit, rebounds)) return false;
     touching_ = true;
     note_start_of_contacts();
     return true;
@@ -47,10 +47,10 @@ bool RigidSystem::meet_late() {
 
 /// What the step is to be compared with.
 void RigidSystem::note_start_of_contacts() {
-    start_of_contacts_.resize(constants_.size());
+    scratch_.start_of_contacts.resize(constants_.size());
     for (int i : constrained_) {
         const BodyState& s = live_.bodies[i];
-        start_of_contacts_[i] = {s.displacement, twice_energy(constants_[i], s)};
+        scratch_.start_of_contacts[i] = {s.displacement, twice_energy(constants_[i], s)};
     }
 }
 

@@ -1,7 +1,7 @@
 // Stage: impacts. 0 <= nu ⟂ C v₊ + psi C v₋ >= 0 with friction against the slip, joints included and forces dropped; again as
 // long as some contact or stop with restitution is approached. The law, and why it cannot raise the energy: contacts/contact_impact.cpp.
 //
-// reads: points, masses and rows of joints. writes: velocities of bodies and velocities_, impulses of impacts, share_ (the part of
+// reads: points, masses and rows of joints. writes: velocities of bodies and scratch_.velocities, impulses of impacts, share_ (the part of
 // the forces still to act after an event), stops that were hit.
 #include <algorithm>
 #include <cmath>
@@ -29,7 +29,8 @@ void RigidSystem::lead_events() {
         s.velocity += dv;
         s.angular_momentum += twist;
         s.angular_velocity += dw;
-        for (int k = 0; k < 3; ++k) velocities_[i][k] += dv[k], velocities_[i][3 + k] += dw[k];
+        for (int k = 0; k < 3; ++k)
+            scratch_.velocities[i][k] += dv[k], scratch_.velocities[i][3 + k] += dw[k];
         share_[i] = 1.0 - lead;
     }
 }
@@ -43,7 +44,8 @@ void RigidSystem::impact() {
         if (contacts_->toi_fraction(i) > 0.0) share_[i] = 1.0 - contacts_->toi_fraction(i);
     take_velocities(true, [this](int k) { return !contacts_->has_rows(k); });
     for (std::size_t k = 0; k < constrained_.size(); ++k)
-        if (contacts_->has_rows(static_cast<int>(k))) velocities_[constrained_[k]] = mixed_.velocity[k];
+        if (contacts_->has_rows(static_cast<int>(k)))
+            scratch_.velocities[constrained_[k]] = mixed_.velocity[k];
     for (std::size_t k = 0; k < joints_.blocks().size(); ++k)
         if (const StopRow& stop = mixed_.rows[k].stop; stop.answered || stop.limit_reached) {
             JointSet::State& state = joints_.states[joints_.blocks()[k].joint];

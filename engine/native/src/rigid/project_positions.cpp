@@ -14,7 +14,7 @@
 //              velocities shortened alike, which no row over resting bodies feels. What both cannot pay is not lifted.
 // Where this cannot be, half the way is tried, and a quarter, an eighth: overlaps may stay, energy may not rise.
 //
-// reads: places and velocities where the step ends, the contact cache, start_of_contacts_. writes: places, orientations and,
+// reads: places and velocities where the step ends, the contact cache, scratch_.start_of_contacts. writes: places, orientations and,
 // where energy or momenta ask for it, velocities of bodies; the penetration that the scene began with, as far as it is left.
 #include <algorithm>
 #include <cmath>
@@ -52,10 +52,11 @@ void RigidSystem::project_positions() {
 /// order, and turns bring other points down.
 void RigidSystem::project_overlaps() {
     for (int round = 0; round < max_projections; ++round) {
-        end_poses_.resize(constants_.size());
+        scratch_.end_poses.resize(constants_.size());
         for (int i = 0; i < bodies(); ++i)
-            end_poses_[i] = {position_of(i), axes(constants_[i], live_.bodies[i])};
-        if (!contacts_->project_positions(mixed_, joints_.blocks().size(), end_poses_, round > 0)) return;
+            scratch_.end_poses[i] = {position_of(i), axes(constants_[i], live_.bodies[i])};
+        if (!contacts_->project_positions(mixed_, joints_.blocks().size(), scratch_.end_poses, round > 0))
+            return;
         project_bodies();
     }
 }
@@ -68,8 +69,8 @@ double RigidSystem::dissipated_energy(const std::vector<int>& members,
     for (const int k : members) {
         const int i = constrained_[k];
         const BodyState& s = live_.bodies[i];
-        sum += 0.5 * (start_of_contacts_[i].energy - twice_energy(constants_[i], s)) +
-               dot(force(i), s.displacement - start_of_contacts_[i].displacement) +
+        sum += 0.5 * (scratch_.start_of_contacts[i].energy - twice_energy(constants_[i], s)) +
+               dot(force(i), s.displacement - scratch_.start_of_contacts[i].displacement) +
                h_ * dot(constants_[i].torque, s.angular_velocity);
     }
     for (const int k : own_blocks) {
@@ -78,11 +79,11 @@ double RigidSystem::dissipated_energy(const std::vector<int>& members,
         for (int i = 0; i < block.size; ++i) {
             double speed = row_velocity(block, i, mixed_.velocity);
             if (block.first >= 0)
-                speed += dot(block.first_jacobian[i], velocities_[constrained_[block.first]]);
+                speed += dot(block.first_jacobian[i], scratch_.velocities[constrained_[block.first]]);
             if (block.second >= 0)
-                speed += dot(block.second_jacobian[i], velocities_[constrained_[block.second]]);
+                speed += dot(block.second_jacobian[i], scratch_.velocities[constrained_[block.second]]);
             for (const FurtherBody& other : block.further)
-                speed += dot(other.jacobian, velocities_[constrained_[other.body]]);
+                speed += dot(other.jacobian, scratch_.velocities[constrained_[other.body]]);
             work += 0.5 * block.multiplier[i] * speed;
         }
         sum += std::max(0.0, work);
@@ -95,7 +96,7 @@ double RigidSystem::lifting_energy(const std::vector<int>& members) const {
     double sum = 0.0;
     for (const int k : members) {
         const int i = constrained_[k];
-        sum -= dot(force(i), live_.bodies[i].displacement - before_projection_[i].displacement);
+        sum -= dot(force(i), live_.bodies[i].displacement - scratch_.before_projection[i].displacement);
     }
     return sum;
 }
@@ -105,12 +106,12 @@ double RigidSystem::affordable_share(int island) const {
     const ContactStage::PositionProjection& projection = *projection_;
     if (projection.externally_driven[island] != 0) return 1.0;
     double cost = 0.0, twice = 0.0;
-    for (const int k : island_members_[island]) {
+    for (const int k : scratch_.island_members[island]) {
         const Vec6& d = projection.velocity[k];
         cost -= h_ * dot(force(constrained_[k]), {d[0], d[1], d[2]});
-        twice += twice_energy(constants_[constrained_[k]], before_projection_[constrained_[k]]);
+        twice += twice_energy(constants_[constrained_[k]], scratch_.before_projection[constrained_[k]]);
     }
-    const double available_energy = dissipated_[island] + 0.5 * twice;
+    const double available_energy = scratch_.dissipated[island] + 0.5 * twice;
     return cost <= available_energy ? 1.0 : 0.999 * available_energy / cost;
 }
 
@@ -118,49 +119,53 @@ double RigidSystem::affordable_share(int island) const {
 void RigidSystem::gather_islands() {
     const Islands& islands = projection_->islands;
     const auto count = static_cast<std::size_t>(islands.count);
-    if (island_members_.size() <
+    if (scratch_.island_members.size() <
         count) {  // lists keep their memory; later there may be more, of a few bodies each
-        island_members_.resize(constrained_.size()), island_blocks_.resize(constrained_.size());
-        for (std::vector<int>& members : island_members_) members.reserve(few_members);
-        dissipated_.reserve(constrained_.size());
+        scratch_.island_members.resize(constrained_.size()),
+            scratch_.island_blocks.resize(constrained_.size());
+        for (std::vector<int>& members : scratch_.island_members) members.reserve(few_members);
+        scratch_.dissipated.reserve(constrained_.size());
     }
-    for (std::size_t k = 0; k < count; ++k) island_members_[k].clear(), island_blocks_[k].clear();
+    for (std::size_t k = 0; k < count; ++k)
+        scratch_.island_members[k].clear(), scratch_.island_blocks[k].clear();
     for (std::size_t k = 0; k < constrained_.size(); ++k)
-        if (islands.of_body[k] >= 0) island_members_[islands.of_body[k]].push_back(static_cast<int>(k));
+        if (islands.of_body[k] >= 0)
+            scratch_.island_members[islands.of_body[k]].push_back(static_cast<int>(k));
     const auto blocks = joints_.blocks();
-    overstep_at_.assign(blocks.size(), 0);
+    scratch_.overstep_at.assign(blocks.size(), 0);
     std::size_t rows = 0;
     for (std::size_t k = 0; k < blocks.size(); ++k) {
-        overstep_at_[k] = rows;
+        scratch_.overstep_at[k] = rows;
         rows += blocks[k].size;
         const int tied = std::max(mixed_.rows[k].first, mixed_.rows[k].second);
-        if (tied >= 0) island_blocks_[islands.of_body[tied]].push_back(static_cast<int>(k));
+        if (tied >= 0) scratch_.island_blocks[islands.of_body[tied]].push_back(static_cast<int>(k));
     }
-    overstep_.resize(rows);
+    scratch_.overstep.resize(rows);
     for (std::size_t k = 0; k < blocks.size(); ++k)
-        joints_.overstep(static_cast<int>(k), live_.bodies, overstep_.data() + overstep_at_[k]);
-    before_projection_ = live_.bodies;
-    dissipated_.assign(islands.count, 0.0);
+        joints_.overstep(static_cast<int>(k), live_.bodies,
+                         scratch_.overstep.data() + scratch_.overstep_at[k]);
+    scratch_.before_projection = live_.bodies;
+    scratch_.dissipated.assign(islands.count, 0.0);
 }
 
 /// Leads bodies that the scene has put beyond their joints' limits a part of the way back, at the rate of the limit's
 /// row: by positions, with all other rows where they are.
 void RigidSystem::project_limits() {
     const auto blocks = joints_.blocks();
-    arrays_.finder.begin(static_cast<int>(constrained_.size()));
+    scratch_.finder.begin(static_cast<int>(constrained_.size()));
     for (std::size_t k = 0; k < blocks.size(); ++k)
-        arrays_.finder.tie(mixed_.rows[k].first, mixed_.rows[k].second);
+        scratch_.finder.tie(mixed_.rows[k].first, mixed_.rows[k].second);
     for (std::size_t k = 0; k < blocks.size(); ++k)
         for (int body : joints_.others(static_cast<int>(k)))
-            if (solver_index_[body] >= 0) arrays_.finder.tie(mixed_.rows[k].first, solver_index_[body]);
-    limit_projection_.islands = arrays_.finder.find();
+            if (solver_index_[body] >= 0) scratch_.finder.tie(mixed_.rows[k].first, solver_index_[body]);
+    limit_projection_.islands = scratch_.finder.find();
     const std::size_t islands = static_cast<std::size_t>(limit_projection_.islands.count);
     limit_projection_.velocity.assign(constrained_.size(), Vec6{});
     limit_projection_.grounded.assign(islands, 0);
     limit_projection_.externally_driven.assign(islands, 1);
     projection_ = &limit_projection_;
     gather_islands();
-    std::vector<char>& beyond = arrays_.beyond;
+    std::vector<char>& beyond = scratch_.beyond;
     beyond.assign(islands, 0);
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         if (rests(static_cast<int>(k))) continue;
@@ -170,44 +175,45 @@ void RigidSystem::project_limits() {
         int row = 0;
         const double back = joints_.given_back(static_cast<int>(k), row);
         if (back == 0.0) continue;
-        overstep_[overstep_at_[k] + row] -= back;
+        scratch_.overstep[scratch_.overstep_at[k] + row] -= back;
         beyond[island] = 1;
     }
     for (int island = 0; island < limit_projection_.islands.count; ++island)
         if (beyond[island] != 0 && !project_island(island, 1.0))
-            for (const int k : island_members_[island])
-                live_.bodies[constrained_[k]] = before_projection_[constrained_[k]];
+            for (const int k : scratch_.island_members[island])
+                live_.bodies[constrained_[k]] = scratch_.before_projection[constrained_[k]];
 }
 
 void RigidSystem::project_bodies() {
     projection_ = &contacts_->projection();
     gather_islands();
     for (int island = 0; island < projection_->islands.count; ++island) {
-        if (rests(island_members_[island])) continue;
-        dissipated_[island] = dissipated_energy(island_members_[island], island_blocks_[island]);
+        if (rests(scratch_.island_members[island])) continue;
+        scratch_.dissipated[island] =
+            dissipated_energy(scratch_.island_members[island], scratch_.island_blocks[island]);
         const double share = affordable_share(island);
         for (int halving = 0; halving < most_halvings; ++halving) {
             if (project_island(island, std::ldexp(share, -halving))) break;
-            for (const int k : island_members_[island])
-                live_.bodies[constrained_[k]] = before_projection_[constrained_[k]];
+            for (const int k : scratch_.island_members[island])
+                live_.bodies[constrained_[k]] = scratch_.before_projection[constrained_[k]];
         }
     }
 }
 
 bool RigidSystem::project_island(int island, double share) {
     const ContactStage::PositionProjection& projection = *projection_;
-    const std::vector<int>& members = island_members_[island];
+    const std::vector<int>& members = scratch_.island_members[island];
     for (const int k : members) {
         const Vec6& d = projection.velocity[k];
         displace(constants_[constrained_[k]], share * h_, {d[0], d[1], d[2]}, {d[3], d[4], d[5]},
                  live_.bodies[constrained_[k]]);
     }
-    if (!hold_joints(members, island_blocks_[island])) return false;
+    if (!hold_joints(members, scratch_.island_blocks[island])) return false;
     double limit = 0.0, now = 0.0;
     for (const int k : members)
-        limit += twice_energy(constants_[constrained_[k]], before_projection_[constrained_[k]]);
+        limit += twice_energy(constants_[constrained_[k]], scratch_.before_projection[constrained_[k]]);
     if (projection.externally_driven[island] == 0)
-        limit -= 2.0 * std::max(0.0, lifting_energy(members) - dissipated_[island]);
+        limit -= 2.0 * std::max(0.0, lifting_energy(members) - scratch_.dissipated[island]);
     if (!(limit >= 0.0)) return false;
     if (projection.grounded[island] == 0) return keep_momenta(members, limit);
     for (const int k : members) {
@@ -232,17 +238,17 @@ bool RigidSystem::project_island(int island, double share) {
 bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector<int>& own_blocks) {
     if (own_blocks.empty()) return true;
     const auto blocks = joints_.blocks();
-    std::vector<int>& place = arrays_.place;
+    std::vector<int>& place = scratch_.place;
     place.assign(constrained_.size(), -1);
-    MixedSystem& system = holding_;
+    MixedSystem& system = scratch_.holding;
     system.mass.clear();
     for (std::size_t i = 0; i < members.size(); ++i) {
         place[members[i]] = static_cast<int>(i);
         system.mass.push_back(mixed_.mass[members[i]]);
     }
     system.rows.resize(own_blocks.size());
-    holding_further_.resize(blocks.size());
-    LargeArray<JointSet::State>& states = arrays_.joint_states;
+    scratch_.holding_further.resize(blocks.size());
+    LargeArray<JointSet::State>& states = scratch_.joint_states;
     states = joints_.states;
     double last = 0.0;
     for (int round = 0; round < most_rounds; ++round) {
@@ -260,13 +266,14 @@ bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector
             joints_.assemble(k, live_.bodies, block.first_jacobian[0].data(), block.second_jacobian[0].data(),
                              unused);
             if (!joints_.others(k).empty()) {
-                fill_further(k, block, unused, holding_further_[k]);
-                for (FurtherBody& other : holding_further_[k]) other.body = place[other.body];
+                fill_further(k, block, unused, scratch_.holding_further[k]);
+                for (FurtherBody& other : scratch_.holding_further[k]) other.body = place[other.body];
             }
             double now[6];
             joints_.overstep(k, live_.bodies, now);
             for (int row = 0; row < block.size; ++row) {
-                const double wanted = overstep_[overstep_at_[k] + row], change = now[row] - wanted;
+                const double wanted = scratch_.overstep[scratch_.overstep_at[k] + row],
+                             change = now[row] - wanted;
                 block.right[row] = -change / h_;
                 if (now[row] == 0.0 && wanted == 0.0 && !joints_.always_holds(blocks[k]))
                     block.lower[row] = block.upper[row] = 0.0;
@@ -290,7 +297,7 @@ bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector
 
 void RigidSystem::keep_spin_energy(int body) {
     const BodyConstants& constants = constants_[body];
-    const BodyState& before = before_projection_[body];
+    const BodyState& before = scratch_.before_projection[body];
     BodyState& s = live_.bodies[body];
     const double most = twice_energy(constants, before), now = twice_energy(constants, s);
     const double linear = constants.mass * dot(s.velocity, s.velocity);
@@ -307,7 +314,7 @@ bool RigidSystem::keep_momenta(const std::vector<int>& members, double limit) {
     Vec3 momentum, spin, gained;
     for (const int k : members) {
         const int i = constrained_[k];
-        const BodyState &old = before_projection_[i], &s = live_.bodies[i];
+        const BodyState &old = scratch_.before_projection[i], &s = live_.bodies[i];
         const Vec3 p = constants_[i].mass * s.velocity;
         mass += constants_[i].mass;
         momentum += p;

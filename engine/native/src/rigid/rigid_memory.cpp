@@ -6,34 +6,36 @@
 
 namespace spook {
 
-void RigidSystem::keep(Memory& memory) const {
+void RigidSystem::keep(Snapshot& kept) const {
     if (contacts_ && live_.velocity_ready) {
-        memory = before_solve_ahead_;
+        kept = before_solve_ahead_;
         return;
     }
-    memory.redundancy = redundant_.memory();
-    memory.live = live_, memory.joints = joints_.states, memory.mixed = mixed_;
-    memory.breaks = joints_.breaks;
-    if (contacts_) contacts_->keep(memory.contacts);
+    kept.state = live_;
+    kept.joints = joints_;
+    kept.warm.mixed = mixed_;
+    kept.warm.redundancy = redundant_.memory();
+    if (contacts_) contacts_->keep(kept.contacts);
     if (!stiff_) return;
-    memory.jacobians.clear();
+    kept.warm.jacobians.clear();
     const auto blocks = joints_.blocks();
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         const double* rows = jacobian(static_cast<int>(k), true);
-        memory.jacobians.insert(memory.jacobians.end(), rows, rows + 6 * blocks[k].size);
+        kept.warm.jacobians.insert(kept.warm.jacobians.end(), rows, rows + 6 * blocks[k].size);
     }
 }
 
-void RigidSystem::go_back(const Memory& memory) {
+void RigidSystem::go_back(const Snapshot& kept) {
     at_hand_ = false;
     share_.clear();  // of a step that was left unfinished
-    redundant_.restore(matrix_, memory.redundancy);
-    live_ = memory.live, joints_.states = memory.joints, mixed_ = memory.mixed;
-    joints_.breaks = memory.breaks;
-    if (contacts_) contacts_->remember(memory.contacts);
+    live_ = kept.state;
+    static_cast<JointStates&>(joints_) = kept.joints;
+    mixed_ = kept.warm.mixed;
+    redundant_.restore(matrix_, kept.warm.redundancy);
+    if (contacts_) contacts_->go_back(kept.contacts);
     if (!stiff_) return;
     const auto blocks = joints_.blocks();
-    const double* rows = memory.jacobians.data();
+    const double* rows = kept.warm.jacobians.data();
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         const int numbers = 6 * blocks[k].size;
         std::copy_n(rows, numbers, jacobian(static_cast<int>(k), true));

@@ -142,14 +142,15 @@ void RigidSystem::solve_locked() {
     };
     bool finite = false;
     if (contacts_) {
-        next_ = free_velocities_;
+        scratch_.next = scratch_.free_velocities;
         finite = locked_.solve(live_.bodies, loads, method_.refinements, [this](int body, const Twist& v) {
-            next_[body] = {v.linear.x, v.linear.y, v.linear.z, v.angular.x, v.angular.y, v.angular.z};
+            scratch_.next[body] = {v.linear.x, v.linear.y, v.linear.z, v.angular.x, v.angular.y, v.angular.z};
         });
         if (finite && meet_late()) return solve_mixed(true);
         for (int i : constrained_)
             if (finite)
-                take(i, {{next_[i][0], next_[i][1], next_[i][2]}, {next_[i][3], next_[i][4], next_[i][5]}});
+                take(i, {{scratch_.next[i][0], scratch_.next[i][1], scratch_.next[i][2]},
+                         {scratch_.next[i][3], scratch_.next[i][4], scratch_.next[i][5]}});
     } else {
         finite = locked_.solve(live_.bodies, loads, method_.refinements, take);
     }
@@ -173,11 +174,11 @@ void RigidSystem::solve_block() {
         return;
     }
     if (contacts_) {
-        next_ = free_velocities_;
+        scratch_.next = scratch_.free_velocities;
         const double* x = solution_.data() + rows_;
         for (int i : constrained_) {
             const int size = constants_[i].particle ? 3 : 6;
-            std::copy_n(x, size, next_[i].data());
+            std::copy_n(x, size, scratch_.next[i].data());
             x += size;
         }
         if (meet_late()) return solve_mixed(true);
@@ -320,7 +321,7 @@ void RigidSystem::fill_rows() {
         rows.stop = numbers.stop;
         if (numbers.softness) std::copy_n(numbers.softness, rows.size, rows.softness.data());
     }
-    for (const int k : other_ends_) {
+    for (const int k : scratch_.other_ends) {
         mixed_.rows[k].stop.both = true;
         mixed_.rows.push_back(other_end(mixed_.rows[k]));
     }

@@ -21,7 +21,7 @@
 #include "rigid/plane_step.hpp"
 #include "rigid/run_state.hpp"
 #include "rigid/sleep.hpp"
-#include "rigid/step_arrays.hpp"
+#include "rigid/step_scratch.hpp"
 #include "run/quantities.hpp"
 #include "run/run_loop.hpp"
 #include "run/stage_clock.hpp"
@@ -63,12 +63,12 @@ public:
     /// Fewer steps between two checks, the larger the scene: they are taken back together.
     std::int64_t block() const noexcept { return std::clamp<std::int64_t>(200'000 / bodies(), 16, 64); }
 
-    class Memory;
+    struct Snapshot;
     /// All that the coming steps depend on, drives apart; going back to it gives the bits of going on from it. Where
     /// velocities were looked ahead for with contacts, it is what was before, and they are found again: what their
     /// contacts left for the end of the step is too much to keep.
-    void keep(Memory& memory) const;
-    void go_back(const Memory& memory);
+    void keep(Snapshot& kept) const;
+    void go_back(const Snapshot& kept);
 
     // What may be set between steps, from outside; reset() takes nothing of it back.
     /// Where the next reset() begins: 13 numbers per body, as final_state() gives them.
@@ -120,15 +120,17 @@ public:
     double penetration() const noexcept { return contacts_ ? contacts_->penetration() : 0.0; }
 
 public:
-    class Memory {
-        friend class RigidSystem;
-        RigidState live;
-        LargeArray<JointSet::State> joints;
-        std::vector<Break> breaks;
-        RedundantRows::Memory redundancy;
+    /// What solves of the next step start from.
+    struct WarmStart {
         MixedSystem mixed;
-        ContactStage::Memory contacts;
+        RedundantRows::Memory redundancy;
         std::vector<double> jacobians;  // of the last step, which the stiffness of the next is made of
+    };
+    struct Snapshot {
+        RigidState state;
+        JointStates joints;
+        WarmStart warm;
+        ContactStage::Snapshot contacts;
     };
 
 private:
@@ -346,8 +348,8 @@ private:
 
     // The state.
     RigidState live_;
-    Memory saved_, before_solve_ahead_;  // the latter: before solve_ahead(), with contacts
-    Memory before_waking_;               // before the velocities of a step in which some body may wake
+    Snapshot saved_, before_solve_ahead_;  // the latter: before solve_ahead(), with contacts
+    Snapshot before_waking_;               // before the velocities of a step in which some body may wake
     JointSet joints_;
     bool replaying_ = false;                    // a block that ended unfit
     LargeArray<JointSet::State> early_joints_;  // then: as its first step left them
@@ -383,31 +385,16 @@ private:
     LargeArray<double> wide_;    // Jacobians of the bodies beyond a row's first two
     bool mixed_values_ = false;  // whether the last step's rows are in mixed_ or in matrix_
     MixedSystem mixed_;
-    std::vector<std::vector<FurtherBody>> further_, holding_further_;  // per block of joints, of its rows
-    std::vector<int> other_ends_;  // blocks of the step's joints whose stops have a row for each end
+    std::vector<std::vector<FurtherBody>> further_;  // per block of joints, of its rows
     PivotSolver pivot_;
     LoadDependentBounds load_dependent_;
     bool breaks_ = false;  // whether some joint may
     std::optional<ContactStage> contacts_, fresh_contacts_;
     std::vector<double> share_;  // of a body's forces that is still to act in this step; empty: all of it
-    std::vector<Pose> poses_;
-    std::vector<Vec6> velocities_, free_velocities_, next_;  // at the start; with forces; with joints as well
-    struct Begun {
-        Vec3 displacement;
-        double energy = 0.0;  // twice the kinetic one
-    };
-    std::vector<Begun> start_of_contacts_;               // per body: the start of a step with contacts
-    bool touching_ = false;                              // whether the step had any
-    ContactStage::PositionProjection limit_projection_;  // of bodies beyond their joints' limits
+    bool touching_ = false;      // whether the step had any
+    ContactStage::PositionProjection limit_projection_;             // of bodies beyond their joints' limits
     const ContactStage::PositionProjection* projection_ = nullptr;  // what is at hand
-    std::vector<Pose> end_poses_;
-    LargeArray<BodyState> before_projection_;  // per body, before overlaps are projected out
-    std::vector<double> dissipated_;           // per island, see dissipated_energy()
-    std::vector<std::vector<int>> island_members_, island_blocks_;  // per island: bodies, blocks of joints
-    std::vector<double> overstep_;                                  // per row of joints, before
-    std::vector<std::size_t> overstep_at_;                          // per block
-    MixedSystem holding_;
-    StepArrays arrays_;  // what is in them is of one call
+    StepScratch scratch_;
     PivotSolver holding_pivot_;
     SleepRules sleep_rules_;
     struct Place {

@@ -131,12 +131,12 @@ void RigidSystem::sleep() {
         some = some || sleep.quiet[i] == sleep_rules_.after;
     }
     if (!some) return;
-    arrays_.finder.begin(bodies());
+    scratch_.finder.begin(bodies());
     std::vector<char> kept_up(constants_.size(), 0);
     const auto tie = [&](int a, int b) {
         for (const auto& [one, other] : {IndexPair{a, b}, IndexPair{b, a}})
             if (is_moving(other)) kept_up[one] = 1;
-        arrays_.finder.tie(constants_[a].moves() ? a : -1, constants_[b].moves() ? b : -1);
+        scratch_.finder.tie(constants_[a].moves() ? a : -1, constants_[b].moves() ? b : -1);
     };
     for (const auto& [a, b] : sleep_rules_.ties) tie(a, b);
     for (const ContactStage::CachedContact& cached : contacts_->cached_contacts()) {
@@ -144,8 +144,8 @@ void RigidSystem::sleep() {
         if (contacts_->conveys(cached.contact))
             kept_up[cached.contact.first] = kept_up[cached.contact.second] = 1;
     }
-    for (const int i : constrained_) arrays_.finder.tie(i, i);
-    const Islands& islands = arrays_.finder.find();
+    for (const int i : constrained_) scratch_.finder.tie(i, i);
+    const Islands& islands = scratch_.finder.find();
     std::vector<char> awake(static_cast<std::size_t>(islands.count), 0);
     for (const int i : constrained_)
         if (sleep.quiet[i] < sleep_rules_.after || kept_up[i]) awake[islands.of_body[i]] = 1;

@@ -36,13 +36,13 @@ void RigidSystem::solve_mixed(bool touching) {
         return touching && stages_.runs(Stage::impact) && contacts_->impact_needed(mixed_);
     };
     bool finite = true;
-    other_ends_.clear();
+    scratch_.other_ends.clear();
     do {
         fill_rows();
         while (impact_needed()) impact();
         fill_momenta(true);
         if (clock_) clock_->mark(Stage::assemble_rows);
-        finite = touching ? contacts_->solve(mixed_, velocities_) : solve_joints();
+        finite = touching ? contacts_->solve(mixed_, scratch_.velocities) : solve_joints();
     } while (finite &&
              (impact_needed() || ((!touching || contacts_->ends_passed()) &&
                                   find_other_ends())));  // the solve may find some that is to come first
@@ -53,8 +53,9 @@ void RigidSystem::solve_mixed(bool touching) {
         return;
     }
     if (contacts_ && !touching) {
-        next_ = free_velocities_;
-        for (std::size_t k = 0; k < constrained_.size(); ++k) next_[constrained_[k]] = mixed_.velocity[k];
+        scratch_.next = scratch_.free_velocities;
+        for (std::size_t k = 0; k < constrained_.size(); ++k)
+            scratch_.next[constrained_[k]] = mixed_.velocity[k];
         if (meet_late()) return solve_mixed(true);
     }
     if (!load_dependent_.empty() && (touching || solver_ == RigidSolver::iterative)) {
@@ -128,10 +129,10 @@ RowBlock RigidSystem::other_end(const RowBlock& block) {
 
 /// Whether velocities lead past such ends; in the next solve of this step they have rows.
 bool RigidSystem::find_other_ends() {
-    const std::size_t known = other_ends_.size();
+    const std::size_t known = scratch_.other_ends.size();
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
-        if (passes_other_end(mixed_.rows[k], mixed_.velocity, h_)) other_ends_.push_back(k);
-    return other_ends_.size() > known;
+        if (passes_other_end(mixed_.rows[k], mixed_.velocity, h_)) scratch_.other_ends.push_back(k);
+    return scratch_.other_ends.size() > known;
 }
 
 /// Rows without contacts.
@@ -148,7 +149,7 @@ bool RigidSystem::solve_joints() {
 /// then on wherever iterations do not settle: what many of these leave adds up.
 bool RigidSystem::settle_joints() {
     const Islands* islands = nullptr;
-    std::vector<std::size_t>& rows = arrays_.rows;
+    std::vector<std::size_t>& rows = scratch_.rows;
     while (true) {
         const RowsResidual worst = rows_residual(mixed_, {}, method_.friction);
         live_.by_rows = live_.by_rows || worst.residual > pgs_tolerance();
@@ -157,17 +158,17 @@ bool RigidSystem::settle_joints() {
             return islands->of_body[std::max(block.first, block.second)];
         };
         if (!islands) {
-            islands = &arrays_.finder.find(mixed_);
+            islands = &scratch_.finder.find(mixed_);
             rows.assign(islands->count, 0);
             for (const RowBlock& block : mixed_.rows) ++rows[island(block)];
         }
         const int own = island(mixed_.rows[worst.row]);
         if (rows[own] > few_rows) return true;
         rows[own] = few_rows + 1;  // once
-        std::vector<char>& answered = arrays_.answered;
+        std::vector<char>& answered = scratch_.answered;
         answered.clear();
         for (const RowBlock& block : mixed_.rows) answered.push_back(island(block) != own);
-        IslandSolver& direct = arrays_.joint_solver;
+        IslandSolver& direct = scratch_.joint_solver;
         direct.set_backoff({});
         direct.floor = method_.floor, direct.refinements = method_.refinements;
         std::vector<FrictionPoint> none;
@@ -195,7 +196,8 @@ void RigidSystem::judge_pgs() {
     residual_ = std::max(residual_, worst.residual);
     if (!(worst.residual > pgs_tolerance())) return;
     const int blocks = static_cast<int>(joints_.blocks().size());
-    note_unsettled(body_of(worst.row < blocks ? worst.row : other_ends_[worst.row - blocks]), worst.residual);
+    note_unsettled(body_of(worst.row < blocks ? worst.row : scratch_.other_ends[worst.row - blocks]),
+                   worst.residual);
 }
 
 /// Takes over what the contact stage has found of its last solve.

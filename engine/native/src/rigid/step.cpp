@@ -57,6 +57,7 @@ void RigidSystem::begin_step() {
 
 /// What the velocities of a step begin with, however often they are found: those of the step before, and loads that follow the time.
 void RigidSystem::begin_velocities() {
+    scratch_.begin();
     if (half_step_)
         for (int i = 0; i < bodies(); ++i)
             live_.before[i] = {live_.bodies[i].velocity, live_.bodies[i].angular_momentum};

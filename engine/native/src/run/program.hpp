@@ -13,13 +13,16 @@
 
 namespace spook {
 
+/// What a system's keep() fills, all that a later step depends on: only the type of it is asked for.
+template <class System, class Kept> Kept kept_by(void (System::*keep)(Kept&) const);
+
 /// A System is what run_loop() asks for, and besides
 ///   System(const Scene&, StageList)            built from the stages it is given, and from nothing else
 ///   const StageList& stages() const            with those it runs marked as taken
 ///   void reset(StageClock*)                    back to the start; null: stages are not timed
 ///   void count(RunReport&, int64 steps) const  the work of so many steps
 ///   std::vector<double> final_state()
-///   Memory, void keep(Memory&) const, void go_back(const Memory&), void place(span)   for a run one holds
+///   void keep(Kept&) const, void go_back(const Kept&), void place(span)   for a run one holds
 ///   void tell(StageChoices&) const             optional: how it runs a stage, where only building it shows
 /// and two functions beside it
 ///   StageChoices choose_stages(const Scene&, bool observing)   which stages the scene needs, and why
@@ -66,7 +69,7 @@ public:
 
     /// Where a held run is.
     struct Snapshot {
-        typename System::Memory memory;
+        decltype(kept_by(&System::keep)) state;
         std::int64_t steps = 0;
     };
 
@@ -103,12 +106,12 @@ public:
     }
     Snapshot keep() const {
         Snapshot snapshot;
-        system_.keep(snapshot.memory);
+        system_.keep(snapshot.state);
         snapshot.steps = steps_;
         return snapshot;
     }
     void go_back(const Snapshot& snapshot) {
-        system_.go_back(snapshot.memory);
+        system_.go_back(snapshot.state);
         steps_ = snapshot.steps;
     }
     System& system() noexcept { return system_; }

@@ -1,0 +1,45 @@
+// What joints carry from step to step.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "linear/large_array.hpp"
+#include "linear/vec.hpp"
+
+namespace spook {
+
+/// What a joint carries from step to step.
+struct JointState {
+    std::array<double, 6> multiplier{};
+    std::array<double, 5> axial_multiplier{};
+    Vec3 first_reach,
+        second_reach;  // from the centres to the point where forces are read, at the last step
+    bool broken = false;
+    signed char at_limit = 0;  // 1 or −1: the lower or upper limit was closed in the last step,
+    signed char closed = 0;    // and is in this one
+    signed char met = 0;       // the end at which an impact of the step has left it: it was on its way there
+    double rebounds =
+        0.0;  // only what arrives faster than this, m/s or rad/s: an impact of the step has answered it
+    double given =
+        -1.0;  // how far the scene began beyond its limit, as far as it still is; negative: not known
+    double angle = 0.0;  // unwrapped coordinate of a hinge that needs it
+    // N s: of an eye's row; of a tyre's rows along and across; of a joint's friction, as far as it follows the load
+    std::array<double, 2> bound{};
+};
+
+/// A joint that broke: in which step of h, and under what.
+struct Break {
+    int joint = 0;
+    std::int64_t step = 0;             // counted from 1
+    double force = 0.0, torque = 0.0;  // N, N m
+};
+
+/// Of all joints; copying it back goes back.
+struct JointStates {
+    LargeArray<JointState> states;
+    std::vector<Break> breaks;  // of the run so far
+};
+
+}  // namespace spook

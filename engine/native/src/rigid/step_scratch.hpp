@@ -1,0 +1,59 @@
+// What a step of rigid bodies fills anew: no stage reads of it what another step has left. Memory is kept.
+#pragma once
+
+#include <limits>
+#include <vector>
+
+#include "contacts/contact_islands.hpp"
+#include "contacts/pivot_solver.hpp"
+#include "linear/large_array.hpp"
+#include "linear/vec.hpp"
+#include "rigid/joint_state.hpp"
+#include "rigid/rigid_state.hpp"
+
+namespace spook {
+
+struct StepScratch {
+    // detect(), per body of the scene:
+    std::vector<Pose> poses;
+    std::vector<Vec6> velocities, free_velocities, next;  // at the start; with forces; with joints as well
+    struct Begun {
+        Vec3 displacement;
+        double energy = 0.0;  // twice the kinetic one
+    };
+    std::vector<Begun> start_of_contacts;  // of a step with contacts
+    // solve_velocities():
+    std::vector<int> other_ends;  // blocks of the step's joints whose stops have a row for each end
+    IslandSolver joint_solver;
+    std::vector<std::size_t> rows;  // by island
+    std::vector<char> answered;     // rows
+    // project_positions():
+    std::vector<Pose> end_poses;
+    LargeArray<BodyState> before_projection;  // per body, before overlaps are projected out
+    std::vector<double> dissipated;           // per island, see dissipated_energy()
+    std::vector<std::vector<int>> island_members, island_blocks;  // per island: bodies, blocks of joints
+    std::vector<double> overstep;                                 // per row of joints, before
+    std::vector<std::size_t> overstep_at;                         // per block
+    MixedSystem holding;
+    std::vector<std::vector<FurtherBody>> holding_further;  // per block of joints, of its rows
+    std::vector<int> place;               // of constrained bodies in their island, −1 of others
+    LargeArray<JointState> joint_states;  // as they were before
+    std::vector<char> beyond;             // project_limits(): islands beyond their limits
+    IslandFinder finder;                  // of whatever is asked for
+
+    /// As a step begins: in a debug build nothing of the step before can be taken for this one's.
+    void begin() {
+        other_ends.clear();
+#ifndef NDEBUG
+        constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+        Vec6 none;
+        none.fill(nan);
+        for (auto* each : {&velocities, &free_velocities, &next}) each->assign(each->size(), none);
+        for (Begun& each : start_of_contacts) each = {{nan, nan, nan}, nan};
+        dissipated.assign(dissipated.size(), nan);
+        overstep.assign(overstep.size(), nan);
+#endif
+    }
+};
+
+}  // namespace spook
