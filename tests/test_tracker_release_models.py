@@ -50,6 +50,18 @@ def test_each_model_is_said_to_have_changed_rounded_or_stayed() -> None:
     assert "- **falls**: moves otherwise from 1 s on: ball by 0.002 m at 1 s (2e+02 times" in page
 
 
+def test_an_edited_model_is_another_one_and_did_not_change() -> None:
+    runs = []
+    for side, value in enumerate((0.1, 0.5)):
+        definition = series(better="inside", role="reported", sensitivity=KNOWN, test_version=f"edit {side}")
+        runs.append(ComparedRun(side=_side(str(side)), samples={"t/c/m": (definition, sample(value))}))
+    changes = compare(*runs).changes
+
+    assert [change.word for change in changes] == ["not_comparable"]
+    assert not any(map(visible, changes))
+    assert alike(changes) == {}
+
+
 def test_models_stand_apart_from_other_tests() -> None:
     (rest,) = without_models([STEP])
 

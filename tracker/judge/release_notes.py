@@ -71,7 +71,7 @@ def visible(change: Change) -> bool:
         return False
     outcomes = (str(change.before_outcome), str(change.after_outcome))
     if change.rounding is not None and outcomes[0] == outcomes[1]:
-        return change.word != "same" and change.before != change.after
+        return change.word in ("changed", "regressed") and change.before != change.after
     return moved(change.before, change.after, outcomes)
 
 
@@ -174,7 +174,7 @@ def alike(changes: Iterable[Change]) -> dict[str, tuple[int, int]]:
     """Of each model, how many values have the same bits and how many differ by rounding."""
     found: dict[str, tuple[int, int]] = {}
     for change in changes:
-        if change.rounding is not None:
+        if change.rounding is not None and change.word != "not_comparable":
             same, rounded = found.get(change.test, (0, 0))
             here = change.before == change.after
             found[change.test] = same + here, rounded + (not here and not visible(change))

@@ -6,6 +6,7 @@ import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from spook_tracker.tracker.document.run_document import Point
 from spook_tracker.tracker.judge.model_words import Moved, severity, words
 from spook_tracker.tracker.judge.verdict import judge
 from spook_tracker.tracker.website.nights import Trend
@@ -33,6 +34,11 @@ class Version:
         return [f"the same bits in all {self.same} values"]
 
 
+def _question(night: Point) -> tuple[str, str]:
+    """What must be the same for two nights to be compared."""
+    return night.test_version, night.run.machine.float_environment
+
+
 def model_history(trends: Sequence[Trend]) -> list[Version]:
     """The versions a model was asked in after the first one, newest first; none for what is no model."""
     found: dict[tuple[str, str], Version] = {}
@@ -42,7 +48,7 @@ def model_history(trends: Sequence[Trend]) -> list[Version]:
         nights = [judged.night for judged in trend.told.nights]
         for earlier, later in itertools.pairwise(nights):
             versions = earlier.run.engine.version, later.run.engine.version
-            if versions[0] == versions[1] or earlier.test_version != later.test_version:
+            if versions[0] == versions[1] or _question(earlier) != _question(later):
                 continue
             here = found.setdefault(versions, Version(versions[1], versions[0]))
             verdict = judge(trend.definition, earlier.sample, later.sample)
