@@ -244,8 +244,9 @@ def _repeated(key: str, first: Samples, again: Sequence[Samples]) -> bool:
 def _told(change: Change, times: Mapping[str, Paired], decided: Mapping[str, Decision]) -> Change:
     """A change as the processes decided it."""
     paired, decision = times.get(change.series), decided.get(change.series)
-    if paired is None or decision is None:
-        return change
+    if paired is None or decision is None:  # what is read off the clock of one process says nothing
+        quiet = change.kind in TIMES and not change.red and change.word in ("changed", "improved")
+        return msgspec.structs.replace(change, word="same", stands="followed") if quiet else change
     processes = 1 + sum(len(base) for base, _ in paired.blocks)
     of = f"in {processes} process{'es' * (processes > 1)} of either side"
     spread = f", which differ by {100.0 * paired.spread:.1f} %" if math.isfinite(paired.spread) else ""

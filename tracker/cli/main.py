@@ -11,6 +11,7 @@ import spook_tracker.tracker.cli.past as past
 import spook_tracker.tracker.cli.rank as ranking
 import spook_tracker.tracker.cli.releases as releases
 from spook_tracker.tracker.cli.ci import ci
+from spook_tracker.tracker.cli.count import count
 from spook_tracker.tracker.cli.history import compare, explain, judge_command, list_tests, show, trend
 from spook_tracker.tracker.cli.models import models_command
 from spook_tracker.tracker.cli.options import (
@@ -392,6 +393,7 @@ def serve(folder: Path, port: int) -> None:
 
 for command in (
     past.bisect,
+    count,
     ci,
     releases.backfill,
     releases.releases_command,

@@ -1,0 +1,25 @@
+"""`tracker count`: instructions where the processor shows no counter."""
+
+from __future__ import annotations
+
+import click
+
+from spook_tracker.tracker.cli.options import example, source_options
+from spook_tracker.tracker.cli.settings import present
+
+
+@click.command(epilog=example("tracker count pendulum --steps 100"))
+@click.argument("tests", nargs=-1, required=True, metavar="TEST...")
+@click.option("--steps", default=100, show_default=True, type=click.IntRange(min=1), help="Of each example.")
+@source_options
+def count(tests: tuple[str, ...], steps: int, engine: str, catalogue: str) -> None:
+    """Count the engine's instructions in the example scenes of tests, by valgrind's callgrind.
+
+    Where the processor shows no counter, as in most virtual machines; a minute each. The clock has no part in it.
+    """
+    from spook_tracker.tracker.cli.console import say
+    from spook_tracker.tracker.measure.callgrind import count_instructions
+
+    for test in tests:
+        found = count_instructions(engine, catalogue, test, steps, present().folder)
+        say(f"{test}: {found.instructions} instructions in {steps} steps, in {', '.join(found.objects)}")
