@@ -163,9 +163,15 @@ class Program:
         failed_body = self._bodies[body] if body >= 0 else None
         joints = [self._joints[joint] for joint in report["failed_joints"]]
         reason = report["reason"].replace("{joints}", _named(joints))
+        failure = _failure(status, failed_body, step, time_limit, reason, report["residual"])
+        if status == "completed" and (endless := self._endless(report["final_state"], observables)):
+            status, failure = (
+                "not_finite",
+                f"{endless} after step {report['steps']}",
+            )
         return Result(
             status=status,
-            failure=_failure(status, failed_body, step, time_limit, reason, report["residual"]),
+            failure=failure,
             failed_body=failed_body,
             failed_step=step if step >= 0 else None,
             time_step=self.time_step,
@@ -185,6 +191,16 @@ class Program:
                 for joint, step, time, force, torque in report["broken"]
             ),
         )
+
+    def _endless(self, final: Array, observables: Mapping[str, Array]) -> str:
+        """Which body has a value that is not finite, or else which observable is infinite; empty if none."""
+        for name, row in zip(self._bodies, final, strict=True):
+            if not np.isfinite(row).all():
+                return f"body {name!r} has a value that is not finite"
+        for name, values in observables.items():
+            if np.isinf(values).any():  # NaN is what there is nothing of
+                return f"the observable {name!r} is infinite"
+        return ""
 
 
 def _named(joints: Sequence[str]) -> str:

@@ -93,6 +93,7 @@ class Desk:
             "TRACKER_ENGINE": "toy_engine",
             "TRACKER_CATALOGUE": "toy_questions:CATALOGUE",
             "PYTHONPATH": str(HERE),
+            "CRASHING_AT": str(self.folder),
         }
         return subprocess.Popen(
             [sys.executable, "-m", "spook_tracker", *words],
@@ -111,8 +112,8 @@ class Desk:
             (os.killpg if everybody else os.kill)(process.pid, signal.SIGKILL)
         process.communicate()
         end = time.monotonic() + PATIENCE
-        while at_work(process.pid):
-            assert time.monotonic() < end, f"{words[0]} left orphans: {at_work(process.pid)}"
+        while at_work(self.folder):
+            assert time.monotonic() < end, f"{words[0]} left orphans: {at_work(self.folder)}"
             time.sleep(0.01)
         return None
 
@@ -163,13 +164,13 @@ class Desk:
         return after
 
 
-def at_work(group: int) -> list[int]:
-    """Processes of a session that have not ended; zombies have."""
+def at_work(folder: Path) -> list[int]:
+    """Processes that were started for this folder, by whomever, and have not ended; zombies have no environment."""
+    mark = f"CRASHING_AT={folder}".encode()
     found = []
-    for place in Path("/proc").glob("[0-9]*/stat"):
+    for place in Path("/proc").glob("[0-9]*/environ"):
         with suppress(OSError):
-            state, _, process_group = place.read_text().rpartition(")")[2].split()[:3]
-            if int(process_group) == group and state not in "ZX":
+            if mark in place.read_bytes().split(b"\0"):
                 found.append(int(place.parent.name))
     return found
 

@@ -103,6 +103,20 @@ def test_whatever_ends_the_process_that_imports_it_is_said_and_is_not_green(act:
     assert not {"their_engine", "their_catalogue"} & set(sys.modules), "imported by the process that decides"
 
 
+def test_a_tale_without_end_is_not_listened_to_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("spook_tracker.tracker.measure.apart.LONGEST", 1 << 16)
+    monkeypatch.setattr("spook_tracker.tracker.measure.apart.PATIENCE", 0.1)
+    talks = (
+        "import os\nwhile True:\n for n in range(3, 12):\n  try:\n   os.set_blocking(n, False)\n"
+        "   os.write(n, b'x' * 4096)\n  except OSError: pass\n"
+    )
+
+    done = gate(("run",), engine=talks, catalogue=QUESTIONS)
+
+    assert (done.exit_code, runs()) == (2, 0)
+    assert "stopped answering before it was done" in done.stderr
+
+
 JUDGES = {
     "the judge": "import spook_tracker.tracker.judge.standing as s\ns.is_red = lambda *a: False\n"
     "import spook_tracker.tracker.cli.report_table as r\nr.is_red = lambda *a: False\nr.red = lambda *a: []\n"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import lzma
 import os
+import tracemalloc
 
 import pytest
 from sqlalchemy.orm import Session
@@ -121,10 +122,18 @@ def test_a_damaged_month_is_named_and_records_nothing(desk, tmp_path, content, s
 def test_a_line_that_never_ends_is_refused_before_it_fills_the_memory(desk, tmp_path, monkeypatch):
     monkeypatch.setattr("spook_tracker.tracker.store.months.MAX_BYTES", 1000)
     file = tmp_path / "2026-11.jsonl.xz"
-    file.write_bytes(lzma.compress(b" " * 10_000_000))
+    file.write_bytes(lzma.compress(b" " * 30_000_000))
+    session = desk("first")
 
-    with pytest.raises(DocumentError, match="more than"):
-        import_months(desk("first"), [file])
+    tracemalloc.start()
+    try:
+        with pytest.raises(DocumentError, match="more than"):
+            import_months(session, [file])
+        _, most = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+
+    assert most < 10_000_000, "the line was read to its end first"
 
 
 def test_only_months_are_taken_for_months(tmp_path):
