@@ -249,6 +249,26 @@ def test_where_the_base_does_not_build_the_commit_before_it_is_the_base(pebble: 
     assert f"{pebble.commits[1][:12]} does not build" in shown.stderr
 
 
+@pytest.mark.parametrize("variable", ["GITHUB_BASE_REF", "CI_MERGE_REQUEST_DIFF_BASE_SHA", ""])
+def test_the_base_is_where_the_service_says_that_the_change_leaves_its_branch(
+    pebble: Pebble, monkeypatch: pytest.MonkeyPatch, variable: str
+) -> None:
+    """Of a change of two commits it is not the first of them; without a main line that is said."""
+    from spook_tracker.tracker.cli.change import _base_of
+    from spook_tracker.tracker.measure.build_settings import Build
+    from spook_tracker.tracker.measure.builds import team_repository
+
+    git(pebble.folder, "branch", "-q", "-m", "main", "stable")
+    for subject in ("One", "Two"):
+        pebble.commit(subject)
+    begun, one, two = pebble.commits
+    if variable:
+        monkeypatch.setenv(variable, "stable" if variable == "GITHUB_BASE_REF" else begun)
+    team = team_repository(pebble.folder, Build())
+
+    assert _base_of(team, "fork-point", two, "sqlite://") == (begun if variable else one)
+
+
 @needs_compiler
 def test_a_change_that_does_not_build_is_said_in_a_line(pebble: Pebble) -> None:
     pebble.commit("Break it", "no C++")

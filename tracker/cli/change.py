@@ -50,7 +50,12 @@ def _base_of(team: Any, base: str, head: str, database: str) -> str:
 
     if base == FORK_POINT:
         found = merge_base(team.repository, head)
-        return found if found not in ("", head) else str(full_hash(team.repository, "HEAD^"))
+        if found not in ("", head):
+            return found
+        complain(
+            "git does not say where this leaves the main line: its base is the commit before; else say --base"
+        )
+        return full_hash(team.repository, "HEAD^")
     try:
         return full_hash(team.repository, base)
     except CommitError:

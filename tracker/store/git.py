@@ -56,8 +56,10 @@ def merge_base(repository: Path, commit: str) -> str:
 
     The main line is the branch that a pull request is for, as the CI service says, else main or master.
     """
+    told = os.environ.get("CI_MERGE_REQUEST_DIFF_BASE_SHA", "")
     asked = os.environ.get("GITHUB_BASE_REF") or os.environ.get("CI_MERGE_REQUEST_TARGET_BRANCH_NAME")
     names = [f"origin/{asked}", asked] if asked else ["origin/main", "main", "origin/master", "master"]
+    names = [told, *names] if HASH.fullmatch(told) else names
     for name in names if HASH.fullmatch(commit) else ():
         base = _git(repository, "merge-base", "--end-of-options", name, commit)
         if base and HASH.fullmatch(base.strip()):
