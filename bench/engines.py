@@ -195,7 +195,7 @@ def _gates(samples: Mapping[str, ranks.Samples]) -> list[str]:
         (name, measurement.configuration, metric.name)
         for name, test in CATALOGUE.items()
         for measurement, metric in test.metrics()
-        if metric.every_engine
+        if metric.limit_kind == "physical"
     }
     printed = [one for one in told if (one[0].test, one[0].configuration, one[0].metric) in facts]
     return [

@@ -35,6 +35,10 @@ class Simulate(Protocol):
 
 Better = Literal["smaller_magnitude", "larger", "smaller", "inside"]
 Role = Literal["gate", "companion", "reported", "explaining"]
+LimitKind = Literal[
+    "physical",  # printed, or about the world alone: an ideal engine keeps it, and any engine is held to it
+    "method",  # what the method the question was written for owes, in errors or in rounding, and nobody else
+]
 
 
 class Estimate(float):
@@ -71,7 +75,7 @@ class Estimate(float):
 class Quantity:
     """What is measured, whoever is asked: the question's own part of a metric.
 
-    `limit` is the printed or physical one, shown for every engine; None where only a method's own limit exists.
+    `limit` is the physical one, for every engine; None where only a method's own limit exists.
     """
 
     name: str
@@ -105,11 +109,10 @@ class Metric:
     better: Better = "smaller_magnitude"
     limit: float | tuple[float, float] | None = None
     limit_source: str = ""  # "thesis, section 3.5" or the derivation
-    every_engine: bool = (
-        False  # the limit is printed or physical; else it is what this method owes, and nobody else
-    )
+    limit_kind: LimitKind = "method"
     set_point: tuple[float, float] | None = None
     set_point_source: str = ""
+    set_point_kind: LimitKind = "method"
     reference: float | None = None  # the right value, where one exists
     tolerance: float = 0.0
     relative_tolerance: float = 1e-9
@@ -125,8 +128,8 @@ class Metric:
             unit=self.unit,
             better=self.better,
             reference=self.reference,
-            limit=self.limit if self.every_engine else None,
-            limit_source=self.limit_source if self.every_engine else "",
+            limit=self.limit if self.limit_kind == "physical" else None,
+            limit_source=self.limit_source if self.limit_kind == "physical" else "",
         )
 
     def passes(self, value: float) -> bool:
@@ -288,7 +291,7 @@ class StabilityStudy:
     study: Callable[[Simulate], BreakPoint | StabilityMap]
     unit: str = ""
     better: Literal["larger", "smaller"] = "larger"
-    expected: tuple[float, float] | None = None  # band for a break point
+    expected: tuple[float, float] | None = None  # band for a break point: always the method's own
     expected_source: str = ""  # where the band comes from; or, without one, why theory has none
 
 
@@ -342,7 +345,9 @@ class ScalarTest:
         """
         seen: set[tuple[object, ...]] = set()
         found = []
-        printed_first = sorted(self.measurements, key=lambda m: not any(q.every_engine for q in m.metrics))
+        printed_first = sorted(
+            self.measurements, key=lambda m: not any(q.limit_kind == "physical" for q in m.metrics)
+        )
         for measurement in printed_first:
             place = (measurement.time_step, *sorted(measurement.parameters.items()))
             new = [metric.quantity for metric in measurement.metrics if (place, metric.name) not in seen]

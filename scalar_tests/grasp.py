@@ -198,6 +198,7 @@ def _asked(time_step: float) -> Measurement:
                 better="larger",
                 limit=HOLDING,
                 limit_source="statics: for ever",
+                limit_kind="physical",
                 reference=HOLDING,
             ),
             error(

@@ -302,6 +302,7 @@ TEST = ScalarTest(
                     better="inside",
                     limit=(3.0, 3.0),
                     limit_source="µ g ≥ Ω² r; the circle grows by 0.9 %, less than the 3 % left",
+                    limit_kind="physical",
                     reference=3.0,
                 ),
                 error(

@@ -235,6 +235,7 @@ def _asked(stone: int) -> Measurement:
                 better="larger",
                 limit=3.0,
                 limit_source="no thrust line fits: it must fall, three times as far as a standing one can sink",
+                limit_kind="physical",
                 relative_tolerance=1e-3,
             ),
             Metric(

@@ -200,7 +200,7 @@ def test_printed_limits_are_for_every_engine() -> None:
     ]
 
     assert len(gates) >= 7
-    assert all(metric.every_engine for metric in gates)
+    assert all(metric.limit_kind == "physical" for metric in gates)
 
 
 def test_to_ask_one_test_imports_no_other() -> None:

@@ -142,7 +142,7 @@ FOUND = {  # test: metric: what finds it again without the engine
 def widths(metric: Metric) -> list[float]:
     """What of a metric is ours to derive: how far its limit and its set point let a value go (rad for degrees)."""
     found, unit = [], math.pi / 180.0 if metric.unit == "degrees" else 1.0
-    if metric.limit is not None and not metric.every_engine:
+    if metric.limit is not None and metric.limit_kind != "physical":
         if isinstance(metric.limit, tuple):
             found.append(0.5 * (metric.limit[1] - metric.limit[0]))
         elif metric.better in ("larger", "smaller") and metric.reference != 0.0:
@@ -215,5 +215,5 @@ def test_what_is_called_rounding_says_where_it_is_from() -> None:
     for test in CATALOGUE.values():
         for asked in test.measurements:
             for metric in asked.metrics:
-                if metric.limit is not None and not metric.every_engine:
+                if metric.limit is not None and metric.limit_kind != "physical":
                     assert metric.limit_source, metric.name

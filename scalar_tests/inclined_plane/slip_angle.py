@@ -105,6 +105,7 @@ TEST = ScalarTest(
                     role="gate",
                     limit=2e-4,
                     limit_source="Coulomb's law; the bisection resolves 1e-4",
+                    limit_kind="physical",
                     reference=0.0,
                     tolerance=1e-4,
                 ),

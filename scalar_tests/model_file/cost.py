@@ -40,7 +40,7 @@ REPEATABILITY = (
         better="smaller",
         limit=0.0,
         limit_source="equal input, equal bits",
-        every_engine=True,
+        limit_kind="physical",
         reference=0.0,
     ),
 )

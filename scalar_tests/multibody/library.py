@@ -90,7 +90,7 @@ def error_metric(role: Role, allowed: float, outputs: str, **told: Any) -> Metri
         role=role,
         limit=allowed,
         limit_source="allowed in the library's " + ("low" if allowed == LOW else "high") + " precision class",
-        every_engine=True,
+        limit_kind="physical",
         reference=0.0,
         relative_tolerance=1e-4,
         **told,

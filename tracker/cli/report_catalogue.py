@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from spook_tracker.scalar_tests.case import Measurement, Metric, ScalarTest
+from spook_tracker.scalar_tests.case import LimitKind, Measurement, Metric, ScalarTest
 from spook_tracker.tracker.cli.console import Column, table, width
 from spook_tracker.tracker.cli.report_sweep import seconds
 from spook_tracker.tracker.cli.report_table import number
@@ -66,15 +66,23 @@ def card(name: str, test: ScalarTest) -> str:
 
 def _metric(measurement: Measurement, metric: Metric, room: int) -> Iterator[str]:
     yield f"{metric.role} {metric.name} [{measurement.configuration}, h = {measurement.time_step:.6g} s]"
-    limit = f"{limit_of(metric)} ({metric.limit_source})" if metric.limit_source else limit_of(metric)
+    limit = limit_of(metric)
+    if metric.limit is not None:
+        limit += _because(metric.limit_kind, metric.limit_source)
     yield from textwrap.wrap(
         f"{metric.description}; {limit}", room, initial_indent="  ", subsequent_indent="  "
     )
     if metric.set_point is not None:
         low, high = metric.set_point
-        source = f" ({metric.set_point_source})" if metric.set_point_source else ""
+        source = _because(metric.set_point_kind, metric.set_point_source)
         words = f"set point {number(low, 10)} … {number(high, 10)} {metric.unit}{source}"
         yield from textwrap.wrap(words, room, initial_indent="  ", subsequent_indent="  ")
+
+
+def _because(kind: LimitKind, source: str) -> str:
+    """Whose a limit or a set point is, and where it comes from."""
+    whose = "physical" if kind == "physical" else "the method's own"
+    return f" ({whose}: {source})" if source else f" ({whose})"
 
 
 def _per_step(cost: float | None, verb: str) -> str:

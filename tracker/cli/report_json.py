@@ -80,8 +80,10 @@ def _test(name: str, test: ScalarTest) -> dict[str, Any]:
                 "better": metric.better,
                 "limit": _limit(metric.limit),
                 "limit_source": metric.limit_source,
+                "limit_kind": metric.limit_kind,
                 "set_point": _limit(metric.set_point),
                 "set_point_source": metric.set_point_source,
+                "set_point_kind": metric.set_point_kind,
                 "description": metric.description,
             }
             for measurement, metric in test.metrics()

@@ -223,12 +223,33 @@ def _styles(narrow: bool, columns: int) -> dict[int, Style]:
 
 
 def failures(run: RunDocument) -> list[str]:
-    """One sentence for each value that is not there or not settled."""
-    return [
+    """One sentence for each value that is not there or not settled; what is not supported is summed up."""
+    failed = [pair for pair in pairs(run) if pair[1].failure and pair[0].role not in FOLLOWED]
+    lines = [
         f"{definition.key}: {sample.outcome.replace('_', ' ')}: {clean(sample.failure)}"
-        for definition, sample in pairs(run)
-        if sample.failure and definition.role not in FOLLOWED
+        for definition, sample in failed
+        if sample.outcome != "not_supported"
     ]
+    return lines + _lacking([pair for pair in failed if pair[1].outcome == "not_supported"])
+
+
+def _lacking(found: Sequence[Pair]) -> list[str]:
+    """What an engine cannot be asked, by what it lacks: how many values wait for it, and of which tests."""
+    waiting: dict[str, list[str]] = {}
+    for definition, sample in found:
+        said, does_not, lacks = clean(sample.failure).partition("does not support ")
+        for lack in lacks.split(", ") if does_not else (said,):
+            waiting.setdefault(lack, []).append(definition.test)
+    most_first = sorted(waiting.items(), key=lambda one: (-len(one[1]), one[0]))
+    return [
+        f"not supported: {lack}: {len(tests)} {'value' if len(tests) == 1 else 'values'} of {_some(tests)}"
+        for lack, tests in most_first
+    ]
+
+
+def _some(tests: Sequence[str], most: int = 3) -> str:
+    names = list(dict.fromkeys(tests))
+    return ", ".join(names[:most]) + (f" and {len(names) - most} more tests" if len(names) > most else "")
 
 
 def verdict(run: RunDocument) -> str:

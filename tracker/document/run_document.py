@@ -27,6 +27,7 @@ OutcomeClass = Literal[
     "missing",
     "not_supported",
 ]
+LimitKind = Literal["physical", "method"]  # any engine's, or what one method owes: see scalar_tests/case.py
 Text = Annotated[str, msgspec.Meta(max_length=65_536)]
 Name = Annotated[str, msgspec.Meta(min_length=1, max_length=200)]
 
@@ -106,6 +107,8 @@ class SeriesDefinition(Struct, frozen=True, kw_only=True):
     counter_roles: dict[
         str, Literal["gate", "explaining"]
     ] = {}  # of its counters, where it is not the usual one
+    limit_kind: LimitKind = "method"
+    set_point_kind: LimitKind = "method"
     sensitivity: Sensitivity | None = None  # of a value without a reference: what a difference of it means
 
 

@@ -53,5 +53,5 @@ def _metric(
         if isinstance(limit, tuple) != (metric.better == "inside"):
             wanted = "two numbers" if metric.better == "inside" else "one number"
             raise LimitError(f"{SOURCE}: the limit of {key} is {wanted}, not {limit!r}")
-        metric = replace(metric, limit=limit, limit_source=SOURCE, role="gate")
+        metric = replace(metric, limit=limit, limit_source=SOURCE, limit_kind="method", role="gate")
     return metric

@@ -1,8 +1,9 @@
 """Our questions put to an engine that has configurations of its own.
 
 A question is a metric at a time step with its parameters. It is asked once in each of the engine's
-configurations, whatever configuration of ours asks it first. What judges SPOOK's method goes: set points, the
-limits of companions, orders of accuracy. The limit of a gate is a fact about the world and stays.
+configurations, whatever configuration of ours asks it first. What judges SPOOK's method goes: limits and set points
+of the kind "method", the limits of companions, orders of accuracy. A gate whose limit is physical stays one. A team's
+own questions are about its own method: there both kinds hold.
 """
 
 from __future__ import annotations
@@ -16,6 +17,7 @@ from spook_tracker.engine.method import PLAIN
 from spook_tracker.engine.protocol import Configuration
 from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.case import Ladder, Measurement, Metric, ScalarTest
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
 
 
 def asked_of(
@@ -34,7 +36,12 @@ def asked_of(
         else replace(
             test,
             measurements=tuple(
-                _measurements(test, configurations if every_setting else configurations[:1], gating)
+                _measurements(
+                    test,
+                    configurations if every_setting else configurations[:1],
+                    gating,
+                    both_kinds=not _is_ours(name, test),
+                )
             ),
             ladders=tuple(_ladder(ladder, one) for ladder in test.ladders for one in configurations),
             figures=(),
@@ -50,7 +57,7 @@ def in_configuration(measure: Any, configuration: str, simulate: Any, *rest: Any
 
 
 def _measurements(
-    test: ScalarTest, configurations: Sequence[Configuration], gating: bool
+    test: ScalarTest, configurations: Sequence[Configuration], gating: bool, both_kinds: bool
 ) -> Iterator[Measurement]:
     asked: set[tuple[object, ...]] = set()
     for measurement in sorted(test.measurements, key=_after_gates):
@@ -66,7 +73,7 @@ def _measurements(
             yield replace(
                 measurement,
                 configuration=one.name,
-                metrics=tuple(_metric(metric, gating and position == 0) for metric in fresh),
+                metrics=tuple(_metric(metric, gating and position == 0, both_kinds) for metric in fresh),
                 measure=partial(in_configuration, measurement.measure, one.name),
                 note=one.reason,
             )
@@ -76,15 +83,20 @@ def _after_gates(measurement: Measurement) -> bool:
     return all(metric.role != "gate" for metric in measurement.metrics)
 
 
-def _metric(metric: Metric, gates: bool) -> Metric:
-    gate = metric.role == "gate"
+def _is_ours(name: str, test: ScalarTest) -> bool:
+    return name in CATALOGUE and CATALOGUE[name] is test
+
+
+def _metric(metric: Metric, gates: bool, both_kinds: bool) -> Metric:
+    gate = metric.role == "gate" and (both_kinds or metric.limit_kind == "physical")
+    expected = gate and metric.set_point_kind == "physical"
     return replace(
         metric,
         role="gate" if gate and gates else "explaining" if metric.role == "explaining" else "reported",
         limit=metric.limit if gate else None,
         limit_source=metric.limit_source if gate else "",
-        set_point=None,
-        set_point_source="",
+        set_point=metric.set_point if expected else None,
+        set_point_source=metric.set_point_source if expected else "",
     )
 
 

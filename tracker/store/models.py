@@ -178,6 +178,8 @@ class Definition(Base):
     time_step: Mapped[float | None] = mapped_column(Double, comment="time step, s")
     limit_low: Mapped[float | None] = mapped_column(Double, comment="lower end of the limit; NULL: none")
     limit_high: Mapped[float | None] = mapped_column(Double, comment="upper end of the limit; NULL: none")
+    limit_kind: Mapped[str] = _text("of the limit: physical, or the method's own")
+    set_point_kind: Mapped[str] = _text("of the set point: physical, or the method's own")
     test_version: Mapped[str] = _text("hash of the definition: values compare only where it is equal")
     body: Mapped[str] = _text("JSON of the whole definition, as in the run document")
 

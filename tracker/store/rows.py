@@ -153,7 +153,18 @@ def definition_row(definition: document.SeriesDefinition) -> Row:
 def _definition_row(body: str) -> Row:
     definition = definition_of(body)
     low, high = limits(definition)
-    same = ("test", "configuration", "metric", "unit", "role", "better", "kind", "test_version")
+    same = (
+        "test",
+        "configuration",
+        "metric",
+        "unit",
+        "role",
+        "better",
+        "kind",
+        "limit_kind",
+        "set_point_kind",
+        "test_version",
+    )
     return {
         "id": identity("definition", body),
         "series_id": identity("series", definition.key),

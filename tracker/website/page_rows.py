@@ -61,6 +61,7 @@ class Row:
     exact: str
     limit: str
     limit_source: str
+    limit_kind: str
     set_point: str
     margin: str
     share: str | None  # of the gauge, per cent
@@ -99,6 +100,7 @@ def row(trend: Trend, title: str, address: str, nights: Sequence[Night] = ()) ->
         exact=repr(trend.value),
         limit=limit(d),
         limit_source=d.limit_source,
+        limit_kind=d.limit_kind,
         set_point=band(d.set_point, d.unit) if d.set_point else "",
         margin=inside.text if math.isfinite(trend.value) else "no value",
         share=None if share is None else f"{100.0 * min(1.0, max(share, 0.012)):.1f}",

@@ -42,7 +42,7 @@ THROW = ScalarTest(
                     role="gate",
                     limit=1.001 * STEP_ERROR,
                     limit_source="½ v h",
-                    every_engine=True,
+                    limit_kind="physical",
                 ),
             ),
             measure=measure,
