@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path
 from typing import Any
 
@@ -14,8 +15,9 @@ from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.measure.other_tools import of_other_tools
 
 COMMIT = "a" * 40
+FAILED = "crashed"
 PYTEST = {
-    "machine_info": {"node": "desk", "cpu": {"brand_raw": "Example"}},
+    "machine_info": {"node": "desk", "cpu": {"brand_raw": "Example", "count": 4}},
     "commit_info": {"id": COMMIT, "time": "2026-11-01T10:00:00+00:00", "dirty": False, "project": "ours", "branch": "main"},
     "benchmarks": [
         {"name": "test_step", "fullname": "bench/test_step.py::test_step", "params": None, "stats":
@@ -43,6 +45,7 @@ ASV = {
         "bench.Suite.time_many": [[0.5, None, 1.5], [["1", "2", "3"]], "v"],
         "bench.Suite.track_drift": [[0.125], [], "v"],
         "bench.Suite.time_broken": [None, [], "v"],
+        "bench.Suite.time_skipped": [[math.nan], [], "v"],
     },
 }  # fmt: skip
 ACTION = {
@@ -66,7 +69,11 @@ def read(said: Any, before: bytes = b"") -> Any:
 def values(run: Any) -> dict[str, tuple[float, str, str]]:
     told = {d.key: d for d in run.series}
     return {
-        s.series.split("/default/")[0]: (float(s.value), told[s.series].unit, told[s.series].better)
+        told[s.series].test: (
+            float(s.value) if s.outcome == "value" else s.outcome,
+            told[s.series].unit,
+            told[s.series].better,
+        )
         for s in run.samples
     }
 
@@ -81,7 +88,7 @@ def test_pytest_benchmark_keeps_every_repeat_and_the_commit() -> None:
     assert (run.engine.name, run.engine.git_hash, run.machine.fingerprint) == (
         "ours",
         COMMIT,
-        "machine 49be417a",
+        "Example, 4 cores",
     )
 
 
@@ -100,8 +107,10 @@ def test_asv_with_parameters_and_what_is_no_time() -> None:
     (run,) = read(ASV)
 
     assert values(run) == {
-        "bench.Suite.time_step": (0.25, "s", "smaller"), "bench.Suite.time_many[0]": (0.5, "s", "smaller"),
-        "bench.Suite.time_many[2]": (1.5, "s", "smaller"), "bench.Suite.track_drift": (0.125, "1", "smaller"),
+        "bench.Suite.time_step": (0.25, "s", "smaller"), "bench.Suite.time_many(1)": (0.5, "s", "smaller"),
+        "bench.Suite.time_many(2)": (FAILED, "s", "smaller"), "bench.Suite.time_many(3)": (1.5, "s", "smaller"),
+        "bench.Suite.track_drift": (0.125, "1", "smaller"),
+        "bench.Suite.time_broken": (FAILED, "s", "smaller"), "bench.Suite.time_skipped": ("not_supported", "s", "smaller"),
     }  # fmt: skip
     assert run.engine.git_hash == COMMIT
 
@@ -110,7 +119,7 @@ def test_github_action_benchmark_is_a_history() -> None:
     runs = read(ACTION, b"window.BENCHMARK_DATA = ")
 
     assert [next(iter(values(run).values())) for run in runs] == [
-        (pytest.approx(5e-7), "s", "smaller"), (9.0, "bodies", "larger"), (7.0, "iter/sec", "larger"),
+        (pytest.approx(5e-7), "s", "smaller"), (9.0, "bodies", "larger"), (7.0, "iter/s", "larger"),
     ]  # fmt: skip
     assert [run.engine.git_hash[0] for run in runs] == ["a", "b", "c"]
 
@@ -119,6 +128,131 @@ def test_github_action_benchmark_is_a_history() -> None:
 def test_times_are_judged_as_noisy_and_decide_nothing(said: Any) -> None:
     for run in read(said):
         assert {(d.kind, d.role) for d in run.series} == {("time", "reported")}
+
+
+@pytest.mark.parametrize(
+    ("written", "value", "unit", "better"),
+    [
+        ("ops/s", 4.0, "ops/s", "larger"),
+        ("ops/ms", 4e3, "ops/s", "larger"),
+        ("ops/us", 4e6, "ops/s", "larger"),
+        ("MB/s", 4e6, "B/s", "larger"),
+        ("iter/sec", 4.0, "iter/s", "larger"),
+        ("us/op", 4e-6, "s", "smaller"),
+        ("B/op", 4.0, "B", "smaller"),
+        ("KB", 4e3, "B", "smaller"),
+        ("MiB", 4 * 2.0**20, "B", "smaller"),
+        ("m/s", 4.0, "m/s", "smaller"),
+        ("bodies", 4.0, "bodies", "smaller"),
+    ],
+)
+def test_a_unit_has_a_direction_and_one_form(written: str, value: float, unit: str, better: str) -> None:
+    (run,) = read(action([{"name": "x", "value": 4.0, "unit": written}], tool="jmh"))
+
+    assert values(run) == {"x": (pytest.approx(value), unit, better)}
+
+
+def test_a_direction_that_the_tool_gives_counts_more_than_the_unit() -> None:
+    (run,) = read(action([{"name": "x", "value": 4.0, "unit": "MB/s"}], tool="customSmallerIsBetter"))
+    (other,) = read(action([{"name": "x", "value": 4.0, "unit": "ms"}], tool="customBiggerIsBetter"))
+
+    assert values(run)["x"][2] == "smaller"
+    assert values(other)["x"][2] == "larger"
+
+
+@pytest.mark.parametrize(("bad", "outcome"), [(None, FAILED), (math.nan, "not_finite"), (-1.0, "not_finite")])
+def test_what_is_no_time_is_the_outcome_of_that_benchmark_alone(bad: Any, outcome: str) -> None:
+    benches = [{"name": "x", "value": bad, "unit": "ns"}, {"name": "y", "value": 2e9, "unit": "ns"}]
+    (run,) = read(action(benches))
+
+    assert values(run) == {"x": (outcome, "s", "smaller"), "y": (2.0, "s", "smaller")}
+
+
+def test_one_name_twice_in_a_run_loses_nothing() -> None:
+    times = [{"name": "x", "value": v, "unit": "s"} for v in (3.0, 2.0)]
+    sizes = [{"name": "x", "value": v, "unit": "MB"} for v in (3.0, 2.0)]
+    (run,) = read(action(times + sizes))
+
+    assert run.samples[0].timing.seconds == (3.0, 2.0)
+    assert values(run) == {"x": (3e6, "B", "smaller"), "x (2)": (2e6, "B", "smaller")}
+
+
+def action(benches: list[dict[str, Any]], tool: str = "cargo") -> dict[str, Any]:
+    entry = ACTION["entries"]["Engine"][0] | {"tool": tool, "benches": benches}
+    return ACTION | {"entries": {"Engine": [entry]}}
+
+
+def test_another_version_of_an_asv_benchmark_is_another_question() -> None:
+    other = ASV | {"results": {name: [*row[:2], "w"] for name, row in ASV["results"].items()}}
+    versions = [{d.key: d.test_version for d in run.series} for (run,) in (read(ASV), read(other))]
+
+    assert versions[0].keys() == versions[1].keys()
+    assert all(versions[1][key] != version for key, version in versions[0].items())
+
+
+def test_asv_parameters_are_known_by_their_values_and_not_by_their_places() -> None:
+    more = {"bench.Suite.time_many": [[9.0, 0.5, 2.0, 1.5], [["0", "1", "2", "3"]], "v"]}
+    (before,), (after,) = read(ASV), read(ASV | {"results": more})
+
+    assert values(after)["bench.Suite.time_many(1)"] == values(before)["bench.Suite.time_many(1)"]
+    assert values(after)["bench.Suite.time_many(3)"] == values(before)["bench.Suite.time_many(3)"]
+
+
+def test_no_name_of_a_host_is_published_and_a_hosted_runner_has_one_lane() -> None:
+    jobs = [
+        PYTEST | {"machine_info": PYTEST["machine_info"] | {"node": node}}
+        for node in ("fv-az1-2", "fv-az3-4")
+    ]
+    lanes = {read(said)[0].machine.fingerprint for said in jobs}
+    hosts = [read(ASV | {"params": {"machine": name}})[0].machine for name in ("desk", "shelf")]
+
+    assert lanes == {"Example, 4 cores"}
+    assert hosts[0].fingerprint != hosts[1].fingerprint, "asv's machines are named by the team: two stay two"
+    assert "desk" not in str(hosts[0]) + str(read(GOOGLE)[0].machine)
+    assert "may mix" in read(GOOGLE)[0].machine.processor, "the doubt is said"
+
+
+def asv_repository(folder: Path) -> Path:
+    machine = folder / "results" / "m"
+    machine.mkdir(parents=True)
+    (folder / "asv.conf.json").write_text('{\n  // ours\n  "project": "gravel",\n}\n')
+    listed = {"version": 2, "bench.Suite.track_drift": {"type": "track", "unit": "MB"}}
+    (folder / "results" / "benchmarks.json").write_text(json.dumps(listed))
+    (machine / "machine.json").write_text('{"machine": "m", "version": 1}')
+    for day in range(3):
+        said = ASV | {"date": ASV["date"] + day * 86_400_000, "commit_hash": f"{day}" * 40}
+        (machine / f"{day}-env.json").write_text(json.dumps(said))
+    return folder
+
+
+@pytest.mark.parametrize("named", [".", "results", "results/m"])
+def test_a_folder_of_asv_comes_in_as_it_is(named: str, tmp_path: Path) -> None:
+    database = f"sqlite:///{tmp_path}/x.db"
+    folder = asv_repository(tmp_path / "repository") / named
+    done = CliRunner().invoke(main, ["import", "--db", database, str(folder)])
+    out = CliRunner().invoke(main, ["export", "latest", "--db", database]).output
+
+    assert done.output == "3 runs recorded, 0 were there already\n"
+    assert json.loads(out)["engine"]["name"] == "gravel"
+    drift = [s for s in json.loads(out)["series"] if s["test"].endswith("track_drift")]
+    assert [s["unit"] for s in drift] == ["B"], "its unit is what benchmarks.json says"
+
+
+def test_engine_and_machine_can_be_named(tmp_path: Path) -> None:
+    database = f"sqlite:///{tmp_path}/x.db"
+    (tmp_path / "a.json").write_text(json.dumps(GOOGLE))
+    named = ["--engine", "pebble", "--machine", "runner of four cores"]
+    CliRunner().invoke(main, ["import", "--db", database, *named, str(tmp_path / "a.json")])
+    out = json.loads(CliRunner().invoke(main, ["export", "latest", "--db", database]).output)
+
+    assert (out["engine"]["name"], out["machine"]["fingerprint"]) == ("pebble", "runner of four cores")
+
+
+def test_a_folder_without_runs_is_one_sentence(tmp_path: Path) -> None:
+    done = CliRunner().invoke(main, ["import", "--db", f"sqlite:///{tmp_path}/x.db", str(tmp_path)])
+
+    assert done.exit_code == 2
+    assert "holds no JSON files of runs" in done.output
 
 
 def test_the_same_file_twice_is_one_run() -> None:
@@ -135,7 +269,6 @@ def test_what_is_nobody_elses_is_left_to_others(said: Any) -> None:
     "said",
     [
         PYTEST | {"benchmarks": [{}]},
-        PYTEST | {"benchmarks": [{"fullname": "x", "stats": {"data": [-1.0]}}]},
         PYTEST | {"benchmarks": [{"fullname": "x", "stats": {"data": ["fast"]}}]},
         GOOGLE | {"benchmarks": [{"name": "x", "real_time": 1.0, "time_unit": "years"}]},
         ASV | {"result_columns": 3},
@@ -169,7 +302,7 @@ def test_the_command_takes_each_of_them(before: bytes, said: Any, tmp_path: Path
     assert f"{len(read(said, before))} runs recorded" in done.output
 
 
-def test_aggregates_alone_give_their_median_and_an_older_file_names_no_machine() -> None:
+def test_aggregates_alone_give_their_median_and_an_older_file_may_mix_machines() -> None:
     context = {"date": "2026-11-01T11:00:00+00:00", "num_cpus": 2}
     each = {"run_name": "BM", "run_type": "aggregate", "time_unit": "us"}
     told = [
@@ -179,15 +312,16 @@ def test_aggregates_alone_give_their_median_and_an_older_file_names_no_machine()
     (run,) = read({"context": context, "benchmarks": told})
 
     assert values(run) == {"BM": (pytest.approx(1.2e-5), "s", "smaller")}
-    assert run.machine.fingerprint == "unknown"
+    assert "may mix processors" in run.machine.fingerprint
 
 
-def test_what_failed_is_left_out_and_no_commit_is_made_up() -> None:
+def test_what_failed_says_so_and_no_commit_is_made_up() -> None:
     (failed,) = read(ASV | {"results": ASV["results"] | {"bench.gone": None}})
     entry = ACTION["entries"]["Engine"][0]
     torn = entry | {"benches": [*entry["benches"], {"name": "nan", "value": None, "unit": "ms"}]}
     (kept,) = read(ACTION | {"entries": {"Engine": [torn]}}, b"window.BENCHMARK_DATA = ")
     (unknown,) = read(PYTEST | {"commit_info": {"id": "unversioned", "time": None}})
 
-    assert len(failed.samples) == 4 and len(kept.samples) == 1
+    assert values(failed)["bench.gone"] == (FAILED, "1", "smaller")
+    assert [s.outcome for s in kept.samples] == ["value", FAILED]
     assert (unknown.engine.git_hash, unknown.engine.version) == ("", "unknown")

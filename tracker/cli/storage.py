@@ -59,19 +59,26 @@ def export(versions: tuple[str, ...], out: Path | None, form: str, database: str
 
 @click.command("import", epilog=example("tracker import runs/*.json"))
 @click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path(path_type=Path))
+@click.option("--engine", default="", metavar="NAME", help="Of other tools' files: what is measured.")
+@click.option(
+    "--machine", default="", metavar="NAME", help="Of other tools' files: the machine they are compared on."
+)
 @database_option
-def import_files(files: tuple[Path, ...], database: str) -> None:
+def import_files(files: tuple[Path, ...], engine: str, machine: str, database: str) -> None:
     """Record runs from JSON documents, whole or in short form; what is there already is left as it is.
 
-    Files of pytest-benchmark, asv, Google Benchmark and github-action-benchmark are taken as run times. So are the
-    compressed files of `tracker export --format months`.
+    Files of pytest-benchmark, asv, Google Benchmark and github-action-benchmark are taken as run times, and asv's folder
+    of results, or the repository that holds it, as it is. The compressed files of `tracker export --format months`
+    come in, too.
     """
+    from spook_tracker.tracker.measure.other_folders import files_in
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.months import import_months, is_month
     from spook_tracker.tracker.store.record import record
     from spook_tracker.tracker.store.transfer import import_files as read_in
 
-    short = _short(files)
+    files = tuple(file for given in files for file in (files_in(given) if given.is_dir() else (given,)))
+    short = _short(files, engine, machine)
     months = [file for file in files if is_month(file)]
     with session_on(database) as session:
         done = read_in(session, [file for file in files if file not in short and file not in months])
@@ -82,8 +89,9 @@ def import_files(files: tuple[Path, ...], database: str) -> None:
     click.echo(f"{stored} runs recorded, {present} were there already")
 
 
-def _short(files: tuple[Path, ...]) -> dict[Path, tuple[Any, ...]]:
+def _short(files: tuple[Path, ...], engine: str, machine: str) -> dict[Path, tuple[Any, ...]]:
     """The files that are runs in short form or another tool's, as whole documents."""
+    from spook_tracker.tracker.measure.other_folders import beside
     from spook_tracker.tracker.measure.other_tools import of_other_tools
     from spook_tracker.tracker.measure.short_form import is_short, whole
     from spook_tracker.tracker.store.border import MAX_BYTES
@@ -93,7 +101,7 @@ def _short(files: tuple[Path, ...]) -> dict[Path, tuple[Any, ...]]:
         if not file.is_file() or file.stat().st_size > MAX_BYTES:
             continue
         content = file.read_bytes()
-        if (runs := of_other_tools(content, str(file))) is not None:
+        if (runs := of_other_tools(content, str(file), beside(file, engine, machine))) is not None:
             found[file] = runs
         elif is_short(content):  # only then: asv's files have results, too
             found[file] = (whole(content, str(file)),)

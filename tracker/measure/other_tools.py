@@ -1,17 +1,21 @@
-"""Files of other benchmark tools as runs: their times are followed and judged as noisy, like our own run times.
+"""Files of other benchmark tools as runs: their values are followed and judged as noisy, like our own run times.
 
 pytest-benchmark (--benchmark-json), asv (results/MACHINE/*.json), Google Benchmark (--benchmark_out) and
 github-action-benchmark (data.js, a whole history in one file). What a file does not say stays unknown.
+A machine is known by its processor, never by its host's name: that is new in every job of a hosted runner, and
+nobody else's to publish.
 """
 
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Any
+from typing import Any, Literal
 
 import msgspec
 
@@ -19,13 +23,30 @@ from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.measure.short_form import ShortResult, ShortRun, document_of
+from spook_tracker.tracker.measure.units import Unit, unit_of
 
 DATA_JS = b"window.BENCHMARK_DATA"
-UNITS = {"ns": 1e-9, "us": 1e-6, "µs": 1e-6, "ms": 1e-3, "s": 1.0, "sec": 1.0, "seconds": 1.0}  # s
-RATES = ("iter/sec", "ops/sec", "op/s", "it/s", "items/s")
+DIRECTIONS: dict[str, Literal["smaller", "larger"]] = {
+    "customBiggerIsBetter": "larger",
+    "customSmallerIsBetter": "smaller",
+}
+MIXED = "not said: may mix processors"
 
 
-def of_other_tools(content: bytes, origin: str) -> tuple[RunDocument, ...] | None:
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """What the file itself does not say: from the files beside it, or from whoever imports it."""
+
+    engine: str = ""  # in place of the file's
+    machine: str = ""  # in place of the file's
+    project: str = ""  # asv.conf.json's
+    benchmarks: Mapping[str, Any] = field(default_factory=dict)  # asv's benchmarks.json
+
+
+NOTHING = Beside()
+
+
+def of_other_tools(content: bytes, origin: str, beside: Beside = NOTHING) -> tuple[RunDocument, ...] | None:
     """The runs in a file of one of these tools; None if it is none of theirs. DocumentError if it makes no sense."""
     js = content.lstrip().startswith(DATA_JS)
     try:
@@ -36,7 +57,8 @@ def of_other_tools(content: bytes, origin: str) -> tuple[RunDocument, ...] | Non
     if read is None:
         return None
     try:
-        return tuple(document_of(_unnamed(run), _identity(run), origin) for run in read(said) if run.results)
+        runs = (_named(run, beside) for run in read(said, beside) if run.results)
+        return tuple(document_of(run, _identity(run), origin) for run in runs)
     except (
         KeyError,
         TypeError,
@@ -53,16 +75,7 @@ def of_other_tools(content: bytes, origin: str) -> tuple[RunDocument, ...] | Non
         ) from None
 
 
-def _unnamed(run: ShortRun) -> ShortRun:
-    """The run of a machine without the name by which its network knows it: histories are published."""
-    if run.machine == "unknown":
-        return run
-    return msgspec.structs.replace(
-        run, machine=f"machine {hashlib.sha256(run.machine.encode()).hexdigest()[:8]}"
-    )
-
-
-def _reader(said: Mapping[str, Any]) -> Any:
+def _reader(said: Mapping[str, Any]) -> Callable[[Mapping[str, Any], Beside], Iterator[ShortRun]] | None:
     if "result_columns" in said and "commit_hash" in said:
         return _asv
     if "entries" in said and "repoUrl" in said:
@@ -75,26 +88,36 @@ def _reader(said: Mapping[str, Any]) -> Any:
     return None
 
 
-def _pytest(said: Mapping[str, Any]) -> Iterator[ShortRun]:
-    commit = said["commit_info"]
+def _named(run: ShortRun, beside: Beside) -> ShortRun:
+    given: dict[str, Any] = {"engine": beside.engine} if beside.engine else {}
+    if beside.machine:
+        given |= {"machine": beside.machine, "processor": beside.machine}
+    return msgspec.structs.replace(run, **given)
+
+
+def _pytest(said: Mapping[str, Any], _: Beside) -> Iterator[ShortRun]:
+    commit, machine = said["commit_info"], said["machine_info"]
     known = commit.get("id") if commit.get("id") != "unversioned" else ""
     results = []
     for one in said["benchmarks"]:
         stats = one["stats"]
         seconds = stats.get("data") or [stats["min"], stats["median"], stats["max"]]
         results.append(_timed(one["fullname"], [float(s) for s in seconds]))
+    cpu = machine.get("cpu") if isinstance(machine.get("cpu"), dict) else {}
+    lane, cores = _lane(cpu.get("brand_raw"), cpu.get("count"))
     yield ShortRun(
         engine=commit.get("project") or "unknown",
         version=(known or "unknown")[:10],
         commit=known or "",
         commit_time=commit.get("time") or "",
         started=said.get("datetime") or "",
-        machine=said["machine_info"].get("node") or "unknown",
+        machine=lane,
+        cores=cores,
         results=tuple(results),
     )
 
 
-def _google(said: Mapping[str, Any]) -> Iterator[ShortRun]:
+def _google(said: Mapping[str, Any], _: Beside) -> Iterator[ShortRun]:
     """Repetitions of one name are its repeats; of aggregates the median counts, where they are all there is."""
     context = said["context"]
     seconds: dict[str, list[float]] = {}
@@ -102,72 +125,153 @@ def _google(said: Mapping[str, Any]) -> Iterator[ShortRun]:
     for one in said["benchmarks"]:
         run = one.get("run_type", "iteration") == "iteration" and not one.get("error_occurred")
         if run or one.get("aggregate_name") == "median":
-            taken = float(one["real_time"]) * UNITS[one.get("time_unit", "ns")]
+            unit = one.get("time_unit", "ns")
+            if (read := unit_of(unit)).name != "s":
+                raise ValueError(f"{unit} is no unit of time")
             name = one.get("run_name") or one["name"]
-            (seconds if run else medians).setdefault(name, []).append(taken)
+            (seconds if run else medians).setdefault(name, []).append(float(one["real_time"]) * read.scale)
+        elif one.get("error_occurred"):
+            seconds.setdefault(one.get("run_name") or one["name"], [])
     seconds = medians | seconds
+    lane, cores = _lane(None, context["num_cpus"])
     yield ShortRun(
         engine=str(context.get("executable", "unknown")).rpartition("/")[2] or "unknown",
         version=str(context.get("git_version") or context["date"]),
         started=context["date"],
-        machine=context.get("host_name") or "unknown",
+        machine=lane,
+        cores=cores,
         results=tuple(_timed(name, repeats) for name, repeats in seconds.items()),
     )
 
 
-def _asv(said: Mapping[str, Any]) -> Iterator[ShortRun]:
-    """A value for each combination of parameters; what failed is null there and left out."""
-    columns = said["result_columns"]
+def _asv(said: Mapping[str, Any], beside: Beside) -> Iterator[ShortRun]:
+    """A value for each combination of parameters, named by their values as `asv show` does.
+
+    asv writes null for what failed and NaN for what its set-up skipped. Its benchmark's version is its definition.
+    """
+    columns, machine = said["result_columns"], said.get("params") or {}
     results = []
     for name, row in said["results"].items():
         told = dict(zip(columns, row or (), strict=False))
-        values = told.get("result") or []
-        for place, value in enumerate(values):
-            if value is not None and math.isfinite(float(value)):
-                case = name if len(values) == 1 else f"{name}[{place}]"
-                results.append(
-                    _timed(case, [float(value)]) if "time_" in name else _followed(case, float(value))
+        cases = list(itertools.product(*(told.get("params") or ())))
+        values = told.get("result") or [None] * len(cases)
+        unit = _asv_unit(name, beside.benchmarks.get(name) or {})
+        for case, value in zip(cases, values, strict=True):
+            result = _sampled(f"{name}({', '.join(map(str, case))})" if case else name, value, unit)
+            if value is not None and math.isnan(float(value)):
+                result = msgspec.structs.replace(result, outcome="not_supported", failure="skipped by asv")
+            results.append(
+                msgspec.structs.replace(
+                    result,
+                    configuration=str(said.get("env_name") or "default"),
+                    definition=str(told.get("version") or ""),
                 )
+            )
+    host = str(machine.get("machine") or "")
+    words = ", ".join(str(part) for part in (machine.get("cpu"), machine.get("gpu")) if part)
+    lane, cores = _lane(words, machine.get("num_cpu"))
+    if host:  # chosen by the team, and kept: two machines of one model are two
+        lane = f"{lane}, no. {hashlib.sha256(host.encode()).hexdigest()[:6]}"
     yield ShortRun(
-        engine="asv",
+        engine=beside.project or "asv",
         version=said["commit_hash"][:10],
         commit=said["commit_hash"],
-        started=datetime.fromtimestamp(float(said["date"]) / 1e3, UTC).isoformat(),
-        machine=str(said.get("params", {}).get("machine") or "unknown"),
+        started=_moment(said["date"]),
+        machine=lane,
+        cores=cores,
         results=tuple(results),
     )
 
 
-def _github_action(said: Mapping[str, Any]) -> Iterator[ShortRun]:
+def _asv_unit(name: str, described: Mapping[str, Any]) -> Unit:
+    """asv's own type and unit where its list of benchmarks is at hand; else what its prefix means to asv."""
+    if described.get("unit"):
+        return unit_of(str(described["unit"]))
+    function = name.rpartition(".")[2].lower()
+    if function.startswith(("time_", "timeraw_")):
+        return unit_of("s")
+    return unit_of("bytes" if function.startswith(("mem_", "peakmem_")) else "1")
+
+
+def _github_action(said: Mapping[str, Any], _: Beside) -> Iterator[ShortRun]:
     for suite, entries in said["entries"].items():
         for entry in entries:
             commit = entry["commit"]
-            larger = "bigger" in str(entry.get("tool", "")).lower()
+            better = DIRECTIONS.get(str(entry.get("tool", "")))
             yield ShortRun(
                 engine=suite,
                 version=commit["id"][:10],
                 commit=commit["id"],
                 commit_time=commit.get("timestamp") or "",
-                started=datetime.fromtimestamp(float(entry["date"]) / 1e3, UTC).isoformat(),
-                results=tuple(_bench(one, larger) for one in entry["benches"] if one["value"] is not None),
+                started=_moment(entry["date"]),
+                processor=MIXED,
+                results=_told_once([_bench(one, better) for one in entry["benches"]]),
             )
 
 
-def _bench(one: Mapping[str, Any], larger: bool) -> ShortResult:
-    unit, value = str(one.get("unit", "1")), float(one["value"])
-    scale = UNITS.get(unit.partition("/")[0].strip())
-    if scale is not None and not larger:
-        return _timed(one["name"], [value * scale])
-    return _followed(one["name"], value, unit, larger or unit.lower() in RATES)
+def _told_once(results: list[ShortResult]) -> tuple[ShortResult, ...]:
+    """Times under one name in one run are its repeats; other values there are numbered, so that none is lost."""
+    found: dict[tuple[str, str], ShortResult] = {}
+    for one in results:
+        name, number = one.test, 1
+        while (before := found.get((one.test, one.metric))) is not None:
+            if one.seconds and before.seconds:
+                one = msgspec.structs.replace(one, seconds=before.seconds + one.seconds)
+                break
+            number += 1
+            one = msgspec.structs.replace(one, test=f"{name} ({number})")
+        found[one.test, one.metric] = one
+    return tuple(found.values())
+
+
+def _bench(one: Mapping[str, Any], better: Literal["smaller", "larger"] | None) -> ShortResult:
+    unit = unit_of(str(one.get("unit", "1")))
+    if better:
+        unit = msgspec.structs.replace(unit, better=better)
+    return _sampled(one["name"], one["value"], unit)
+
+
+def _sampled(test: str, value: Any, unit: Unit) -> ShortResult:
+    """One value in its unit; what is no value, or no time, is this result's outcome alone."""
+    metric = "run_time" if unit.name == "s" and unit.better == "smaller" else "value"
+    number = math.nan if value is None else float(value) * unit.scale
+    if metric == "run_time":
+        return _timed(test, [] if value is None else [number])
+    failure: dict[str, Any] = {} if math.isfinite(number) else _failed(value)
+    return ShortResult(
+        test=test,
+        metric=metric,
+        value=Number(number) if not failure else None,
+        unit=unit.name,
+        better=unit.better,
+        noisy=True,
+        **failure,
+    )
 
 
 def _timed(test: str, seconds: list[float]) -> ShortResult:
-    return ShortResult(test=test, metric="run_time", seconds=tuple(seconds))
+    """Run time of each repeat, s; none: it failed."""
+    if seconds and all(math.isfinite(s) and s >= 0.0 for s in seconds):
+        return ShortResult(test=test, metric="run_time", seconds=tuple(seconds))
+    failure = _failed(seconds[0] if seconds else None)
+    return ShortResult(test=test, metric="run_time", unit="s", better="smaller", noisy=True, **failure)
 
 
-def _followed(test: str, value: float, unit: str = "1", larger: bool = False) -> ShortResult:
-    better: Any = "larger" if larger else "smaller"
-    return ShortResult(test=test, metric="value", value=Number(value), unit=unit, better=better, noisy=True)
+def _failed(value: Any) -> dict[str, Any]:
+    if value is None:
+        return {"outcome": "crashed", "failure": "it failed: the file gives no value"}
+    return {"outcome": "not_finite", "failure": f"the file says {value}"}
+
+
+def _lane(processor: Any, cores: Any) -> tuple[str, int]:
+    """The machine by what decides run times, and its cores."""
+    text = str(cores or "")
+    count = int(text) if text.isdecimal() and len(text) < 7 else 1
+    return f"{processor or 'processor ' + MIXED}, {count} cores", count
+
+
+def _moment(milliseconds: Any) -> str:
+    return datetime.fromtimestamp(float(milliseconds) / 1e3, UTC).isoformat()
 
 
 def _identity(run: ShortRun) -> str:

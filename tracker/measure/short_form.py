@@ -53,6 +53,7 @@ class ShortResult(Struct, frozen=True, kw_only=True):
     seconds: tuple[float, ...] = ()  # run time of each repeat; the value is the shortest, and noisy
     failure: Text = ""
     description: Text = ""
+    definition: Text = ""  # what was asked, in any words: values are compared only where it is the same
 
 
 class ShortRun(Struct, frozen=True, kw_only=True):
@@ -66,6 +67,8 @@ class ShortRun(Struct, frozen=True, kw_only=True):
     commit_time: Text = ""  # ISO 8601 UTC
     started: Text = ""  # ISO 8601 UTC; else the commit's time, else now
     machine: Name = "unknown"
+    processor: Text = ""  # as a reader sees it; else the machine's name
+    cores: int = 1
 
 
 class _Peek(msgspec.Struct):
@@ -114,8 +117,8 @@ def document_of(short: ShortRun, identity: str, origin: str) -> RunDocument:
         ),
         machine=Machine(
             fingerprint=short.machine,
-            processor=short.machine,
-            cores=1,
+            processor=short.processor or short.machine,
+            cores=short.cores,
             operating_system="",
             float_environment="",
         ),
@@ -147,6 +150,7 @@ def _pair(result: ShortResult, origin: str) -> tuple[SeriesDefinition, Sample]:
         limit=result.limit,
     )
     facts: Any = (key, result.unit, result.better, result.limit)
+    facts += (result.definition,) if result.definition else ()
     series = SeriesDefinition(
         key=key,
         test=result.test,

@@ -1,0 +1,56 @@
+"""Folders of asv, as asv leaves them: which files hold results, and what the files beside them say about these."""
+
+from __future__ import annotations
+
+import json
+import re
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from spook_tracker.tracker.document.errors import DocumentError
+from spook_tracker.tracker.measure.other_tools import Beside
+
+ABOUT = ("benchmarks.json", "machine.json", "asv.conf.json")
+SETTING = r'^\s*"{}"\s*:\s*"([^"]*)"'  # asv.conf.json has comments, so that json cannot read it
+
+
+def files_in(folder: Path) -> tuple[Path, ...]:
+    """The result files of an asv repository, of its results or of one machine's; else every JSON file in a folder.
+
+    DocumentError if there are none.
+    """
+    root = folder / (_setting(folder / "asv.conf.json", "results_dir") or "results")
+    inside = root if (folder / "asv.conf.json").is_file() and root.is_dir() else folder
+    deep = "**/*.json" if inside is root or (inside / "benchmarks.json").is_file() else "*.json"
+    found = sorted(file for file in inside.glob(deep) if file.name not in ABOUT)
+    if not found:
+        raise DocumentError(f"{folder} holds no JSON files of runs; name the folder they are in")
+    return tuple(found)
+
+
+def beside(file: Path, engine: str, machine: str) -> Beside:
+    """What the files of asv around a result file say, and what the caller says."""
+    results = file.parent.parent
+    project = _setting(results.parent / "asv.conf.json", "project")
+    return Beside(engine, machine, project, _benchmarks(results / "benchmarks.json"))
+
+
+@lru_cache(maxsize=8)
+def _benchmarks(file: Path) -> dict[str, Any]:
+    try:
+        said = json.loads(file.read_bytes())
+    except (OSError, ValueError):
+        return {}
+    return (
+        {name: one for name, one in said.items() if isinstance(one, dict)} if isinstance(said, dict) else {}
+    )
+
+
+@lru_cache(maxsize=8)
+def _setting(file: Path, name: str) -> str:
+    try:
+        found = re.search(SETTING.format(name), file.read_text(), re.MULTILINE)
+    except (OSError, ValueError):
+        return ""
+    return found[1] if found else ""
