@@ -103,6 +103,13 @@ def test_whatever_ends_the_process_that_imports_it_is_said_and_is_not_green(act:
     assert not {"their_engine", "their_catalogue"} & set(sys.modules), "imported by the process that decides"
 
 
+def test_an_exit_is_told_with_the_line_it_stands_in() -> None:
+    done = gate(("run",), engine="import sys\nsys.exit()", catalogue=QUESTIONS)
+
+    assert "SystemExit" in done.stderr
+    assert "their_engine.py, line 2" in done.stderr
+
+
 def test_a_tale_without_end_is_not_listened_to_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("spook_tracker.tracker.measure.apart.LONGEST", 1 << 16)
     monkeypatch.setattr("spook_tracker.tracker.measure.apart.PATIENCE", 0.1)
@@ -164,13 +171,14 @@ def test_a_catalogue_that_asks_nothing_is_no_green(command: tuple[str, ...], wha
     assert said in done.stderr
 
 
-def test_an_engine_that_supports_nothing_is_no_green() -> None:
+@pytest.mark.parametrize("command", [("run",), NIGHT], ids=" ".join)
+def test_an_engine_that_supports_nothing_is_no_green(command: tuple[str, ...]) -> None:
     lacks = TOY + (
         "from spook_tracker.engine.protocol import NotSupported\n"
         "def simulate(*asked, **more): raise NotSupported('it does not support this')\n"
     )
 
-    done = gate(("run",), engine=lacks, catalogue=QUESTIONS)
+    done = gate(command, engine=lacks, catalogue=QUESTIONS)
 
     assert done.exit_code == 2
     assert "toy supports none of the values asked for" in done.stderr
