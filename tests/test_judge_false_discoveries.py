@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from spook_tracker.tracker.judge.noise import judge_noisy
 from spook_tracker.tracker.judge.normal_nights import exceeded, student
+from spook_tracker.tracker.judge.run_times import judge_noisy
 from spook_tracker.tracker.judge.shifts import RARE
 from tests import noise_battery as battery
 

@@ -13,7 +13,7 @@ import pytest
 
 from spook_tracker.tracker.document.run_document import MapData, Point
 from spook_tracker.tracker.judge.compare import same_commit
-from spook_tracker.tracker.judge.noise import judge_noisy
+from spook_tracker.tracker.judge.run_times import judge_noisy
 from spook_tracker.tracker.judge.series_history import judge_history
 from spook_tracker.tracker.judge.verdict import judge, judge_map
 from tests.run_documents import definition, engine, run_of

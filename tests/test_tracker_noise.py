@@ -11,8 +11,7 @@ from scipy import stats
 
 from spook_tracker.tracker.document.middle import quartile
 from spook_tracker.tracker.document.run_document import Timing
-from spook_tracker.tracker.judge.change_points import change_points
-from spook_tracker.tracker.judge.noise import judge_noisy
+from spook_tracker.tracker.judge.run_times import judge_noisy, judged_and_segments
 from spook_tracker.tracker.judge.timing_statistics import compare_times, rank_test
 
 
@@ -58,7 +57,7 @@ def test_one_slow_night_is_suspected_and_forgotten():
 def test_a_mended_slowdown_is_recovered():
     told = states([*noisy(30, 1), *noisy(3, 2, level=1.3e-3), *noisy(3, 3)])
 
-    assert told[30:] == ["suspected", "detected", "detected", "recovered", "green", "green"]
+    assert told[30:] == ["suspected", "detected", "detected", "detected", "recovered", "green"]
 
 
 def test_a_speed_up_becomes_the_new_level():
@@ -134,18 +133,24 @@ def test_an_accepted_level_is_the_new_usual():
     assert set(told[31:]) == {"green"}
 
 
+def levels(values):
+    return [(segment.first, segment.last) for segment in judged_and_segments(values)[1]]
+
+
 def test_a_step_is_found_where_it_is_and_its_levels_are_told():
-    (point,) = change_points([*noisy(45, 1), *noisy(15, 2, level=1.05e-3)], name="a")
+    before, after = judged_and_segments([*noisy(45, 1), *noisy(15, 2, level=1.05e-3)])[1]
 
-    assert abs(point.place - 45) <= 1
-    assert abs(point.after / point.before - 1.05) < 0.01
-    assert point.probability <= 0.005
+    assert abs(after.first - 45) <= 1
+    assert abs(after.level / before.level - 1.05) < 0.01
+    assert after.boundary.probability > 0.9
+    assert 45 in after.boundary.places
+    assert sum(after.boundary.probabilities) == pytest.approx(1.0, abs=0.01)
 
 
-def test_two_steps_are_two_change_points():
+def test_two_steps_are_three_segments():
     values = [*noisy(40, 1), *noisy(40, 2, level=1.2e-3), *noisy(40, 3)]
 
-    assert [round(point.place / 40) for point in change_points(values)] == [1, 2]
+    assert levels(values) == [(0, 39), (40, 79), (80, 119)]
 
 
 def test_a_change_of_eight_nights_in_the_middle_of_a_history_is_found():
@@ -157,23 +162,15 @@ def test_a_change_of_eight_nights_in_the_middle_of_a_history_is_found():
     assert "detected" not in told[71:]
 
 
-def test_the_change_point_of_a_thousand_nights_is_at_its_night():
-    (point,) = change_points([*noisy(600, 5), *noisy(400, 6, level=1.1e-3)])
-
-    assert point.place == 600
+def test_the_boundary_of_a_thousand_nights_is_at_its_night():
+    assert levels([*noisy(600, 5), *noisy(400, 6, level=1.1e-3)])[1] == (600, 999)
 
 
-def test_noise_has_no_change_points():
-    assert not any(change_points(noisy(200, seed), name=str(seed)) for seed in range(30))
-    assert change_points([1.0] * 50) == []
-    assert change_points([1.0, 2.0]) == []
-    assert not change_points([math.nan] * 20)
-
-
-def test_the_same_history_gives_the_same_answer():
-    values = [*noisy(45, 1), *noisy(15, 2, level=1.05e-3)]
-
-    assert change_points(values, name="a") == change_points(values, name="a")
+def test_noise_is_one_segment():
+    assert all(len(levels(noisy(200, seed))) == 1 for seed in range(30))
+    assert levels([1.0] * 50) == [(0, 49)]
+    assert levels([1.0]) == [(0, 0)]
+    assert levels([math.nan] * 20) == []
 
 
 @pytest.mark.parametrize(("n", "m"), [(5, 5), (5, 7), (10, 10), (30, 30)])

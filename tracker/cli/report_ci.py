@@ -49,8 +49,8 @@ def _values(finding: Finding) -> tuple[str, str]:
     judged, definition = finding.judged, finding.definition
     if judged is None or definition is None:
         return "", ""
-    before = judged.against.sample.value if judged.against else None
-    return value(before), value(judged.night.sample.value, definition.unit)
+    before, now = judged.pair
+    return value(before), value(now, definition.unit)
 
 
 def _linked(finding: Finding, site: str) -> str:

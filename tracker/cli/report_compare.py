@@ -14,6 +14,7 @@ from spook_tracker.tracker.document.json_form import Number, readable
 from spook_tracker.tracker.judge.causes import causes_tonight
 from spook_tracker.tracker.judge.choice import worst_change
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Frontier, Side
+from spook_tracker.tracker.judge.series_history import Judged
 from spook_tracker.tracker.judge.tonight import Finding, not_compared
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import OVERALL, QUIET, WORDS, spaced
@@ -307,14 +308,22 @@ def _finding_line(finding: Finding, site: str) -> str:
     judged, definition = finding.judged, finding.definition
     parts = [f"✗ {finding.series}: {finding.name}"]
     if judged is not None and definition is not None:
-        before = judged.against.sample.value if judged.against else None
-        parts.append(f"{value(before)} → {value(judged.night.sample.value, definition.unit)}")
+        before, now = judged.pair
+        parts.append(f"{value(before)} → {value(now, definition.unit)}")
         parts.append(_limit(definition.limit))
     parts.append(finding.verdict.sentence)
     if finding.blame:
         parts.append(("" if finding.news else "still red: ") + finding.blame)
     parts.append(f"see {site}{page_of(finding.test)}")
     return clean("; ".join(parts))
+
+
+def accused(judged: Judged | None) -> dict[str, Any]:
+    """The commits that a red run time may have become worse with, and how probable its first bad commit is."""
+    if judged is None or judged.accused is None:
+        return {}
+    good, bad = (night.run.engine.git_hash or night.run.engine.version for night in judged.accused)
+    return {"accused": {"after": good, "up_to": bad, "probability": judged.probability}}
 
 
 def findings_json(findings: Sequence[Finding], then: Sequence[Any] = ()) -> str:
@@ -333,8 +342,10 @@ def findings_json(findings: Sequence[Finding], then: Sequence[Any] = ()) -> str:
             "news": finding.red and finding.news,
             "sentence": finding.verdict.sentence,
             "value": finding.judged.night.sample.value if finding.judged else None,
+            "levels": finding.judged.levels if finding.judged else None,
             "first_bad": finding.first_bad,
             "last_good": finding.last_good,
+            **accused(finding.judged),
         }
         for finding in findings
     ]

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from spook_tracker.scalar_tests.case import ScalarTest
+from spook_tracker.tracker.cli.report_compare import accused
 from spook_tracker.tracker.document.json_form import Number, readable
 from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.series_history import Judged, Told
@@ -53,8 +54,10 @@ def _night(judged: Judged) -> dict[str, Any]:
         "state": judged.state,
         "stands": judged.stands,
         "news": judged.news,
-        "first_bad": judged.first_bad.run.engine.git_hash if judged.first_bad else "",
-        "last_good": judged.last_good.run.engine.git_hash if judged.last_good else "",
+        "levels": judged.levels,
+        "first_bad": judged.worse_at.run.engine.git_hash if judged.worse_at else "",
+        "last_good": judged.before_worse.run.engine.git_hash if judged.before_worse else "",
+        **accused(judged),
         "accepted": judged.accepted,
     }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import click
 
@@ -12,7 +12,15 @@ from spook_tracker.tracker.document.run_document import SeriesDefinition
 from spook_tracker.tracker.document.wording import day
 from spook_tracker.tracker.judge.events import name_of
 from spook_tracker.tracker.judge.maps import ToldMap
-from spook_tracker.tracker.judge.series_history import Judged, Told, blame, commit_of, is_noisy
+from spook_tracker.tracker.judge.series_history import (
+    Judged,
+    Told,
+    blame,
+    commit_of,
+    is_noisy,
+    lanes_of,
+    on_one_clock,
+)
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, STATES, spaced
 
 
@@ -100,16 +108,24 @@ def changes(definition: SeriesDefinition, judged: Sequence[Judged]) -> list[str]
             f"{j.verdict.sentence}"
             for j in told
         ]
-    from spook_tracker.tracker.judge.change_points import (
-        change_points,
-    )  # NumPy, which most series do not need
-
-    values = [j.night.value for j in judged]
     return [
-        f"{day(judged[point.place].night.run.started)} {commit_of(judged[point.place].night.run)}: "
-        f"level {number(point.before)} → {number(point.after)} (p = {point.probability:.3f})"
-        for point in change_points(values, name=definition.key)
+        line
+        for places in lanes_of([j.night for j in judged], on_one_clock)
+        for line in _boundaries(judged, places)
     ]
+
+
+def _boundaries(judged: Sequence[Judged], places: Sequence[int]) -> Iterator[str]:
+    """Where one machine's level segments meet, and how sure that is."""
+    before = None
+    for place in places:
+        now = judged[place].segment
+        if now is not None and before is not None and now is not before and now.boundary is not None:
+            yield (
+                f"{day(judged[place].night.run.started)} {commit_of(judged[place].night.run)}: "
+                f"level {number(before.level)} → {number(now.level)} ({100.0 * now.boundary.probability:.0f} % sure)"
+            )
+        before = now or before
 
 
 def _repeats(judged: Judged) -> bool:

@@ -169,9 +169,11 @@ def _hits_in(told: Told, nights: Sequence[Judged], over: Judged | None) -> list[
     last: Any = None  # where the series last became worse
     for judged in nights:
         if judged.red:
-            if judged.worse_at is not last or open_from == len(found):
+            if judged.news or open_from == len(found):
                 found.append(_hit(told.key, told.definition, judged))
-                last = judged.worse_at
+            elif judged.worse_at is not last:  # one more night tells better where it began
+                found[-1] = _hit(told.key, told.definition, judged)
+            last = judged.worse_at
         elif judged.state == "suspected":
             continue
         elif judged.state == "accepted" and open_from == len(found):
@@ -209,8 +211,8 @@ def _hit(key: str, definition: SeriesDefinition, judged: Judged, standing: Stand
         name=name_of(judged),
         sentence=judged.verdict.sentence,
         stands=judged.stands,
-        before=good.value if good else math.nan,
-        value=bad.value,
+        before=judged.levels[0] if judged.levels else good.value if good else math.nan,
+        value=judged.levels[1] if judged.levels else bad.value,
         good=good.run if good else None,
         bad=bad.run,
         standing=standing,

@@ -5,7 +5,7 @@ A night is compared with the level that holds: the last night that was not red. 
 so it stays red until it is mended or accepted; a red night worse than the red night before it is news of its
 own. Small steps that each stay inside the tolerance are caught by comparing with the last release, and with
 the level that was last accepted, as well, and are called drift. Values without noise are judged after one
-run, exactly; run times by the robust statistics of tracker/judge/noise.py.
+run, exactly; run times by level segments: tracker/judge/run_times.py.
 """
 
 from __future__ import annotations
@@ -22,12 +22,14 @@ import msgspec
 from msgspec.structs import replace
 
 from spook_tracker.tracker.document.collection import no_collection
+from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import Point, Run, Sample, SeriesDefinition, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.calibration import engines_own, taken_again, unquiet
 from spook_tracker.tracker.judge.explaining import calm_nights
 from spook_tracker.tracker.judge.lane import looked_at_again
-from spook_tracker.tracker.judge.noise import judge_noisy
+from spook_tracker.tracker.judge.run_times import judged_and_segments
+from spook_tracker.tracker.judge.segments import Segment
 from spook_tracker.tracker.judge.slower import Usual, only_followed
 from spook_tracker.tracker.judge.standing import NO_VALUE, standing
 from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict, judge, same_bits
@@ -35,6 +37,7 @@ from spook_tracker.tracker.judge.vocabulary import Class, State
 
 RELEASE = re.compile(r"v?\d+(\.\d+)*")
 NOISY_NIGHTS = 400  # how far back run times are judged again night by night
+SURE = 0.995  # a boundary as probable needs no range
 LONG_DRIFT = 5.0  # tolerances a series may lose over many releases before that is called drift, too
 IDENTICAL = Verdict(word="identical", sentence="the same bits", ulps=0)
 
@@ -54,7 +57,13 @@ class Judged(msgspec.Struct, frozen=True, kw_only=True):
     accepted: str = ""
     usual: Usual | None = None  # of run times: level and noise after this night
     time: float | None = None  # of run times: the value judged (tracker.judge.calibration.engines_own)
-    confirms: bool = False  # of run times: the second slow night, which makes both red
+    confirms: bool | None = None  # of run times: whether a red segment is told for the first time tonight
+    levels: tuple[float, float] | None = None  # of run times: what the percentage is of, before and now
+    accused: tuple[Point, Point] | None = None  # of red run times: last surely good, first surely bad night
+    probability: float | None = None  # that `worse_at` is right
+    segment: Segment | None = (
+        None  # of run times: the level that the night belongs to, as far as is known today
+    )
 
     @property
     def red(self) -> bool:
@@ -63,7 +72,14 @@ class Judged(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def news(self) -> bool:
         """Red for a reason of tonight, or red since tonight, and not only still red."""
-        return self.red and (self.worse_at is self.night or self.confirms)
+        return self.red and (self.worse_at is self.night if self.confirms is None else self.confirms)
+
+    @property
+    def pair(self) -> tuple[Number | None, Number]:
+        """What is printed beside the sentence: the value before and now, of red run times their levels."""
+        if self.red and self.levels is not None:
+            return Number(self.levels[0]), Number(self.levels[1])
+        return None if self.against is None else self.against.sample.value, self.night.sample.value
 
 
 @dataclass(frozen=True)
@@ -84,7 +100,7 @@ class Told:
         nights = self.nights
         if {judged.state for judged in nights}.isdisjoint(("detected", "accepted")):
             return []
-        lane = _clock if is_noisy(self.definition) else _question
+        lane = on_one_clock if is_noisy(self.definition) else _question
         found = []
         for places in lanes_of([judged.night for judged in nights], lane):
             over = nights[places[-1]].night.test_version != nights[-1].night.test_version
@@ -113,6 +129,17 @@ def is_release(run: Run) -> bool:
 @lru_cache(maxsize=4096)
 def _released(version: str) -> bool:
     return RELEASE.fullmatch(version) is not None
+
+
+def blame_of(judged: Judged) -> str:
+    """Which commit a red series became worse with, and how sure that is; empty if it is not red."""
+    if judged.worse_at is None:
+        return ""
+    words = blame(judged.worse_at.run, judged.before_worse and judged.before_worse.run)
+    if judged.accused is None or judged.probability is None or judged.probability >= SURE:
+        return words
+    good, bad = (commit_of(night.run) for night in judged.accused)
+    return f"{words} ({100.0 * judged.probability:.0f} % sure; surely after {good}, up to {bad})"
 
 
 def blame(bad: Run, good: Run | None) -> str:
@@ -184,7 +211,7 @@ def _question(night: Point) -> Hashable:
     return night.test_version, night.run.machine.float_environment
 
 
-def _clock(night: Point) -> Hashable:
+def on_one_clock(night: Point) -> Hashable:
     """Run times are comparable under one definition of the test on one machine."""
     return night.test_version, night.run.machine.fingerprint
 
@@ -391,7 +418,7 @@ def _judge_times(
     """Run times: each machine and each definition of the test is a history of its own."""
     found: dict[int, Judged] = {}
     old = Verdict(word="same", sentence="too long ago to be judged again")
-    for every in lanes_of(history, _clock):
+    for every in lanes_of(history, on_one_clock):
         loud = {place: why for place in every if (why := unquiet(history[place]))}
         looked_at = looked_at_again(len(every), NOISY_NIGHTS)
         again = [every[i] for i in looked_at]
@@ -406,7 +433,7 @@ def _judge_times(
             acceptance(accepted, key, value, night_of(night.run)) if accepted else None
             for night, value in zip(lane, values, strict=True)
         ]
-        verdicts = judge_noisy(
+        verdicts, segments = judged_and_segments(
             values,
             larger_is_better=definition.better == "larger",
             releases=[is_release(night.run) for night in lane],
@@ -415,6 +442,7 @@ def _judge_times(
             absolute=definition.tolerance,
             ages=[i for i in looked_at if every[i] not in loud],
         )
+        level_of = {i: segment for segment in segments for i in range(segment.first, segment.last + 1)}
         for i, noisy in enumerate(verdicts):
             if noisy.state in ("detected", "suspected") and is_read_off(definition):
                 noisy = noisy._replace(
@@ -429,6 +457,7 @@ def _judge_times(
             first = lane[noisy.first_bad] if noisy.first_bad is not None else None
             worse_at = lane[noisy.worse_at] if noisy.worse_at is not None else first
             good = lane[noisy.last_good] if noisy.last_good is not None else None
+            before = lane[noisy.worse_at - 1] if noisy.worse_at else good
             found[places[i]] = Judged(
                 night=lane[i],
                 verdict=noisy.verdict,
@@ -438,10 +467,14 @@ def _judge_times(
                 first_bad=first,
                 last_good=good,
                 worse_at=worse_at,
-                before_worse=good,
+                before_worse=before,
                 accepted=str(taken[i]) if noisy.state == "accepted" else "",
                 usual=noisy.usual,
                 time=values[i],
-                confirms=noisy.state == "detected" and (i == 0 or verdicts[i - 1].state != "detected"),
+                confirms=noisy.news,
+                levels=noisy.levels,
+                accused=None if noisy.accused is None else (lane[noisy.accused[0]], lane[noisy.accused[1]]),
+                probability=noisy.probability,
+                segment=level_of.get(i),
             )
     return [found[place] for place in sorted(found)]

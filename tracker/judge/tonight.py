@@ -17,6 +17,7 @@ from spook_tracker.tracker.judge.series_history import (
     Judged,
     Told,
     blame,
+    blame_of,
     commit_of,
     judge_all,
 )
@@ -59,7 +60,7 @@ class Finding:
         """The last good run and the first bad one, each None where history knows none."""
         if self.judged is None:
             return (self.good, self.bad) if self.red else (None, None)
-        good, bad = self.judged.last_good, self.judged.first_bad
+        good, bad = self.judged.before_worse, self.judged.worse_at
         return good and good.run, bad and bad.run
 
     @property
@@ -76,6 +77,8 @@ class Finding:
     @property
     def blame(self) -> str:
         """The commit or the range of commits it came with, in words; empty if history does not know."""
+        if self.judged is not None:
+            return blame_of(self.judged)
         good, bad = self._range
         return "" if bad is None else blame(bad, good)
 

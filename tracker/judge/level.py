@@ -1,0 +1,195 @@
+"""The present level of a noisy series: what is usual there, and what stands clear of it.
+
+Noise is that of nights about the level of their own segment. Where the segment is young, the last nights before it
+help out, about theirs. What nights that hold have reached is learnt, so that two clusters and spikes raise no alarm.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from spook_tracker.tracker.document.middle import median
+from spook_tracker.tracker.judge.normal_nights import exceeded
+from spook_tracker.tracker.judge.segments import NORMAL, Boundary, Standing, spread_of
+from spook_tracker.tracker.judge.shifts import BASE, CLIP, FEWEST_BASE, remembered, standard_error
+from spook_tracker.tracker.judge.slower import LEAST, worse_by
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.judge.shifts import Values
+
+WINDOW = 30  # nights that say what is usual, and that are remembered of the segments before
+FEWEST = 5  # of them before noise can be told; until then only a gross change counts
+FEW_NIGHTS_FLOOR = 0.5  # relative, while the noise is not known
+FLOOR = 0.05  # relative; less where the noise is less than an eighth of it, of nights enough
+ENOUGH = 20  # nights
+CLEAR = 8.0  # noises, below the floor: the noise of few nights may be told too small
+SIGMAS = 4.0
+REACH = 1.25  # times the second largest deviation of nights that hold
+UNSEEN = 25  # nights: of fewer, as much again may be reached by those to come
+REACHED = 200  # nights of which that is remembered
+SECOND = 2.5  # standard deviations that the second largest of two hundred nights reaches
+CREEP = 5  # nights in each median that is compared for drift
+RANGES = 2.0  # times what nights of a segment range over: none that remember each other go so far
+
+
+@dataclass
+class Growing:
+    """The present segment while it grows."""
+
+    places: list[int]  # of its nights that hold
+    standing: Standing = "usual"
+    before: list[int] = field(default_factory=list)  # the last nights of the segment before it
+    where: Boundary | None = None
+    size: float = 0.0  # of a red: the change when it was told
+    stay: int = 0  # nights that a flaky level lasts
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What the present segment is held to: the last usual or accepted level."""
+
+    level: float
+    threshold: float
+    noise: float
+    last: int  # its last night
+    nights: int  # that tell it
+
+
+@dataclass
+class PresentLevel:
+    """The present segment and what is remembered of those before it."""
+
+    values: Sequence[float]
+    larger_is_better: bool
+    tolerance: float
+    absolute: float
+    now: Growing = field(default_factory=lambda: Growing([]))
+    better: bool = False  # the side on which the last nights stand clear
+    remembers: list[float] = field(default_factory=list)  # relative deviations of nights before the segment
+    reached: list[float] = field(
+        default_factory=list
+    )  # the same of its own when they joined it; worse is positive
+    until: int = 0  # nights seen
+    start: int = 0  # the first night there is, or the last that was accepted
+    _told: tuple[int, tuple[float, float, float]] | None = None
+
+    def _costs(self, places: Sequence[int]) -> list[float]:
+        """Values of which larger is worse, and a change as many per cent: a rate gives the time of one."""
+        if not self.larger_is_better:
+            return [self.values[i] for i in places]
+        return [1.0 / value if (value := self.values[i]) else math.inf for i in places]
+
+    def _level(self) -> tuple[float, float, float]:
+        """Level, noise and threshold of the present segment, by its last nights."""
+        if self._told is not None and self._told[0] == len(self.now.places):
+            return self._told[1]
+        own = [self.values[i] for i in self.now.places[-WINDOW:]]
+        level = median(own)
+        off = [value / level - 1.0 for value in own] if level else [0.0]
+        if len(own) < ENOUGH:
+            off += self.remembers[len(own) - WINDOW :]
+        noise = spread_of([1.0 + x for x in off], 1.0)
+        self._told = len(self.now.places), (level, noise, self._threshold(level, noise, len(own), len(off)))
+        return self._told[1]
+
+    def _threshold(self, level: float, noise: float, own: int, count: int) -> float:
+        """The relative change that stands clear: of the noise, of what nights reached, of what is tolerated."""
+        tolerated = self._tolerated(level)
+        if count < FEWEST or level == 0.0:
+            return max(FEW_NIGHTS_FLOOR, tolerated)
+        clear = max(FLOOR, SIGMAS * noise)
+        if own >= ENOUGH:
+            clear = max(LEAST, min(clear, CLEAR * noise))
+        reached = self._reached()
+        if len(reached) >= 2:
+            clear = max(clear, REACH * (1.0 + UNSEEN / len(reached)) * second_largest(reached))
+        return max(clear, tolerated)
+
+    def _reached(self) -> list[float]:
+        """Deviations of nights that hold: the segment's own, filled up by those before it while it is young."""
+        missing = WINDOW - len(self.reached)
+        return [*self.remembers[-missing:], *self.reached] if missing > 0 else self.reached
+
+    def _tolerated(self, level: float) -> float:
+        return max(self.tolerance, self.absolute / abs(level) if self.absolute and level else 0.0)
+
+    def _worse_by(self, level: float, value: float) -> float:
+        return worse_by(level, value, self.larger_is_better)
+
+    def _number(self, place: int) -> bool:
+        """Whether a night has a time: none is infinite, and so is that of a rate of zero."""
+        return math.isfinite(self.values[place]) and not (self.larger_is_better and self.values[place] == 0.0)
+
+    def _stands_clear(self, change: float, threshold: float) -> bool:
+        """Whether a night is beyond what is usual, and beyond where nights that remember each other go."""
+        import numpy as np
+
+        if change <= threshold:
+            return False
+        base = self._base()
+        if len(base) < FEWEST_BASE or not math.isfinite(change) or not remembered(base):
+            return True
+        far = RANGES * float(np.max(base) - np.min(base))  # whatever they remember
+        return change * float(np.median(base)) > min(standard_error(base, 1), far)
+
+    def _reach_down(self, threshold: float) -> float:
+        """What stands clear for the better: of where nights that hold have been."""
+        reached = self._reached()
+        if len(reached) < 2:
+            return threshold
+        lowest = second_largest([-x for x in reached])
+        return REACH * (1.0 + UNSEEN / len(reached)) * lowest
+
+    def _join(self, places: Sequence[int]) -> None:
+        """Nights that hold."""
+        if len(self.now.places) >= FEWEST:
+            level = self._level()[0]
+            more = [self._worse_by(level, self.values[i]) for i in places]
+            self.reached = [*self.reached, *more][-REACHED:]
+        self.now.places += places
+        self._told = None
+
+    def _base(self) -> Values:
+        """Nights of the segment; what lies far off, accidents and an older level, counts as if it lay nearer."""
+        import numpy as np
+
+        base = np.array(self._costs(self.now.places[-BASE:]))
+        middle = float(np.median(base))
+        far = CLIP * NORMAL * float(np.median(np.abs(base - middle)))
+        return np.clip(base, middle - far, middle + far) if far > 0.0 else base
+
+    def _wanders(self) -> float:
+        """How far the means of two spans of nights may lie apart, a trend of these nights taken out."""
+        import numpy as np
+
+        base = self._base()
+        if len(base) < FEWEST_BASE:
+            return 0.0
+        nights = np.arange(len(base))
+        level = base - np.polyval(np.polyfit(nights, base, 1), nights)
+        return math.sqrt(2.0) * standard_error(level, CREEP) if remembered(level) else 0.0
+
+    def _chance(self, nights: Sequence[int]) -> float:
+        """How probable it is that these nights lie so far off by chance: the tail of Student's t."""
+        level, noise, _ = self._level()
+        off = [abs(self._worse_by(level, self.values[i])) for i in nights]
+        own, reached = len(self.now.places), self._reached()
+        side = [-x for x in reached] if self.better else reached
+        if len(side) > 1:
+            noise = max(noise, second_largest(side) / SECOND)
+        known = min(own, WINDOW) if own >= ENOUGH else min(WINDOW, own + len(self.remembers))
+        if known < FEWEST:
+            noise = max(noise, FEW_NIGHTS_FLOOR / SIGMAS)
+        if noise <= 0.0:
+            return 0.0
+        t = sum(off) / len(off) / (noise * math.sqrt(1.0 / len(off) + 1.0 / min(own, WINDOW)))
+        return exceeded(min(t, 1e9), max(FEWEST, known + len(off) - 2))
+
+
+def second_largest(values: Sequence[float]) -> float:
+    """Of two values at least."""
+    place = values.index(max(values))
+    return max(max(values[:place], default=-math.inf), max(values[place + 1 :], default=-math.inf))

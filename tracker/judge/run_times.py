@@ -1,0 +1,499 @@
+"""A run time night by night: a list of level segments, and what they say by short rules.
+
+A segment ends when two nights in a row stand clear of it, or when several together do (tracker/judge/shifts.py); one
+night ends none. Each rule is a function: `_stands_clear`, `_begins`, `_worse`, `_came_back`, `_flaky`, `_crept`. Noise
+is that of nights about the level of their own segment; where a segment is young, the last nights before it help out.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, NamedTuple
+
+from msgspec.structs import replace
+
+from spook_tracker.tracker.document.middle import median
+from spook_tracker.tracker.judge.level import (
+    CREEP,
+    FEWEST,
+    FLOOR,
+    REACHED,
+    SIGMAS,
+    WINDOW,
+    Growing,
+    PresentLevel,
+    Reference,
+)
+from spook_tracker.tracker.judge.segments import (
+    Segment,
+    boundary,
+    inner_split,
+    spread_of,
+)
+from spook_tracker.tracker.judge.shifts import (
+    BASE,
+    FEWEST_BASE,
+    RARE,
+    SPANS,
+    Shift,
+    remembered,
+    shift,
+)
+from spook_tracker.tracker.judge.slower import LEAST, Usual, change_in_words, slower
+from spook_tracker.tracker.judge.verdict import Verdict
+from spook_tracker.tracker.judge.vocabulary import State
+
+if TYPE_CHECKING:
+    pass
+
+MENDED = 0.25  # of its size: a red level that is left of it is none
+SETTLED = 30  # nights of a segment after which its boundary is known
+BACK, WEIGHT = 9.0, 6.0  # log likelihoods: to believe that a red level was left; of one night at most
+OFTEN = 2  # times left before: such a level is flaky,
+LONGER = 2  # until it lasts so many times its longest
+
+
+class Noisy(NamedTuple):
+    """One night's verdict; `against`, `first_bad`, `last_good`, `worse_at` and `accused` are places in the sequence."""
+
+    verdict: Verdict
+    state: State
+    against: int | None = None
+    first_bad: int | None = None
+    last_good: int | None = None
+    worse_at: int | None = None  # where it last became worse: the first bad night, or a later segment's
+    news: bool = False  # red for a segment that is told tonight
+    accused: tuple[int, int] | None = None  # last surely good, first surely bad
+    probability: float | None = None  # that `worse_at` is right
+    levels: tuple[float, float] | None = None  # what the percentage is of: before, now
+    usual: Usual | None = None  # after this night: the level that is held to, and what stands clear of it
+
+
+def judge_noisy(values: Sequence[float], **options: object) -> list[Noisy]:
+    """A verdict for each value of one machine, oldest first: `judged_and_segments` without the segments."""
+    return judged_and_segments(values, **options)[0]  # type: ignore[arg-type]
+
+
+def judged_and_segments(
+    values: Sequence[float],
+    *,
+    larger_is_better: bool = False,
+    releases: Sequence[bool] | None = None,
+    accepted: Sequence[bool] | None = None,
+    tolerance: float = 0.0,
+    absolute: float = 0.0,
+    ages: Sequence[int] | None = None,
+) -> tuple[list[Noisy], list[Segment]]:
+    """Verdicts and segments, oldest first. Values are positive; worse is larger, unless larger is better.
+
+    `tolerance` and `absolute`: the change, relative and in the unit of the values, up to which the series' definition
+    tells none, whatever its noise. `ages`: how many nights each value lies after the first, where some are left out.
+    """
+    walk = _Walk(values, larger_is_better, tolerance, absolute, ages=ages or range(len(values)))
+    told = []
+    for place in range(len(values)):
+        night = walk.night(place, bool(releases and releases[place]), bool(accepted and accepted[place]))
+        told.append(night._replace(usual=walk.held_to()))
+    return told, walk.segments()
+
+
+@dataclass
+class _Walk(PresentLevel):
+    """What is known of a series, night after night."""
+
+    ages: Sequence[int] = ()
+    off: list[int] = field(default_factory=list)  # the last nights in a row that stand clear, on one side
+    reference: Reference | None = None  # while red or flaky
+    over: list[Segment] = field(default_factory=list)
+    anchor: list[int] = field(default_factory=list)  # the nights at the last release
+    crept: float = 0.0  # the largest drift since it is red; zero while it is not
+    first: tuple[int, int] | None = None  # of the red: last good and first bad night
+    broken: bool = False  # no finite value last night
+
+    def held_to(self) -> Usual:
+        """The level that a night is held to, and what stands clear of it."""
+        if self.reference is not None:
+            return self.reference.level, self.reference.threshold
+        if not self.now.places:
+            return math.inf, FLOOR
+        level, _, threshold = self._level()
+        return level, threshold
+
+    # One more night.
+
+    def night(self, place: int, release: bool, accepted: bool) -> Noisy:
+        value, self.until = self.values[place], place + 1
+        if not self.now.places:
+            return self._without_a_level(place)
+        level, _, threshold = self._level()
+        if not self._number(place):
+            return self._no_value(place, accepted)
+        change = self._worse_by(level, value)
+        self._see(place, change, threshold)
+        found = self._begins()
+        if found is not None:
+            return self._new_segment(place, found, accepted)
+        if accepted and (self._red or (self.off and not self.better)):
+            return self._accept(place)
+        return self._holds(place, change, level, release)
+
+    @property
+    def _red(self) -> bool:
+        return self.now.standing == "red" or self.crept > 0.0
+
+    def _without_a_level(self, place: int) -> Noisy:
+        """Before the first number there is nothing to be worse than."""
+        number = self._number(place)
+        if number:
+            self._start(place)
+        new = place == self.start
+        verdict = Verdict(word="new", sentence="the first value") if new else slower(-math.inf, 0.0, 0.0, "")
+        if not new:
+            words = "the first number" if number else "no number yet"
+            verdict = Verdict(word="improved" if number else "same", sentence=words)
+        return Noisy(verdict=verdict, state="green", against=None if new else place - 1)
+
+    def _start(self, place: int) -> None:
+        """A history that begins here."""
+        self.now, self.anchor, self.start = Growing([place]), [place], place
+        self.off, self.reference, self.first, self.crept = [], None, None, 0.0
+        self.remembers, self.reached, self._told = [], [], None
+
+    def _no_value(self, place: int, accepted: bool) -> Noisy:
+        level = self._level()[0]
+        good = self.now.places[-1]
+        verdict = slower(math.inf, level, math.inf, "not finite")
+        if accepted:
+            return Noisy(verdict=verdict, state="accepted", against=good)
+        news, self.broken = not self.broken, True
+        if news and not self._red:
+            self.first = good, place
+        last, first = self.first or (good, place)
+        return Noisy(verdict=verdict, state="detected", against=good, first_bad=first, last_good=last, worse_at=place if news else first, news=news, levels=(level, self.values[place]))  # fmt: skip
+
+    def _see(self, place: int, change: float, threshold: float) -> None:
+        """The nights in a row that stand clear of the segment on one side; what no second one confirmed is noise."""
+        worse, better = self._stands_clear(change, threshold), -change > threshold
+        better = better and -change > self._reach_down(threshold)
+        if self.off and (not (worse or better) or better != self.better):
+            self._join(self.off)
+            self.off = []
+        if worse or better:
+            self.off, self.better = [*self.off, place], better
+        else:
+            self._join([place])
+
+    # Rules: when a segment ends.
+
+    def _begins(self) -> tuple[int, Shift | None] | None:
+        """How many of the last nights are a new segment, and by which test; None if they are none."""
+        if len(self.off) > 1 and self._chance(self.off) <= RARE:
+            return len(self.off), None
+        if self.reference is not None and (back := self._came_back()) is not None:
+            return back
+        return self._together() or self._above_both()
+
+    def _together(self) -> tuple[int, Shift | None] | None:
+        """Several nights that together lie above the segment's others."""
+        if self.off and self.better:
+            return None
+        level = self._level()[0]
+        if level <= 0.0 or len(self.now.places) < FEWEST_BASE + min(SPANS) - len(self.off):
+            return None
+        nights = [*self.now.places[-BASE - max(SPANS) :], *self.off]
+        near = [self._worse_by(level, self.values[i]) for i in nights[-min(SPANS) :]]
+        mean = sum(near) / len(near)
+        if mean < LEAST:
+            return None  # most nights: nothing to count
+        age = self.ages[nights[-1]] - self.ages[self.start]
+        found = shift(self._costs(nights), mean < self._level()[1], age)
+        if found is None or found.change <= self._tolerated(level):
+            return None
+        return found.span, found
+
+    def _above_both(self) -> tuple[int, Shift | None] | None:
+        """Several nights above both of two clusters that nights are drawn from at random, whatever segments they made."""
+        if not self.over or self.now.standing == "red" or len(self.now.places) >= BASE:
+            return None
+        first = max(self.start, self.until - BASE - max(SPANS))
+        nights = [i for i in range(first, self.until) if self._number(i)]
+        level, last = self._level()[0], nights[-min(SPANS) :]
+        if len(nights) < FEWEST_BASE + min(SPANS) or sum(
+            self._worse_by(level, self.values[i]) for i in last
+        ) < 0.5 * LEAST * len(last):
+            return None
+        found = shift(self._costs(nights), True, self.ages[nights[-1]] - self.ages[self.start])
+        if found is None or not found.apart or found.change <= self._tolerated(level):
+            return None
+        return found.span, found
+
+    def _came_back(self) -> tuple[int, None] | None:
+        """Whether the last nights of a red segment are more probably of the level before it (Page's cumulative sum)."""
+        assert self.reference is not None
+        places = self.now.places
+        settled = [self.values[i] for i in places[-WINDOW - max(SPANS) : -max(SPANS)] or places[: min(SPANS)]]
+        level = median(settled)
+        noise = max(spread_of(settled, level), self.reference.noise, 0.1 * LEAST)
+        apart = self._worse_by(self.reference.level, level) / noise
+        total = 0.0
+        for recent, i in enumerate(reversed([*self.now.places[-SETTLED:], *self.off]), start=1):
+            off = self._worse_by(self.reference.level, self.values[i]) / noise
+            total += max(-WEIGHT, min(WEIGHT, apart * (0.5 * apart - off)))
+            if total > BACK and recent < len(self.now.places) + len(self.off):
+                return recent, None
+            if total < -BACK:
+                return None
+        return None
+
+    # A new segment.
+
+    def _new_segment(self, place: int, found: tuple[int, Shift | None], accepted: bool) -> Noisy:
+        nights = [*self.now.places, *self.off]
+        count, told = found
+        if count >= len(nights):  # the segment is as young: what was before it
+            first = max(self.start, place - WINDOW - SETTLED)
+            nights = [i for i in range(first, place + 1) if self._number(i)]
+        old, noise, threshold = self._level()
+        near = nights[-WINDOW - count :]
+        where = boundary(near, self._costs(near), count)
+        after = [i for i in nights if i >= where.best]
+        before = [i for i in nights if i < where.best]
+        usual = [self.values[i] for i in before[-WINDOW:]]
+        old = median(usual)
+        noise = spread_of(usual, old) if len(usual) >= FEWEST_BASE else noise
+        level = median([self.values[i] for i in after])
+        was, began = self.now.standing, self.now.where
+        held = self.reference or Reference(old, threshold, noise, before[-1], min(len(before), WINDOW))
+        self.over.append(
+            Segment(nights[0] if began is None else began.best, before[-1], old, noise, was, began)
+        )
+        off = [self._worse_by(old, self.values[i]) for i in before[-WINDOW:]]
+        self.remembers, self.reached = [*self.remembers, *off][-WINDOW:], []
+        self.now = Growing(after, "usual", before[-WINDOW:], where)
+        self.off, self._told, self.crept = [], None, 0.0
+        change = self._worse_by(held.level, level)
+        words = change_in_words(change)
+        if accepted and change > 0.0:
+            return self._accept(place)
+        rose = self._worse_by(old, level) > 0.0
+        if change > 0.0 and ((rose and self.reference is None) or self._worse(held, level, len(after))):
+            apart = told is not None and told.apart
+            if was != "red" and not apart and (stay := self._flaky(held, level, len(after))):
+                self.reference, self.now.standing, self.now.stay = held, "flaky", stay
+                return self._flaky_night(level)
+            self.reference, self.now.standing, self.now.size = held, "red", change
+            if was != "red" or self.first is None:
+                self.first = before[-1], where.best
+            if rose and told is not None:
+                words += f" over {told.span} nights, by chance once in {1.0 / told.probability:.0e}"
+            return self._red_night(news=rose, words=words)
+        self.reference, self.first = None, None
+        self.now.standing = "recovered" if was == "red" else "usual"
+        better = Verdict(
+            word="improved" if self._worse_by(old, level) < 0 and was != "red" else "same", sentence=words
+        )
+        if was == "red":
+            better = replace(better, sentence=f"{words}, inside the noise")
+        return Noisy(
+            verdict=better,
+            state="recovered" if was == "red" else "green",
+            against=before[-1],
+            levels=(held.level, level),
+        )
+
+    def _settle(self) -> None:
+        """The boundary of a young segment again, with one more night behind it; nights change sides with it."""
+        old = self.now.where
+        if old is None or len(self.now.places) > SETTLED or self.now.places[0] != old.best:
+            return
+        nights = [*self.now.before, *self.now.places]
+        where = boundary(nights, self._costs(nights), len(self.now.places))
+        if where.best not in old.places:
+            return
+        before = [i for i in nights if i < where.best]
+        if self.first is not None and self.first[1] == old.best:
+            self.first = before[-1], where.best
+        self.now.where, self.now.before, self.now.places = where, before, nights[len(before) :]
+        self._told = None
+
+    def _worse(self, held: Reference, level: float, nights: int) -> bool:
+        """Whether a level is worse than what it is held to, beyond noise and tolerance."""
+        noise = max(held.noise, self._level()[1])
+        noise *= SIGMAS * math.sqrt(1.0 / nights + 1.0 / held.nights)
+        return self._worse_by(held.level, level) > max(
+            LEAST, min(noise, held.threshold), self._tolerated(held.level)
+        )
+
+    def _flaky(self, held: Reference, level: float, nights: int) -> int:
+        """How long a level may last that was reached and left again before, often; zero of another."""
+        change = self._worse_by(held.level, level)
+        near = max(LEAST, 0.15 * change, SIGMAS * max(held.noise, LEAST) / math.sqrt(nights))
+        been = [
+            segment.last - segment.first + 1
+            for segment in self.over
+            if segment.first >= self.start
+            and abs(self._worse_by(held.level, segment.level) - change) <= near
+            and segment.standing in ("red", "flaky")
+        ]
+        return LONGER * max(been) if len(been) >= OFTEN else 0
+
+    # What is said.
+
+    def _holds(self, place: int, change: float, level: float, release: bool) -> Noisy:
+        """A night that ends no segment."""
+        self._settle()
+        self._split_inside()
+        fast = bool(self.off) and self.better
+        back, self.broken = self.broken and not self._red, False
+        if self.now.standing == "red":
+            return self._mended() or self._red_night(news=False)
+        if self.now.standing == "flaky":
+            assert self.reference is not None
+            if len(self.now.places) <= self.now.stay:
+                return self._flaky_night(self._level()[0])
+            self.now.standing, self.now.size = "red", self._worse_by(self.reference.level, self._level()[0])
+            assert self.now.where is not None
+            self.first = self.reference.last, self.now.where.best
+            return self._red_night(news=True)
+        if not self.off or self.better:
+            self._anchors(place, release)
+        good = self.now.places[0]
+        was = self.crept > 0.0
+        if not (self.off and not self.better) and (creep := self._crept()) is not None:
+            return self._drifted(*creep, news=not was)
+        if self.off and not self.better:
+            if self.crept:
+                old, recent = self._ends() or (level, level)
+                return self._drifted(old, recent, news=False)
+            verdict = slower(change, level, self.values[place], "")
+            return Noisy(verdict=verdict, state="suspected", against=good, levels=(level, self.values[place]))
+        state: State = "recovered" if back or was else "green"
+        words = change_in_words(change)
+        verdict = (
+            Verdict(word="improved", sentence=words)
+            if fast
+            else Verdict(word="same", sentence=f"{words}, inside the noise")
+        )
+        return Noisy(verdict=verdict, state=state, against=good, levels=(level, self.values[place]))
+
+    def _red_night(self, news: bool, words: str = "") -> Noisy:
+        assert self.reference is not None and self.now.where is not None and self.first is not None
+        held, level = self.reference.level, self._level()[0]
+        verdict = slower(self._worse_by(held, level), held, level, "slower")
+        if words:
+            verdict = replace(verdict, sentence=words)
+        where = self.now.where
+        good, first = self.first
+        risen = self._worse_by(self.over[-1].level, level) > 0.0
+        return Noisy(
+            verdict=verdict, state="detected", against=good, first_bad=first, last_good=good,
+            worse_at=where.best if risen else first, news=news, accused=(max(where.places[0] - 1, 0), where.places[-1]),
+            probability=where.probability, levels=(held, level),
+        )  # fmt: skip
+
+    def _mended(self) -> Noisy | None:
+        """Recovered, if the red level came to lie where the one before it was, little by little."""
+        assert self.reference is not None
+        held, level = self.reference.level, self._level()[0]
+        change = self._worse_by(held, level)
+        if change > MENDED * self.now.size:
+            return None
+        good = self.reference.last
+        self.reference, self.first, self.now.standing = None, None, "recovered"
+        words = f"{change_in_words(change)}, inside the noise"
+        verdict = Verdict(word="same", sentence=words)
+        return Noisy(verdict=verdict, state="recovered", against=good, levels=(held, level))
+
+    def _flaky_night(self, level: float) -> Noisy:
+        assert self.reference is not None
+        held = self.reference.level
+        words = f"{change_in_words(self._worse_by(held, level))}, at a level that was left again before"
+        verdict = Verdict(word="same", sentence=words)
+        return Noisy(verdict=verdict, state="green", against=self.reference.last, levels=(held, level))
+
+    def _accept(self, place: int) -> Noisy:
+        """The present level is the one that others are held to from now on."""
+        held, _ = self.held_to()
+        change = self._worse_by(held, self.values[place])
+        good = self.now.places[-1]
+        verdict = slower(change, held, self.values[place], "slower")
+        level, noise, _ = self._level()
+        began = self.now.where.best if self.now.where else self.start
+        self.over.append(Segment(began, good, level, noise, self.now.standing, self.now.where))
+        self._start(place)
+        self.now.standing = "accepted"
+        return Noisy(verdict=verdict, state="accepted", against=good, levels=(held, self.values[place]))
+
+    def _split_inside(self) -> None:
+        """Nights of an older level leave the segment: they say nothing of its noise."""
+        count = len(self.now.places)
+        if count < FEWEST_BASE or count % FEWEST:
+            return
+        base = self._base()
+        costs = base.tolist()
+        split = inner_split(costs, 1.0)
+        if split is None:
+            return
+        import numpy as np
+
+        low, high = base[:split], base[split:]
+        memory = remembered(np.concatenate([low - low.mean(), high - high.mean()]))
+        if memory and inner_split(costs, (1.0 - memory) / (1.0 + memory)) is None:
+            return
+        nights = self.now.places
+        cut = len(nights) - len(base) + split
+        self.now.places, self._told = nights[cut:], None
+        level = self._level()[0]
+        self.reached = [self._worse_by(level, self.values[i]) for i in self.now.places[-REACHED:]]
+        self._told = None
+
+    # Drift.
+
+    def _anchors(self, place: int, release: bool) -> None:
+        if release and len(self.anchor) >= CREEP:
+            self.anchor, self.crept = [place], 0.0
+        elif len(self.anchor) < CREEP and place not in self.anchor:
+            self.anchor = [*self.anchor, place]
+
+    def _ends(self) -> tuple[float, float] | None:
+        """The middle of the nights at the last release, and of the last ones."""
+        last = self.now.places[-CREEP:]
+        if len(self.anchor) < CREEP or len(last) < CREEP:
+            return None
+        return median(self.values[i] for i in self.anchor), median(self.values[i] for i in last)
+
+    def _crept(self) -> tuple[float, float] | None:
+        """Drift against the last release, where both ends have nights enough: red until half of it is gone."""
+        ends = self._ends()
+        if ends is None:
+            return None
+        old, recent = ends
+        change, threshold = self._worse_by(old, recent), self._level()[2]
+        enough = min(threshold, 0.5 * self.crept) if self.crept else threshold
+        if change <= enough or (not self.crept and change * abs(old) <= self._wanders()):
+            self.crept = 0.0
+            return None
+        self.crept = max(self.crept, change)
+        return old, recent
+
+    def _drifted(self, old: float, recent: float, news: bool) -> Noisy:
+        change = self._worse_by(old, recent)
+        words = f"{change_in_words(change)}, little by little since the last release"
+        verdict = Verdict(word="regressed", sentence=words, name="drift")
+        first = self.anchor
+        return Noisy(verdict=verdict, state="detected", against=first[0], first_bad=first[-1], news=news, worse_at=first[-1], levels=(old, recent))  # fmt: skip
+
+    def segments(self) -> list[Segment]:
+        """All segments, the present one last; each lasts until the next begins."""
+        if not self.now.places:
+            return []
+        level, noise, _ = self._level()
+        first = self.now.where.best if self.now.where else self.start
+        last = Segment(first, self.until - 1, level, noise, self.now.standing, self.now.where)
+        ends = [segment.first - 1 for segment in [*self.over, last][1:]]
+        return [
+            dataclasses.replace(segment, last=end) for segment, end in zip(self.over, ends, strict=True)
+        ] + [last]

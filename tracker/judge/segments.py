@@ -1,0 +1,120 @@
+"""Level segments of a noisy series, and where one begins: how probable each night is to be its first.
+
+A boundary is found by least squares over two levels, told that there is one step (as Otava and asv split, and as
+rustc-perf's issue 1339 asks: noise is taken inside the two segments, never across). With the levels and the noise
+integrated out, a split after k of n nights is as probable as (k (n − k))^−½ SSE^−(n−2)/2 (Smith 1975). Nights far off
+their level count as if they lay 3.5 noises off, and nights that remember each other count for fewer.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from spook_tracker.tracker.document.middle import median
+
+Standing = Literal["usual", "red", "accepted", "recovered", "flaky"]
+
+NORMAL = 1.4826  # standard deviations in a median absolute deviation
+FAR = 3.5  # noises: more of one night is an accident
+SURE = 0.998  # of the accused range: its nights hold the true one with this probability
+
+
+@dataclass(frozen=True, slots=True)
+class Boundary:
+    """The first nights that a segment may have, as places, and how probable each is; the sum is `SURE` at least."""
+
+    places: tuple[int, ...]
+    probabilities: tuple[float, ...]
+
+    @property
+    def best(self) -> int:
+        return self.places[self.probabilities.index(max(self.probabilities))]
+
+    @property
+    def probability(self) -> float:
+        """That the best is right."""
+        return max(self.probabilities)
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """Nights of one level: `first` and `last` are places, `spread` the relative noise inside it."""
+
+    first: int
+    last: int
+    level: float
+    spread: float
+    standing: Standing
+    boundary: Boundary | None = None  # None: nothing is known before it
+
+
+def spread_of(values: Sequence[float], level: float) -> float:
+    """The relative standard deviation that the median deviation from the level tells."""
+    return NORMAL * median([abs(value - level) for value in values]) / abs(level) if values and level else 0.0
+
+
+def boundary(places: Sequence[int], costs: Sequence[float], after: int) -> Boundary:
+    """Where the level changed among these nights, of which the last `after` lie behind it as far as is known."""
+    import numpy as np
+
+    count = len(costs)
+    values = np.array(costs)
+    split = min(max(1, count - after), count - 1)
+    low, high = float(np.median(values[:split])), float(np.median(values[split:]))
+    off = np.concatenate([values[:split] - low, values[split:] - high])
+    noise = NORMAL * float(np.median(np.abs(off)))
+    noise = max(noise, 1e-6 * max(abs(low), abs(high)))
+    values = np.clip(values, min(low, high) - FAR * noise, max(low, high) + FAR * noise)
+    before = np.arange(1, count)
+    sums, squares = np.cumsum(values)[:-1], float(values @ values)
+    rest = float(np.sum(values)) - sums
+    left = squares - sums**2 / before - rest**2 / (count - before)
+    left = np.maximum(left, count * (0.1 * noise) ** 2)
+    best = int(np.argmin(left))
+    memory = _memory(
+        np.concatenate(
+            [values[: best + 1] - values[: best + 1].mean(), values[best + 1 :] - values[best + 1 :].mean()]
+        )
+    )
+    freedom = max(1.0, (count - 2) * (1.0 - memory) / (1.0 + memory))
+    log = -0.5 * freedom * np.log(left / left[best]) - 0.5 * np.log(before * (count - before))
+    weight = np.exp(log - np.max(log))
+    weight /= np.sum(weight)
+    order = np.argsort(-weight)
+    needed = order[: int(np.searchsorted(np.cumsum(weight[order]), SURE)) + 1]
+    first, last = int(needed.min()), int(needed.max())
+    return Boundary(
+        tuple(places[i + 1] for i in range(first, last + 1)), tuple(map(float, weight[first : last + 1]))
+    )
+
+
+def _memory(off: object) -> float:
+    """Autocorrelation of deviations from one night to the next where it is told from chance, else none."""
+    import numpy as np
+
+    values = np.asarray(off)
+    total = float(values @ values)
+    found = float(values[1:] @ values[:-1]) / total if total else 0.0
+    return min(found, 0.9) if found > 2.6 / math.sqrt(len(values)) else 0.0
+
+
+def inner_split(costs: Sequence[float], remembered: float, fewest: int = 8) -> int | None:
+    """Where nights of one segment are of two: the largest rank statistic over places (Pettitt 1979); None if of one.
+
+    `remembered` says how many nights count for one.
+    """
+    import numpy as np
+
+    count = len(costs)
+    if count < 2 * fewest:
+        return None
+    values = np.array(costs)
+    _, which, counts = np.unique(values, return_inverse=True, return_counts=True)
+    ranks = (np.cumsum(counts) - 0.5 * (counts - 1.0))[which]  # equal values share theirs
+    n = np.arange(fewest, count - fewest + 1)
+    sums = np.cumsum(ranks)[n - 1]
+    off = np.abs(sums - 0.5 * n * (count + 1)) / np.sqrt(n * (count - n) * (count + 1) / 12.0)
+    return int(n[np.argmax(off)]) if float(np.max(off)) > 4.5 / math.sqrt(remembered) else None
