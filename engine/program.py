@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import os
 import threading
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -42,6 +44,14 @@ class NativeProgram(Protocol):
     @property
     def stages(self) -> list[str]: ...
     def run(self, steps: int, time_limit: float, timed: bool) -> dict[str, Any]: ...
+
+
+def _memory() -> float:
+    """Bytes of memory there are; without limit where the system does not say."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
+    except (AttributeError, OSError, ValueError):
+        return math.inf
 
 
 def table(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
@@ -137,9 +147,26 @@ class Program:
         for name, what in self._observe.items():
             if max(what.first, what.last or 0) > steps:
                 raise MethodError(f"observe {name!r}: its samples end beyond the last step, {steps}")
+        self._fit_memory(steps)
         with self._running:
             report = self._native.run(steps, limit, time_stages)
         return self.result(report, time_limit)
+
+    def _fit_memory(self, steps: int) -> None:
+        """Refuse traces that no memory of this machine can hold, before a run fails in the middle for them."""
+        sizes = {}
+        for (name, what), shape in zip(self._observe.items(), self._shapes, strict=True):
+            if isinstance(what, Trace):
+                last = steps if what.last is None else what.last
+                sizes[name] = 8 * math.prod(shape) * max(0, (last - what.first) // what.every + 1)  # bytes
+        needed, memory = sum(sizes.values()), _memory()
+        if needed <= memory:
+            return
+        name = max(sizes, key=lambda one: sizes[one])
+        raise MethodError(
+            f"observe {name!r}: traces of {steps} steps are {needed / 2**30:.3g} GiB, and this machine has "
+            f"{memory / 2**30:.3g}; take every n-th sample (every=), a part (first=, last=), or Final, Maximum, Mean, ..."
+        )
 
     @property
     def native(self) -> Any:

@@ -211,3 +211,25 @@ def test_a_sphere_rolls_down_a_slope_with_five_sevenths_of_the_pull() -> None:
 
     assert v[:, 0] == pytest.approx(5.0 / 7.0 * G * math.sin(tilt) * H * np.arange(121), abs=1e-8)
     assert force[0] == pytest.approx(-2.0 / 7.0 * MASS * G * math.sin(tilt), rel=1e-6)
+
+
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
+@pytest.mark.parametrize("edge", [(1.0, 1.0, 1.0), (1.0, 1.0, 0.1)])
+def test_the_box_never_gives_more_than_its_corners(edge: tuple[float, float, float], solver: str) -> None:
+    """Pulled along a diagonal down a slope steeper than µ: √2 µ N, also where a corner carries nothing and lifts."""
+    mu, tilt = 0.5, math.atan(0.9)
+    material = Material(friction=mu)
+    bodies = (
+        RigidBody(name="p", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=material),
+        RigidBody(name="b", mass=1.0, shape=Box(edge), position=(0.0, 0.0, 0.5 * edge[2]), material=material),
+    )
+    down = 10.0 * math.sin(tilt) * math.sqrt(0.5)
+    force = simulate(
+        Scene(bodies=bodies, gravity=(-down, -down, -10.0 * math.cos(tilt))),
+        time_step=1 / 60,
+        steps=60,
+        method=Method(friction="box", solver=solver),
+        observe={"f": Trace(quantity=ContactForce("b"))},
+    )["f"][1:]
+
+    assert np.all(np.hypot(force[:, 0], force[:, 1]) <= math.sqrt(2.0) * mu * force[:, 2] * (1.0 + 1e-9))

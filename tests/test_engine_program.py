@@ -207,6 +207,18 @@ def test_traces_come_with_their_times() -> None:
     assert result.sample_times["x"].tolist() == [0.5, 2.0, 3.5]
 
 
+@pytest.mark.parametrize("steps", [10**15, 10**12])
+def test_a_trace_that_no_memory_holds_is_refused_before_the_run(steps: int) -> None:
+    scene = Scene(bodies=(Particle(name="p", mass=1.0, position=(0.0, 0.0, 0.0)),))
+    with pytest.raises(MethodError, match=r"observe 'p'.* GiB, and this machine has .*every="):
+        simulate(
+            scene,
+            time_step=1e-3,
+            steps=steps,
+            observe={"v": Trace(quantity=Position(), every=10**9), "p": Trace(quantity=Position())},
+        )
+
+
 def test_half_step_velocities_read_the_velocity_of_the_sample() -> None:
     """Free fall is then exact: positions and velocities, at the start, within and at the end."""
     falling = Scene(bodies=(body(),), gravity=GRAVITY)

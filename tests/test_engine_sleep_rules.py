@@ -12,12 +12,16 @@ from spook_tracker.engine import (
     WORLD,
     Box,
     ConstraintForce,
+    Distance,
     Hinge,
     JointSpring,
     Load,
     Lock,
     Material,
+    Method,
     Motor,
+    Plane,
+    Position,
     Prismatic,
     Ramp,
     RigidBody,
@@ -25,7 +29,9 @@ from spook_tracker.engine import (
     Sinusoid,
     Sphere,
     Spring,
+    Trace,
     Wire,
+    simulate,
 )
 from tests.sleep_scenes import (
     FLOOR,
@@ -283,3 +289,31 @@ def test_what_fell_asleep_turning_slowly_wakes_without_that_turn() -> None:
     assert asleep(run) == 0
     assert run.state["turns"][7] == pytest.approx(0.1, rel=1e-12)
     assert not run.state["turns"][10:].any()
+
+
+@pytest.mark.parametrize("hung", [False, True])
+def test_what_begins_to_fall_slowly_is_not_asleep(hung: bool) -> None:
+    """On a small moon a ball stays below sleep_speed for seconds: thrown up by 1 cm/s, or let go on a string."""
+    gravity, seconds = 0.01, 5.0
+    ball = RigidBody(
+        name="ball",
+        mass=1.0,
+        position=(0.0, 0.0, 1.0),
+        shape=Sphere(0.1),
+        velocity=(0.0, 0.0, 0.0 if hung else 0.01),
+    )
+    floor = RigidBody(name="floor", position=(0.0, 0.0, 0.0), shape=Plane(), motion="static")
+    rod = Distance(name="rod", between=((1.0, 0.0, 1.0), "ball"), compliance=0.0)
+    result = simulate(
+        Scene(bodies=(ball, floor), constraints=(rod,) if hung else (), gravity=(0.0, 0.0, -gravity)),
+        time_step=1 / 60,
+        duration=seconds,
+        method=Method(sleep_speed=0.02),
+        observe={"x": Trace(quantity=Position("ball"))},
+    )
+    fallen = 1.0 - result["x"][-1, 2]
+
+    if hung:  # a quarter circle begins as a fall
+        assert fallen == pytest.approx(0.5 * gravity * seconds**2, rel=0.01)
+    else:
+        assert fallen == pytest.approx(0.5 * gravity * seconds**2 - 0.01 * seconds, abs=1e-3)

@@ -108,7 +108,7 @@ void ContactStage::order_points() {
     for (Point& point : points_) {
         while (old < state_.cache.size() && state_.cache[old].contact.key < point.contact.key) ++old;
         if (old == state_.cache.size() || state_.cache[old].contact.key != point.contact.key) continue;
-        point.before = state_.cache[old].normal;
+        point.before = std::max(0.0, state_.cache[old].normal);  // what carries nothing may be rounded below it
         point.compression_before = state_.cache[old].compression;
         if (point.solved) continue;
         std::copy_n(state_.cache[old].tangent, 2, point.tangents);

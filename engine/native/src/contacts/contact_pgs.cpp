@@ -110,7 +110,7 @@ void ContactStage::take_in(std::size_t known) {
             std::lower_bound(state_.cache.begin(), state_.cache.end(), point.contact.key,
                              [](const CachedContact& t, std::uint64_t key) { return t.contact.key < key; });
         if (old == state_.cache.end() || old->contact.key != point.contact.key) continue;
-        point.before = old->normal;
+        point.before = std::max(0.0, old->normal);
         point.compression_before = old->compression;
         std::copy_n(old->tangent, 2, point.tangents);
     }

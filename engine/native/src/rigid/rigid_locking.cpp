@@ -16,6 +16,7 @@ namespace spook {
 namespace {
 
 constexpr double NEARLY = 1e-4;  // of a row's diagonal: an angle of 1e-2 between rows
+constexpr double FEW = 10.0;     // joints of a loop: rows of longer ones move each other by less and less, as 1/n²
 constexpr std::int64_t SOON = 8,
                        LATE = 64;  // steps to the next look; and where half of the motion goes in one
 constexpr double LITTLE = 1e-2;    // of what is too much: then the next look has twice the time
@@ -113,7 +114,8 @@ void RigidSystem::judge_loops() {
         take_probe(loop, 0.0);
         loop.probe.clear_counters();
         loop.may_lock = false;
-        if (!loop.probe.factor(NEARLY)) continue;
+        const double shorter = std::min(1.0, FEW / static_cast<double>(loop.blocks.size()));
+        if (!loop.probe.factor(NEARLY * shorter * shorter)) continue;
         const auto redundant = static_cast<std::int64_t>(loop.probe.counters().floored_pivots);
         const auto rows = static_cast<std::int64_t>(loop.weakness.size());
         loop.may_lock = redundant > 0 && loop.probe.unknowns() - 2 * rows + redundant > 0;

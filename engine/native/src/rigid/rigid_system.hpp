@@ -209,7 +209,7 @@ private:
     void mark_moving(int body);
     void wake_joint(int joint);
     void note_places();
-    double pace(int body) const noexcept;
+    bool still(int body) const noexcept;
     void sleep();
 
     // rigid_plane.cpp: steps by numbers of a plane
@@ -398,10 +398,10 @@ private:
     PivotSolver holding_pivot_;
     SleepRules sleep_rules_;
     struct Place {
-        Vec3 displacement;
+        Vec3 displacement, velocity;
         Quat turn;
     };
-    std::vector<Place> start_places_;                       // per body: where it was as the step began
+    std::vector<Place> start_places_;                       // per body: where it was, and how fast, as the step began
     double residual_ = 0.0, residual_before_waking_ = 0.0;  // largest an iterative solve stopped at, m/s
     // Beyond plain SPOOK; all per row of matrix_ unless said otherwise.
     bool composed_ = false, half_step_ = false, stiff_ = false, velocities_seen_ = false;

@@ -2,8 +2,8 @@
 //
 // Bodies that are connected by contacts, joints or springs are an island; what does not move by itself joins none. An
 // island whose bodies all were slower than the method's sleep_speed, |v| + |w| r and as measured by where they got,
-// for so many steps in a row falls asleep: velocities zero, places as they are to the last bit, forces to be read as
-// they were. It takes no part in a step but for being met: it stays in the search for pairs of those that are awake,
+// for so many steps in a row, half of their load held, falls asleep: velocities zero, places as they are to the last bit,
+// forces to be read as they were. It takes no part in a step but for being met: it stays in the search for pairs of those that are awake,
 // at rest. Whatever gets a point with a sleeper, or moves what it touches or is attached to, wakes its island, and the
 // velocities of that step are found anew: nothing was moved yet. Falling asleep takes the kinetic energy that was left,
 // and lying there neither takes nor gives any.
@@ -102,18 +102,25 @@ void RigidSystem::keep_jacobians() {
 
 /// Where bodies are as a step begins.
 void RigidSystem::note_places() {
-    for (const int i : constrained_) start_places_[i] = {live_.bodies[i].displacement, live_.bodies[i].turn};
+    for (const int i : constrained_) {
+        start_places_[i].displacement = live_.bodies[i].displacement;
+        start_places_[i].turn = live_.bodies[i].turn;
+    }
 }
 
-/// How fast a body's surface was in the step: by its velocities, or by where it got if that is more, m/s.
-double RigidSystem::pace(int i) const noexcept {
+/// Whether a body's surface was slower in the step than what sleeps may be, by its velocities and by where it got [m/s]; and
+/// at least half of its load was held: what falls is slow at first, and not at rest.
+bool RigidSystem::still(int i) const noexcept {
     const BodyState& s = live_.bodies[i];
-    const double way = norm(s.displacement - start_places_[i].displacement) / h_;
-    double speed = std::max(norm(s.velocity), way);
-    if (constants_[i].particle) return speed;
-    const Quat turn = s.turn * conjugate(start_places_[i].turn);
+    const auto& [displacement, velocity, start_turn] = start_places_[i];
+    const Vec3 load = h_ * acceleration_[i], gained = s.velocity - velocity;
+    if (dot(gained, load) > 0.5 * dot(load, load)) return false;
+    const double way = norm(s.displacement - displacement) / h_;
+    const double speed = std::max(norm(s.velocity), way);
+    if (constants_[i].particle) return speed < method_.sleep_speed;
+    const Quat turn = s.turn * conjugate(start_turn);
     const double turned = 2.0 * norm(Vec3{turn.x, turn.y, turn.z}) / h_;
-    return speed + sleep_rules_.reach[i] * std::max(norm(s.angular_velocity), turned);
+    return speed + sleep_rules_.reach[i] * std::max(norm(s.angular_velocity), turned) < method_.sleep_speed;
 }
 
 /// The end of a step: what was met by a displaced body is awake, and islands that have been at rest fall asleep.
@@ -126,8 +133,8 @@ void RigidSystem::sleep() {
     bool some = false;
     for (const int i : constrained_) {
         if (asleep(i)) continue;
-        const bool still = sleep_rules_.may[i] != 0 && !broke && pace(i) < method_.sleep_speed;
-        sleep.quiet[i] = still ? std::min(sleep.quiet[i] + 1, sleep_rules_.after) : 0;
+        const bool quiet = sleep_rules_.may[i] != 0 && !broke && still(i);
+        sleep.quiet[i] = quiet ? std::min(sleep.quiet[i] + 1, sleep_rules_.after) : 0;
         some = some || sleep.quiet[i] == sleep_rules_.after;
     }
     if (!some) return;

@@ -61,6 +61,8 @@ void RigidSystem::begin_velocities() {
     if (half_step_)
         for (int i = 0; i < bodies(); ++i)
             live_.before[i] = {live_.bodies[i].velocity, live_.bodies[i].angular_momentum};
+    if (sleep_rules_.on())
+        for (const int i : constrained_) start_places_[i].velocity = live_.bodies[i].velocity;
     if (!load_follows_.empty() || !drives_.empty()) follow_time();
 }
 
