@@ -72,7 +72,7 @@ def view(chart: Chart, *, table: bool = True) -> View:
     every = 0
     lines = [line for line in chart.lines if line.style != "limit" and not line.waits] if table else []
     if lines:
-        columns = ("line", chart.x_label, chart.y_label)
+        columns = ("line", chart.x_label, chart.y_label or "value")
         points = [(line, i) for line in lines for i in range(len(line.x))]
         every = math.ceil(len(points) / TABLE_ROWS) if len(points) > TABLE_ROWS else 0
         labels = dict(chart.x_ticks)

@@ -166,7 +166,7 @@ def describe(chart: Chart) -> str:
     """One sentence for readers who cannot see the picture."""
     names = [line.name for line in chart.lines if not line.quiet]
     shown = "; ".join(clean(name) for name in names[:8]) + ("; …" if len(names) > 8 else "")
-    return f"{clean(chart.y_label)} against {clean(chart.x_label)}. Lines: {shown}."
+    return f"{clean(chart.y_label) or 'value'} against {clean(chart.x_label)}. Lines: {shown}."
 
 
 def sparkline(
