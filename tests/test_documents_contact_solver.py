@@ -31,7 +31,7 @@ def test_a_stack_at_rest_is_factored_as_often_as_is_said() -> None:
 @pytest.mark.parametrize(("method", "least", "most"), [(PLAIN, 0.0, 1e-8), (pile.SWEEPS, 1e-2, 0.1)])
 def test_spheres_are_solved_as_far_as_is_said(method: Method, least: float, most: float) -> None:
     assert "1000 dropped spheres are solved in each of 240 steps to less than 1e-8 m/s" in SAID
-    assert "fifty sweeps leave up to a tenth of a metre a second" in SAID
+    assert "fifty iterations leave up to a tenth of a metre a second" in SAID
 
     result = simulate(pile.scene(), time_step=pile.TIME_STEP, steps=STEPS, method=method)
 
