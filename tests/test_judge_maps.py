@@ -215,7 +215,7 @@ def test_a_map_given_up_is_accepted_until_its_day_and_red_after_it() -> None:
     given = Accepted(series=KEY, low=0.0, high=0.0, who="A", why="w", removed=True)
     assert lost(runs, (given,)) is None
     assert not causes_of(book(DocumentHistory(runs), (given,)))
-    over = replace(given, until=date(2026, 10, 2))
+    over = replace(given, until=date(2025, 10, 2))
     assert lost(runs[:2], (over,)) is None
     assert lost(runs, (over,)) == between(runs[0], runs[1], runs[2])
 

@@ -70,7 +70,7 @@ def beside_run_times(changes: Sequence[Change], before: Samples, after: Samples)
     for change in changes:
         if change.kind in TIMES and change.role != EXPLAINING:
             counted = _instructions(change, before, after)
-            if parts := [*counted, *why.get((change.test, change.configuration), ())]:
+            if parts := [*counted, *sorted(why.get((change.test, change.configuration), ()))]:
                 change = msgspec.structs.replace(change, sentence=f"{change.sentence}; {', '.join(parts)}")
         told.append(change)
     return told
@@ -109,7 +109,7 @@ def beside_findings(findings: Sequence[Finding]) -> list[Finding]:
         timed = definition is not None and definition.kind == "time" and definition.role != EXPLAINING
         parts = why.get((definition.test, definition.configuration)) if timed and definition else None
         if parts:
-            sentence = f"{finding.verdict.sentence}; {', '.join(parts)}"
+            sentence = f"{finding.verdict.sentence}; {', '.join(sorted(parts))}"
             finding = replaced(finding, verdict=msgspec.structs.replace(finding.verdict, sentence=sentence))
         told.append(finding)
     return told
