@@ -163,7 +163,7 @@ def test_the_hover_text_of_plotly_is_inert() -> None:
     assert "<" not in trace["name"]
     assert trace["hoverinfo"] == "text"
     assert "hovertemplate" not in trace
-    assert "<a" not in trace["text"][0]
+    assert "<a" not in trace["hovertext"][0]
 
 
 @pytest.mark.parametrize(("low", "high"), [(2.7e-4, 1.2e-3), (1.5e-6, 8.8e-6), (3.1, 3.9), (2e-9, 9e3)])

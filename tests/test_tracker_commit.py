@@ -3,6 +3,7 @@
 import subprocess
 from types import SimpleNamespace
 
+import msgspec
 import pytest
 
 from spook_tracker.engine.build_info import BuildInfo
@@ -80,7 +81,7 @@ def test_a_tree_edited_after_the_build_is_not_recorded_as_the_commit_that_was_bu
 
 
 def test_both_are_stored_and_a_build_without_them_keeps_the_identity_it_had():
-    bare = engine(3)
+    bare = msgspec.structs.replace(engine(3), commit_time="2026-10-03T22:17:00+00:00")
     told = EngineVersion(
         **{f: getattr(bare, f) for f in bare.__struct_fields__} | {"subject": SUBJECT, "author": "Em"}
     )

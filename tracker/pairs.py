@@ -40,7 +40,7 @@ from spook_tracker.tracker.measure.commits import CommitError
 
 Ask = Callable[[Sequence[str]], RunDocument]  # puts these tests, all if none are named, to a fresh process
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
-Told = Callable[[str], None]
+Line = Callable[[str], None]
 GONE = ("removed", "missing")  # what a second process would not bring back
 
 
@@ -91,7 +91,7 @@ def compare_by_pairs(
     by_old: Ask,
     accepted: Sequence[Accepted] = (),
     seed: str = "",
-    tell: Told = lambda line: None,
+    tell: Line = lambda line: None,
 ) -> CompareDocument:
     """The change against its base. `seed` draws the order of the processes. Raises what asking raises.
 

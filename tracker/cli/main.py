@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from pathlib import Path
 from typing import Any
 
@@ -447,7 +448,7 @@ def _measure(request: Any, engine: str, limit: float | None, catalogue: str, dat
 
 
 def _print_run(document: Any, everything: bool) -> None:
-    from spook_tracker.tracker.cli.console import say
+    from spook_tracker.tracker.cli.console import say, width
     from spook_tracker.tracker.cli.report_table import pass_table
 
     say(pass_table(document, everything))
@@ -456,7 +457,7 @@ def _print_run(document: Any, everything: bool) -> None:
         from spook_tracker.tracker.measure.instructions import why_not
 
         if why := why_not():
-            say(f"note: retired instructions are not counted: {why}")
+            say(textwrap.fill(f"note: retired instructions are not counted: {why}", width()))
 
 
 def _answered(document: Any) -> bool:

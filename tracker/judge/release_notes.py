@@ -161,8 +161,8 @@ def told(changes: Iterable[Change]) -> list[str]:
         Moved(
             metric=change.metric,
             unit=change.unit,
-            before=float("nan") if change.before is None else float(change.before),
-            after=float("nan") if change.after is None else float(change.after),
+            before=float("nan") if change.before is None else change.before,
+            after=float("nan") if change.after is None else change.after,
             severity=severity(change.sentence),
             became="" if change.before_outcome == change.after_outcome else change.sentence,
         )

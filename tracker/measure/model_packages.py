@@ -20,7 +20,7 @@ from spook_tracker.engine.model_reading import ModelError, Reading, read
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.tracker.measure.model_files import SUFFIXES, ModelFileError
 
-Word = Literal["model", "part", "refused", "runs", "fails"]
+LookedWord = Literal["model", "part", "refused", "runs", "fails"]
 PARTS = ("no model by itself", "part of other models", "nothing in", "begins with <")
 STEPS = 10  # that a model must take to be said to run
 LIMITS = crew.Limits(seconds=60.0, memory=4 << 30)
@@ -31,7 +31,7 @@ class Looked:
     """One file and what it is."""
 
     path: Path
-    word: Word
+    word: LookedWord
     sentence: str = ""
     format: str = ""
     bodies: int = 0
@@ -70,7 +70,7 @@ def loaded(paths: Sequence[Path], engine: str, workers: int = 2) -> Iterator[Loo
         yield Looked(path, "fails", answer.failure) if isinstance(answer, crew.Lost) else answer
 
 
-def _said(path: Path, reading: Reading, word: Word, sentence: str = "") -> Looked:
+def _said(path: Path, reading: Reading, word: LookedWord, sentence: str = "") -> Looked:
     return Looked(path, word, sentence, reading.format, reading.bodies, len(reading.files))
 
 
