@@ -37,7 +37,7 @@ Better = Literal["smaller_magnitude", "larger", "smaller", "inside"]
 Role = Literal["gate", "companion", "reported", "explaining"]
 LimitKind = Literal[
     "physical",  # printed, or about the world alone: an ideal engine keeps it, and any engine is held to it
-    "method",  # what the method the question was written for owes, in errors or in rounding, and nobody else
+    "method",  # what the method the question was written for owes, in errors or in rounding, and no other
 ]
 
 

@@ -46,7 +46,7 @@ def elsewhere(
 
 
 def resident() -> float:
-    """Memory this process has now [MB]; 0 where nobody says."""
+    """Memory this process has now [MB]; 0 where it is not known."""
     try:
         pages = int(Path("/proc/self/statm").read_text().split()[1])
     except OSError:
@@ -244,7 +244,7 @@ class _Calm:
 
 
 def _answer(module: str) -> None:
-    """The other end of `elsewhere`; what an engine prints goes where it disturbs nobody."""
+    """The other end of `elsewhere`; what an engine prints goes where it disturbs nothing."""
     _end_with_parent()
     answers = os.dup(1)
     os.dup2(2, 1)
