@@ -108,7 +108,8 @@ void ContactStage::order_points() {
     for (Point& point : points_) {
         while (old < state_.cache.size() && state_.cache[old].contact.key < point.contact.key) ++old;
         if (old == state_.cache.size() || state_.cache[old].contact.key != point.contact.key) continue;
-        point.before = std::max(0.0, state_.cache[old].normal);  // what carries nothing may be rounded below it
+        // What carries nothing may be rounded below it.
+        point.before = std::max(0.0, state_.cache[old].normal);
         point.compression_before = state_.cache[old].compression;
         if (point.solved) continue;
         std::copy_n(state_.cache[old].tangent, 2, point.tangents);

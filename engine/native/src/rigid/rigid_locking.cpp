@@ -16,7 +16,8 @@ namespace spook {
 namespace {
 
 constexpr double NEARLY = 1e-4;  // of a row's diagonal: an angle of 1e-2 between rows
-constexpr double FEW = 10.0;     // joints of a loop: rows of longer ones move each other by less and less, as 1/n²
+// Joints of a loop: rows of longer ones move each other by less and less, as 1/n².
+constexpr double FEW = 10.0;
 constexpr std::int64_t SOON = 8,
                        LATE = 64;  // steps to the next look; and where half of the motion goes in one
 constexpr double LITTLE = 1e-2;    // of what is too much: then the next look has twice the time

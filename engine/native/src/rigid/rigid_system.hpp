@@ -401,7 +401,7 @@ private:
         Vec3 displacement, velocity;
         Quat turn;
     };
-    std::vector<Place> start_places_;                       // per body: where it was, and how fast, as the step began
+    std::vector<Place> start_places_;  // per body: where it was, and how fast, as the step began
     double residual_ = 0.0, residual_before_waking_ = 0.0;  // largest an iterative solve stopped at, m/s
     // Beyond plain SPOOK; all per row of matrix_ unless said otherwise.
     bool composed_ = false, half_step_ = false, stiff_ = false, velocities_seen_ = false;
