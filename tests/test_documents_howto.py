@@ -45,6 +45,8 @@ ELSEWHERE = {  # what asks for another engine, a server, or minutes, and the tes
     "tracker bisect throw": "tests/test_tracker_builds.py",
     "tracker backfill v1.0..HEAD": "tests/test_tracker_builds.py",
     "tracker import results.json": "tests/test_tracker_outside.py",
+    "tracker import results": "tests/test_tracker_other_tools.py",
+    'tracker import nightly/*.jsonl --engine gravel --column run_time=s --column "step.*=us"': "tests/test_tracker_imports.py",
     "tracker db partition": "tests/test_tracker_partition.py",
 }
 CLUSTER = (
@@ -102,6 +104,7 @@ def test_every_line_of_the_pages_runs_or_names_the_test_that_runs_it(team: Path)
         "choose-an-engine.md",
         "own-engine.md",
         "own-commits.md",
+        "other-tools.md",
         "upgrade.md",
     ]
     assert sorted(pages) == sorted(page.name for page in (DOCS / "how-to").glob("*.md"))

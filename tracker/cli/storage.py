@@ -63,49 +63,46 @@ def export(versions: tuple[str, ...], out: Path | None, form: str, database: str
 @click.option(
     "--machine", default="", metavar="NAME", help="Of other tools' files: the machine they are compared on."
 )
+@click.option(
+    "--branch", default="", metavar="NAME", help="Of other tools' files: only runs of commits on this branch."
+)
+@click.option(
+    "--column",
+    "columns",
+    multiple=True,
+    metavar="NAME=MEANING",
+    help="Of JSON lines and CSV: commit, started, test, metric, value, unit, parameter ...; a unit (s, B, steps/s); or -. Repeatable.",
+)
 @database_option
-def import_files(files: tuple[Path, ...], engine: str, machine: str, database: str) -> None:
+def import_files(
+    files: tuple[Path, ...], engine: str, machine: str, branch: str, columns: tuple[str, ...], database: str
+) -> None:
     """Record runs from JSON documents, whole or in short form; what is there already is left as it is.
 
     Files of pytest-benchmark, asv, Google Benchmark and github-action-benchmark are taken as run times, and asv's folder
-    of results, or the repository that holds it, as it is. The compressed files of `tracker export --format months`
-    come in, too.
+    of results, or the repository that holds it, as it is; so are records of any tool, as JSON lines or CSV, whose columns
+    are given a meaning. The compressed files of `tracker export --format months` come in, too.
     """
+    from spook_tracker.tracker import importing
     from spook_tracker.tracker.measure.other_folders import files_in
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.months import import_months, is_month
-    from spook_tracker.tracker.store.record import record
     from spook_tracker.tracker.store.transfer import import_files as read_in
 
     files = tuple(file for given in files for file in (files_in(given) if given.is_dir() else (given,)))
-    short = _short(files, engine, machine)
+    found = importing.read(files, engine, machine, branch, columns)
     months = [file for file in files if is_month(file)]
     with session_on(database) as session:
-        done = read_in(session, [file for file in files if file not in short and file not in months])
-        documents = [document for runs in short.values() for document in runs]
-        new = sum(record(session, document) for document in documents)
+        done = read_in(session, [file for file in files if file not in found.files and file not in months])
+        new, there = importing.record(session, found)
         fresh, known = import_months(session, months)
-    stored, present = len(done.stored) + new + fresh, len(done.present) + len(documents) - new + known
+    stored, present = len(done.stored) + new + fresh, len(done.present) + there + known
     click.echo(f"{stored} runs recorded, {present} were there already")
-
-
-def _short(files: tuple[Path, ...], engine: str, machine: str) -> dict[Path, tuple[Any, ...]]:
-    """The files that are runs in short form or another tool's, as whole documents."""
-    from spook_tracker.tracker.measure.other_folders import beside
-    from spook_tracker.tracker.measure.other_tools import of_other_tools
-    from spook_tracker.tracker.measure.short_form import is_short, whole
-    from spook_tracker.tracker.store.border import MAX_BYTES
-
-    found: dict[Path, tuple[Any, ...]] = {}
-    for file in files:
-        if not file.is_file() or file.stat().st_size > MAX_BYTES:
-            continue
-        content = file.read_bytes()
-        if (runs := of_other_tools(content, str(file), beside(file, engine, machine))) is not None:
-            found[file] = runs
-        elif is_short(content):  # only then: asv's files have results, too
-            found[file] = (whole(content, str(file)),)
-    return found
+    if found.unknown:
+        names = ", ".join(found.unknown)
+        click.echo(
+            f"no unit, so only kept as what may explain a change: {names}; say it with --column {found.unknown[0]}=UNIT"
+        )
 
 
 @click.command(epilog=example("tracker schema > run.schema.json"))

@@ -100,7 +100,7 @@ def beside_findings(findings: Sequence[Finding]) -> list[Finding]:
         if definition is None or judged is None or definition.role != EXPLAINING or judged.against is None:
             continue
         old, new = judged.against.sample.value, judged.night.sample.value
-        if old != new:
+        if old != new and math.isfinite(new):
             words = f"{_name(definition.metric)} {old:.6g} → {new:.6g}"
             why.setdefault((definition.test, definition.configuration), []).append(words)
     told = []

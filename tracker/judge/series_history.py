@@ -30,7 +30,7 @@ from spook_tracker.tracker.judge.explaining import calm_nights
 from spook_tracker.tracker.judge.lane import looked_at_again
 from spook_tracker.tracker.judge.run_times import judged_and_segments
 from spook_tracker.tracker.judge.segments import Segment
-from spook_tracker.tracker.judge.slower import Usual, only_followed
+from spook_tracker.tracker.judge.slower import Usual, by_outcome, only_followed
 from spook_tracker.tracker.judge.standing import NO_VALUE, standing
 from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict, judge, same_bits
 from spook_tracker.tracker.judge.vocabulary import Class, State
@@ -430,7 +430,9 @@ def _judge_times(
         lane = [history[place] for place in places]
         values = engines_own(lane)
         taken = [
-            acceptance(accepted, key, value, night_of(night.run)) if accepted else None
+            acceptance(accepted, key, value, night_of(night.run), night.sample.outcome == "missing")
+            if accepted
+            else None
             for night, value in zip(lane, values, strict=True)
         ]
         verdicts, segments = judged_and_segments(
@@ -444,6 +446,7 @@ def _judge_times(
         )
         level_of = {i: segment for segment in segments for i in range(segment.first, segment.last + 1)}
         for i, noisy in enumerate(verdicts):
+            noisy = noisy._replace(verdict=by_outcome(noisy.verdict, lane[i].sample))
             if noisy.state in ("detected", "suspected") and is_read_off(definition):
                 noisy = noisy._replace(
                     verdict=only_followed(noisy.verdict), state="green", first_bad=None, last_good=None

@@ -6,6 +6,7 @@ import math
 
 from msgspec.structs import replace
 
+from spook_tracker.tracker.document.run_document import Sample
 from spook_tracker.tracker.judge.verdict import Verdict
 
 LEAST = 0.01  # relative: no change of a time below is told, whatever the evidence
@@ -71,6 +72,17 @@ def slower(change: float, level: float, value: float, name: str) -> Verdict:
         name=name,
         decades=math.log10(abs(value / level)) if level and value else None,
     )
+
+
+def by_outcome(verdict: Verdict, sample: Sample) -> Verdict:
+    """The same, where a night without a number is called what became of it."""
+    if verdict.name != "not finite" or sample.outcome in ("value", "not_finite"):
+        return verdict
+    if sample.outcome == "missing":
+        return replace(verdict, word="missing", name="missing", sentence=sample.failure or verdict.sentence)
+    name = sample.outcome.replace("_", " ")
+    why = f": {sample.failure}" if sample.failure else ""
+    return replace(verdict, name=name, sentence=f"{name}{why}; {verdict.sentence}")
 
 
 def change_in_words(change: float) -> str:

@@ -1,9 +1,10 @@
-"""Folders of asv, as asv leaves them: which files hold results, and what the files beside them say about these."""
+"""What lies around a file of another tool: asv's folders as asv leaves them, and the repository one stands in."""
 
 from __future__ import annotations
 
 import json
 import re
+import subprocess
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -29,11 +30,29 @@ def files_in(folder: Path) -> tuple[Path, ...]:
     return tuple(found)
 
 
-def beside(file: Path, engine: str, machine: str) -> Beside:
+def beside(file: Path, engine: str, machine: str, branch: str) -> Beside:
     """What the files of asv around a result file say, and what the caller says."""
     results = file.parent.parent
-    project = _setting(results.parent / "asv.conf.json", "project")
-    return Beside(engine, machine, project, _benchmarks(results / "benchmarks.json"))
+    return Beside(
+        engine=engine,
+        machine=machine,
+        branch=branch,
+        commits=_commits(branch) if branch else {},
+        project=_setting(results.parent / "asv.conf.json", "project"),
+        benchmarks=_benchmarks(results / "benchmarks.json"),
+    )
+
+
+@lru_cache(maxsize=8)
+def _commits(branch: str) -> dict[str, bool]:
+    """The commits that the repository here knows, and whether each lies on the branch; none without a repository."""
+
+    def those(*words: str) -> list[str]:
+        done = subprocess.run(["git", "rev-list", *words, "--"], capture_output=True, text=True, check=False)
+        return done.stdout.split() if done.returncode == 0 else []
+
+    on_it = those(branch) or those(f"origin/{branch}")
+    return dict.fromkeys(those("--all"), False) | dict.fromkeys(on_it, True) if on_it else {}
 
 
 @lru_cache(maxsize=8)

@@ -12,7 +12,7 @@ import hashlib
 import itertools
 import json
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from typing import Any, Literal
@@ -21,7 +21,7 @@ import msgspec
 
 from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.document.json_form import Number
-from spook_tracker.tracker.document.run_document import RunDocument
+from spook_tracker.tracker.document.run_document import RunDocument, SeriesDefinition
 from spook_tracker.tracker.measure.short_form import ShortResult, ShortRun, document_of
 from spook_tracker.tracker.measure.units import Unit, unit_of
 
@@ -39,6 +39,8 @@ class Beside:
 
     engine: str = ""  # in place of the file's
     machine: str = ""  # in place of the file's
+    branch: str = ""  # the one whose runs are wanted
+    commits: Mapping[str, bool] = field(default_factory=dict)  # those git knows here: whether they lie on it
     project: str = ""  # asv.conf.json's
     benchmarks: Mapping[str, Any] = field(default_factory=dict)  # asv's benchmarks.json
 
@@ -57,8 +59,10 @@ def of_other_tools(content: bytes, origin: str, beside: Beside = NOTHING) -> tup
     if read is None:
         return None
     try:
-        runs = (_named(run, beside) for run in read(said, beside) if run.results)
-        return tuple(document_of(run, _identity(run), origin) for run in runs)
+        told = _branch_of(said)
+        return documents_of(((run, told) for run in read(said, beside) if run.results), beside, origin)
+    except DocumentError:
+        raise
     except (
         KeyError,
         TypeError,
@@ -73,6 +77,32 @@ def of_other_tools(content: bytes, origin: str, beside: Beside = NOTHING) -> tup
         raise DocumentError(
             f"{origin} looks like another tool's file but cannot be read as one ({words})"
         ) from None
+
+
+def documents_of(
+    runs: Iterable[tuple[ShortRun, str]], beside: Beside, origin: str
+) -> tuple[RunDocument, ...]:
+    """Runs, and the branch that the file says of each, as whole documents; those of other branches are left out."""
+    wanted = (_named(run, beside) for run, told in runs if _is_wanted(run, told, beside, origin))
+    return tuple(document_of(run, _identity(run), origin) for run in wanted)
+
+
+def _is_wanted(run: ShortRun, told: str, beside: Beside, origin: str) -> bool:
+    if not beside.branch:
+        return True
+    if told:
+        return told == beside.branch
+    if (lies := beside.commits.get(run.commit)) is None:
+        raise DocumentError(
+            f"{origin} does not say on which branch {run.version} was measured, and no repository here knows it"
+        )
+    return lies
+
+
+def _branch_of(said: Mapping[str, Any]) -> str:
+    """pytest-benchmark's; the others do not say."""
+    commit = said.get("commit_info")
+    return str(commit.get("branch") or "") if isinstance(commit, dict) else ""
 
 
 def _reader(said: Mapping[str, Any]) -> Callable[[Mapping[str, Any], Beside], Iterator[ShortRun]] | None:
@@ -153,11 +183,13 @@ def _asv(said: Mapping[str, Any], beside: Beside) -> Iterator[ShortRun]:
     results = []
     for name, row in said["results"].items():
         told = dict(zip(columns, row or (), strict=False))
-        cases = list(itertools.product(*(told.get("params") or ())))
+        cases = asv_cases(name, told)
         values = told.get("result") or [None] * len(cases)
         unit = _asv_unit(name, beside.benchmarks.get(name) or {})
-        for case, value in zip(cases, values, strict=True):
-            result = _sampled(f"{name}({', '.join(map(str, case))})" if case else name, value, unit)
+        for place, (case, value) in enumerate(zip(cases, values, strict=True)):
+            result = sampled(case, value, unit)
+            if result.seconds:
+                result = _repeated(result, told, place, unit.scale)
             if value is not None and math.isnan(float(value)):
                 result = msgspec.structs.replace(result, outcome="not_supported", failure="skipped by asv")
             results.append(
@@ -181,6 +213,35 @@ def _asv(said: Mapping[str, Any], beside: Beside) -> Iterator[ShortRun]:
         cores=cores,
         results=tuple(results),
     )
+
+
+def asv_cases(name: str, described: Mapping[str, Any]) -> list[str]:
+    """The tests of one benchmark: by the values of its parameters, as `asv show` names them."""
+    cases = itertools.product(*(described.get("params") or ()))
+    return [f"{name}({', '.join(map(str, case))})" if case else name for case in cases]
+
+
+def asv_series(name: str, described: Mapping[str, Any], configuration: str) -> SeriesDefinition:
+    """The series of a benchmark that asv lists and that has no result yet."""
+    result = msgspec.structs.replace(
+        sampled(name, None, _asv_unit(name, described)),
+        configuration=configuration,
+        definition=str(described.get("version") or ""),
+    )
+    run = ShortRun(engine="asv", version="none", results=(result,))
+    return document_of(run, "none", "asv's list").series[0]
+
+
+def _repeated(result: ShortResult, told: Mapping[str, Any], place: int, scale: float) -> ShortResult:
+    """The repeats behind a time where asv kept them, else its quartiles; the value stays the one that asv shows."""
+    of_case = {name: row[place] for name, row in told.items() if isinstance(row, list) and place < len(row)}
+    quartiles = of_case.get("stats_q_25"), result.value, of_case.get("stats_q_75")
+    kept: Sequence[Any] = of_case.get("samples") or (() if None in quartiles else quartiles)
+    seconds = tuple(float(one) * (1.0 if one is result.value else scale) for one in kept)
+    if not seconds or not all(math.isfinite(s) and s >= 0.0 for s in seconds):
+        return result
+    often = of_case.get("stats_number")
+    return msgspec.structs.replace(result, seconds=seconds, runs_per_repeat=int(often or 1))
 
 
 def _asv_unit(name: str, described: Mapping[str, Any]) -> Unit:
@@ -216,7 +277,8 @@ def _told_once(results: list[ShortResult]) -> tuple[ShortResult, ...]:
         name, number = one.test, 1
         while (before := found.get((one.test, one.metric))) is not None:
             if one.seconds and before.seconds:
-                one = msgspec.structs.replace(one, seconds=before.seconds + one.seconds)
+                seconds = before.seconds + one.seconds
+                one = msgspec.structs.replace(one, value=Number(min(seconds)), seconds=seconds)
                 break
             number += 1
             one = msgspec.structs.replace(one, test=f"{name} ({number})")
@@ -228,10 +290,10 @@ def _bench(one: Mapping[str, Any], better: Literal["smaller", "larger"] | None) 
     unit = unit_of(str(one.get("unit", "1")))
     if better:
         unit = msgspec.structs.replace(unit, better=better)
-    return _sampled(one["name"], one["value"], unit)
+    return sampled(one["name"], one["value"], unit)
 
 
-def _sampled(test: str, value: Any, unit: Unit) -> ShortResult:
+def sampled(test: str, value: Any, unit: Unit) -> ShortResult:
     """One value in its unit; what is no value, or no time, is this result's outcome alone."""
     metric = "run_time" if unit.name == "s" and unit.better == "smaller" else "value"
     number = math.nan if value is None else float(value) * unit.scale
@@ -252,7 +314,7 @@ def _sampled(test: str, value: Any, unit: Unit) -> ShortResult:
 def _timed(test: str, seconds: list[float]) -> ShortResult:
     """Run time of each repeat, s; none: it failed."""
     if seconds and all(math.isfinite(s) and s >= 0.0 for s in seconds):
-        return ShortResult(test=test, metric="run_time", seconds=tuple(seconds))
+        return ShortResult(test=test, metric="run_time", value=Number(min(seconds)), seconds=tuple(seconds))
     failure = _failed(seconds[0] if seconds else None)
     return ShortResult(test=test, metric="run_time", unit="s", better="smaller", noisy=True, **failure)
 

@@ -50,7 +50,10 @@ class ShortResult(Struct, frozen=True, kw_only=True):
     outcome: OutcomeClass = "value"
     explaining: bool = False  # says why a run time of its test changed, and is never red
     noisy: bool = False  # judged by statistics, as run times are, and not exactly
-    seconds: tuple[float, ...] = ()  # run time of each repeat; the value is the shortest, and noisy
+    seconds: tuple[
+        float, ...
+    ] = ()  # run time of each repeat; the value is noisy, and the shortest if not given
+    runs_per_repeat: int = 1
     failure: Text = ""
     description: Text = ""
     definition: Text = ""  # what was asked, in any words: values are compared only where it is the same
@@ -133,8 +136,8 @@ def _pair(result: ShortResult, origin: str) -> tuple[SeriesDefinition, Sample]:
     if any(not (math.isfinite(s) and s >= 0.0) for s in result.seconds):
         raise DocumentError(f"{origin}: {key}: seconds must be numbers that are not negative")
     if result.seconds:
-        smallest = Number(min(result.seconds))
-        result = msgspec.structs.replace(result, value=smallest, unit="s", better="smaller", noisy=True)
+        told = Number(min(result.seconds)) if result.value is None else result.value
+        result = msgspec.structs.replace(result, value=told, unit="s", better="smaller", noisy=True)
     if result.value is None and result.outcome in ("value", "unsettled", "out_of_limit"):
         raise DocumentError(f"{origin}: {key} has no value; say in its outcome what became of it")
     if isinstance(result.limit, tuple) != (result.better == "inside") and result.limit is not None:
@@ -177,7 +180,9 @@ def _pair(result: ShortResult, origin: str) -> tuple[SeriesDefinition, Sample]:
     outcome = "value" if result.outcome == "out_of_limit" else result.outcome
     sample = judged_sample(key, metric, Outcome(value, outcome, result.failure), Witness(_nothing))
     if result.seconds:
-        sample = msgspec.structs.replace(sample, timing=Timing(seconds=result.seconds, runs_per_repeat=1))
+        sample = msgspec.structs.replace(
+            sample, timing=Timing(seconds=result.seconds, runs_per_repeat=result.runs_per_repeat)
+        )
     return series, sample
 
 

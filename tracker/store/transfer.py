@@ -15,7 +15,7 @@ from pathlib import Path
 from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.document.errors import DocumentError
-from spook_tracker.tracker.document.json_form import readable
+from spook_tracker.tracker.document.json_form import encode, readable
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store.border import MAX_BYTES, checked, decoded
 from spook_tracker.tracker.store.history import A_DAY, History
@@ -88,6 +88,12 @@ def import_files(session: Session, paths: Iterable[Path]) -> Imported:
         for run, new in zip(runs, record_together(session, runs), strict=True):
             (stored if new else present).append(run.id)
     return Imported(tuple(stored), tuple(present))
+
+
+def record_all(session: Session, runs: Iterable[RunDocument]) -> list[bool]:
+    """Store runs that were made from other files, many in a transaction; whether each is new. DocumentError."""
+    whole = (decoded(encode(run), run.id) for run in runs)
+    return [new for together in _together(whole) for new in record_together(session, together)]
 
 
 def refuse_ahead(run: RunDocument, origin: str) -> None:

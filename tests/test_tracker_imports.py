@@ -1,0 +1,188 @@
+"""Folders as benchmark tools leave them, and records of any tool, come in by one command and lose nothing.
+
+The files in tests/data/tools are ours, in the form of real ones: names, numbers and commits are made up.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from spook_tracker.tracker.cli.main import main
+
+TOOLS = Path(__file__).parent / "data" / "tools"
+COLUMNS = ["--column", "run_time=s", "--column", "step=us", "--column", "step.*=us", "--column", "*_memory=B"]
+
+
+class Imported:
+    """A database of what was imported, and what the command said."""
+
+    def __init__(self, folder: Path, *words: Any) -> None:
+        self.folder = folder
+        self.said = self.tracker("import", *words)
+
+    def tracker(self, *words: Any, code: int = 0) -> str:
+        done = CliRunner().invoke(main, [*map(str, words), "--db", f"sqlite:///{self.folder}/x.db"])
+        assert done.exit_code == code, done.output
+        return str(done.output)
+
+    def runs(self) -> list[dict[str, Any]]:
+        self.tracker("export", "--out", self.folder / "out")
+        told = [json.loads(file.read_text()) for file in (self.folder / "out").glob("*.json")]
+        return sorted(told, key=lambda run: str(run["started"]))
+
+    def of(self, place: int) -> dict[str, Any]:
+        """Test and metric → its sample, in the run at that place."""
+        run = self.runs()[place]
+        named = {d["key"]: f"{d['test']} {d['metric']}" for d in run["series"]}
+        return {named[s["series"]]: s for s in run["samples"]}
+
+
+@pytest.mark.parametrize(
+    ("files", "options", "runs", "values", "missing"),
+    [
+        ("pytest-benchmark/*.json", [], 2, 2, 0),
+        ("google-benchmark", [], 1, 1, 0),
+        ("asv", [], 3, 13, 2),
+        ("github-action-benchmark/data.js", [], 3, 8, 1),
+        ("json-lines/*.jsonl", COLUMNS, 3, 30, 6),
+        ("csv/times.csv", ["--column", "solver=parameter"], 2, 4, 0),
+    ],
+)
+def test_every_form_comes_in_whole(
+    files: str, options: list[str], runs: int, values: int, missing: int, tmp_path: Path
+) -> None:
+    found = Imported(tmp_path, *options, *sorted(TOOLS.glob(files)))
+    told = [sample["outcome"] for run in found.runs() for sample in run["samples"]]
+
+    assert found.said.startswith(f"{runs} runs recorded, 0 were there already\n")
+    assert (told.count("value"), told.count("missing")) == (values, missing)
+    assert found.tracker("import", *options, *sorted(TOOLS.glob(files))).startswith("0 runs recorded")
+
+
+def test_asv_keeps_its_own_number_with_the_repeats_or_quartiles_behind_it(tmp_path: Path) -> None:
+    found = Imported(tmp_path, TOOLS / "asv").of(0)
+    kept, summed = (found[f"heap.Heap.time_step('{solver}') run_time"] for solver in ("direct", "iterative"))
+
+    assert (kept["value"], kept["timing"]["seconds"]) == (0.02, [0.0199, 0.02, 0.0202])
+    assert (summed["value"], summed["timing"]["seconds"]) == (0.01, [0.0099, 0.01, 0.0102])
+    assert (kept["timing"]["runs_per_repeat"], summed["timing"]["runs_per_repeat"]) == (1, 2)
+
+
+def test_what_a_list_names_and_no_result_answers_is_missing_by_name(tmp_path: Path) -> None:
+    found = Imported(tmp_path, TOOLS / "asv")
+    nights = [{name: s["outcome"] for name, s in found.of(i).items()} for i in range(3)]
+
+    assert nights[1]["heap.track_drift value"] == "crashed"
+    assert nights[2]["rope.time_rope run_time"] == "missing"
+    assert "rope.time_never run_time" not in nights[1] | nights[0], (
+        "the list is of today, and so is what it misses"
+    )
+    assert nights[2]["rope.time_never run_time"] == "missing"
+
+
+def test_a_benchmark_that_stops_while_others_go_on_is_missing_and_red_until_it_is_back(
+    tmp_path: Path,
+) -> None:
+    found = Imported(tmp_path, TOOLS / "github-action-benchmark" / "data.js")
+    told = found.tracker("judge", "latest", code=1)
+
+    assert "rope/default/run_time: missing" in told
+    assert "bad since 333333333333, last good 222222222222" in told
+    accepted = tmp_path / "accepted.toml"
+    accepted.write_text(
+        '[[accepted]]\nseries = "rope/*"\nremoved = true\nwho = "me"\nwhy = "asked as cord"\n'
+    )
+    found.tracker("judge", "latest", "--accepted", accepted)
+
+
+def test_it_is_missed_in_a_file_of_one_run_as_well(tmp_path: Path) -> None:
+    """pytest-benchmark writes a file a night: what was there before is what the history has."""
+    first, second = sorted((TOOLS / "pytest-benchmark").glob("*.json"))
+    said = json.loads(first.read_text())
+    also = [{**one, "fullname": f"{one['fullname']} again"} for one in said["benchmarks"]]
+    (tmp_path / "first.json").write_text(json.dumps({**said, "benchmarks": [*said["benchmarks"], *also]}))
+    found = Imported(tmp_path, tmp_path / "first.json")
+    found.tracker("import", second)
+
+    assert sorted(s["outcome"] for s in found.of(1).values()) == ["missing", "value"]
+
+
+def test_a_run_of_a_few_benchmarks_misses_none_of_the_others(tmp_path: Path) -> None:
+    said = json.loads((TOOLS / "github-action-benchmark" / "data.js").read_text().partition("=")[2])
+    said["entries"]["Gravel"][2]["benches"] = said["entries"]["Gravel"][2]["benches"][:1]
+    (tmp_path / "data.js").write_text("window.BENCHMARK_DATA = " + json.dumps(said))
+
+    assert len(Imported(tmp_path, tmp_path / "data.js").of(2)) == 1
+
+
+def test_records_of_several_files_are_one_run_a_commit(tmp_path: Path) -> None:
+    found = Imported(tmp_path, *COLUMNS, "--engine", "gravel", *(TOOLS / "json-lines").glob("*.jsonl"))
+    run = found.runs()[0]
+    told = {d["key"]: d for d in run["series"]}
+
+    assert {d["test"] for d in run["series"]} == {"humanoid", "gripper"}
+    assert (run["engine"]["name"], run["engine"]["git_hash"]) == ("gravel", "1" * 40)
+    assert told["humanoid/default/steps_per_second"]["better"] == "larger"
+    assert told["humanoid/default/step.solve"]["unit"] == "s"
+    assert found.of(0)["humanoid step.solve"]["value"] == pytest.approx(1.2e-4)
+
+
+def test_numbers_in_no_known_unit_explain_and_the_command_says_so(tmp_path: Path) -> None:
+    found = Imported(tmp_path, *COLUMNS, TOOLS / "json-lines" / "humanoid.jsonl")
+
+    assert "contacts_mean; say it with --column contacts_mean=UNIT" in found.said
+    assert {d["role"] for d in found.runs()[0]["series"] if d["metric"] == "contacts_mean"} == {"explaining"}
+
+
+def test_rows_of_one_commit_are_told_apart_by_a_parameter(tmp_path: Path) -> None:
+    found = Imported(tmp_path, "--column", "solver=parameter", TOOLS / "csv" / "times.csv")
+
+    assert found.of(0)["heap(solver=direct) run_time"]["value"] == pytest.approx(0.0205)
+    assert set(found.of(0)) == {"heap(solver=direct) run_time", "heap(solver=iterative) run_time"}
+
+
+def test_only_runs_of_a_branch(tmp_path: Path) -> None:
+    files = sorted((TOOLS / "pytest-benchmark").glob("*.json"))
+    found = Imported(tmp_path, "--branch", "main", *files)
+
+    assert found.said == "1 runs recorded, 0 were there already\n"
+    refused = found.tracker("import", "--branch", "main", TOOLS / "asv", code=2)
+    assert "does not say on which branch 1111111111 was measured" in refused
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "options", "words"),
+    [
+        ("a.jsonl", '{"x": 1}\n', [], "no column tells the commit or the version"),
+        ("a.jsonl", '{"commit": "a", "x": \n', [], "line 1"),
+        ("a.jsonl", "[1]\n[2]\n", [], "cannot be read as records"),
+        ("a.jsonl", "3\n", [], "record 1 is no JSON object"),
+        ("a.csv", "commit,x\na\n", [], "line 2 has not as many cells"),
+        ("a.csv", "commit,test,value,unit\na,t,fast,s\n", [], "value is 'fast' and no number"),
+        (
+            "a.csv",
+            "commit,x_s,day\na,1,2026-01-01\na,2,2026-01-01\n",
+            ["day=started"],
+            "a second value of a/x_s",
+        ),
+        ("a.csv", "commit,x\na,1\n", ["x"], "gives no column a meaning"),
+        ("a.csv", "commit,x\na,1\n", ["x=s,sideways"], "after the unit comes larger, smaller or explains"),
+        ("a.csv", "commit,x_s,at\na,1,1e300\n", ["at=started"], "is no moment that a calendar has"),
+    ],
+)
+def test_records_that_make_no_sense_are_one_sentence_and_nothing_is_stored(
+    name: str, content: str, options: list[str], words: str, tmp_path: Path
+) -> None:
+    (tmp_path / name).write_text(content)
+    columns = [word for option in options for word in ("--column", option)]
+    found = Imported.__new__(Imported)
+    found.folder = tmp_path
+    said = found.tracker("import", *columns, tmp_path / name, code=2)
+
+    assert words in said
+    assert said.count("\n") == 1

@@ -1,0 +1,75 @@
+"""Files of other tools into the history: told apart, read as whole documents, stored with what they lost."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from spook_tracker.tracker.document.run_document import RunDocument
+from spook_tracker.tracker.measure.disappeared import Listed, with_missing
+from spook_tracker.tracker.measure.other_folders import beside
+from spook_tracker.tracker.measure.other_tools import of_other_tools
+from spook_tracker.tracker.measure.record_tables import is_table, meanings, of_tables
+from spook_tracker.tracker.measure.short_form import is_short, whole
+from spook_tracker.tracker.store.border import MAX_BYTES
+from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.transfer import record_all
+
+
+@dataclass(frozen=True, slots=True)
+class Read:
+    """What files held that are no run documents of ours."""
+
+    files: frozenset[Path]  # those that were read here
+    short: tuple[RunDocument, ...]
+    others: tuple[tuple[RunDocument, Listed], ...]  # with what the tool says of its benchmarks
+    unknown: tuple[str, ...]  # columns of numbers in no known unit
+
+
+def read(
+    files: Iterable[Path], engine: str = "", machine: str = "", branch: str = "", columns: Sequence[str] = ()
+) -> Read:
+    """Runs in short form and of other tools, as whole documents; other files are left. DocumentError."""
+    told = meanings(columns)
+    seen: set[Path] = set()
+    short: list[RunDocument] = []
+    others: list[tuple[RunDocument, Listed]] = []
+    tables: dict[Path, bytes] = {}
+    for file in files:
+        if not file.is_file() or file.stat().st_size > MAX_BYTES:
+            continue
+        content = file.read_bytes()
+        around = beside(file, engine, machine, branch)
+        if is_table(file, content):
+            tables[file] = content
+        elif (runs := of_other_tools(content, str(file), around)) is not None:
+            listed = Listed(around.benchmarks, grids=b'"result_columns"' in content)
+            others += [(run, listed) for run in runs]
+        elif is_short(content):  # only then: asv's files have results, too
+            short.append(whole(content, str(file)))
+        else:
+            continue
+        seen.add(file)
+    found = of_tables(tables, told, beside(next(iter(tables), Path()), engine, machine, branch))
+    return Read(
+        frozenset(seen), tuple(short), (*others, *((run, Listed()) for run in found.runs)), found.unknown
+    )
+
+
+def record(session: Any, found: Read) -> tuple[int, int]:
+    """Store them; how many are new, and how many were there before."""
+    stored = History(session)
+
+    def before(run: RunDocument) -> RunDocument | None:
+        earlier: list[Any] = [
+            other
+            for other in stored.runs(run.engine.name)
+            if other.machine.fingerprint == run.machine.fingerprint and other.started < run.started
+        ]
+        last = max(earlier, key=lambda other: other.started, default=None)
+        return stored.document(last.id) if last else None
+
+    new = record_all(session, (*found.short, *with_missing(found.others, before)))
+    return sum(new), len(new) - sum(new)

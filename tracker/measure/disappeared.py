@@ -1,0 +1,111 @@
+"""Benchmarks of other tools that stop while their siblings go on: missing, by name, until they are back.
+
+Other tools store what they got and never say what they were asked for. A run is taken to be asked for what the last
+run like it had, of the same engine on the same machine: one with which it has at least half of both together in
+common. A run of some benchmarks alone, of another file or of another environment is like none of the others. Where the
+tool keeps a list of its benchmarks, what left the list was removed and is not missed; what is on the list without any
+result is missed in the newest run, if that run is of the list's time: everything it measured is on it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator, Mapping, Set
+from itertools import groupby
+from typing import Any, NamedTuple
+
+from msgspec.structs import replace
+
+from spook_tracker.tracker.document.json_form import Number
+from spook_tracker.tracker.document.run_document import RunDocument, Sample, SeriesDefinition
+from spook_tracker.tracker.measure.other_tools import asv_cases, asv_series
+
+Lane = tuple[str, str]  # engine, machine
+GONE = "its siblings were measured and it was not"
+NEVER = "the tool's list names it, and there is no result"
+
+
+class Listed(NamedTuple):
+    """What a tool itself says of its benchmarks."""
+
+    benchmarks: Mapping[str, Any] = {}  # by name; empty: it keeps no list
+    grids: bool = False  # a run holds a benchmark with all the parameters that it has then
+
+
+def with_missing(
+    read: Iterable[tuple[RunDocument, Listed]], before: Callable[[RunDocument], RunDocument | None]
+) -> Iterator[RunDocument]:
+    """The runs, oldest first in each lane, each with a missing value for what it ought to have and has not.
+
+    `before` is the run of the same lane that was stored earlier and comes next before one, or None.
+    """
+    ordered = sorted(read, key=lambda one: (lane_of(one[0]), one[0].started))
+    for _, runs in groupby(ordered, key=lambda one: lane_of(one[0])):
+        of_lane = list(runs)
+        earlier = before(of_lane[0][0])
+        kinds = [{d.key: d for d in earlier.series}] if earlier else []  # what the last run of each kind had
+        for run, listed in of_lane:
+            here = {d.key: d for d in run.series}
+            like = next((known for known in kinds if _are_alike(known.keys(), here.keys())), None)
+            known = like or {}
+            names = {_name(d) for d in run.series}
+            missed = {
+                key: (d, GONE) for key, d in known.items() if key not in here and _stays(d, names, listed)
+            }
+            if run is of_lane[-1][0]:
+                missed |= {d.key: (d, NEVER) for d in _never_measured(run, listed, missed)}
+            whole = _with(run, missed)
+            kinds = [{d.key: d for d in whole.series}, *(other for other in kinds if other is not like)]
+            yield whole
+
+
+def lane_of(run: RunDocument) -> Lane:
+    """Runs of one engine on one machine follow one another."""
+    return run.engine.name, run.machine.fingerprint
+
+
+def _are_alike(some: Set[str], others: Set[str]) -> bool:
+    return 2 * len(some & others) >= len(some | others)
+
+
+def _stays(definition: SeriesDefinition, names: Set[str], listed: Listed) -> bool:
+    """Whether the benchmark, with these parameters, is still one for all that the tool says."""
+    name = _name(definition)
+    if listed.grids and name in names:
+        return False  # it was measured, and these parameters are none of its own any more
+    if not listed.benchmarks:
+        return True
+    return name in listed.benchmarks and definition.test in asv_cases(name, listed.benchmarks[name])
+
+
+def _never_measured(run: RunDocument, listed: Listed, missed: Iterable[str]) -> Iterator[SeriesDefinition]:
+    names = {_name(d) for d in run.series}
+    if not listed.benchmarks or not names <= listed.benchmarks.keys():
+        return
+    told = names | {key.partition("/")[0].partition("(")[0] for key in missed}
+    for name in sorted(listed.benchmarks.keys() - told):
+        yield asv_series(name, listed.benchmarks[name], run.series[0].configuration)
+
+
+def _name(definition: SeriesDefinition) -> str:
+    """The benchmark's, without its parameters."""
+    return definition.test.partition("(")[0]
+
+
+def _with(run: RunDocument, missed: Mapping[str, tuple[SeriesDefinition, str]]) -> RunDocument:
+    if not missed:
+        return run
+    samples = tuple(
+        Sample(
+            series=key,
+            value=Number(math.nan),
+            outcome="missing",
+            passed=False,
+            set_point_held=False,
+            failure=why,
+        )
+        for key, (_, why) in missed.items()
+    )
+    return replace(
+        run, series=run.series + tuple(d for d, _ in missed.values()), samples=run.samples + samples
+    )
