@@ -25,6 +25,8 @@ SEEN = """[...document.querySelectorAll('figure.chart')].every((box) => 'drawn' 
   !box.checkVisibility() || box.getBoundingClientRect().top > innerHeight || box.getBoundingClientRect().bottom < 0)"""
 STILL = """[...document.querySelectorAll('figure.replay, .live')].every((box) => box.player || box.page ||
   box.getBoundingClientRect().top > innerHeight || box.getBoundingClientRect().bottom < 0)"""
+MODULE = Path(__file__).parent.parent / "site" / "static" / "live.wasm"
+LIVE = ("live.html",) if MODULE.exists() else ()  # the pages that need it
 CHROMES = ("chromium", "chromium-browser", "google-chrome")
 
 

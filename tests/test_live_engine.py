@@ -85,6 +85,12 @@ def planetarium(p, h, page):
     return Scene(bodies=(planet,), forces=(CentralGravity(name="sun", strength=1.0),)), METHODS[p["method"]]
 
 
+def edge(p, h, page):
+    places = [(float(i), 0.0, 0.0) for i in range(1, p["links"] + 1)]
+    bodies, links = rods(places, [1.0] * len(places), float(f"1e{p['compliance']}"), p["damping"] * h)
+    return Scene(bodies=bodies, constraints=links, gravity=(0.0, 0.0, -9.81)), Method()
+
+
 def ground(surface):
     return RigidBody(name="plane", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=surface)
 
@@ -145,6 +151,8 @@ CASES = [
     (slope, {"friction": "box", "rate": 120, "angle": 35, "direction": 60, "mu": 0.3}),
     (oscillator, {"rate": 60, "stiffness": 50, "damping": 0}),
     (oscillator, {"rate": 60, "stiffness": 200, "damping": 2.25}),
+    (edge, {"rate": 30, "damping": 0, "compliance": -13, "links": 3}),
+    (edge, {"rate": 30, "damping": 0.1, "compliance": -13, "links": 3}),
     (planetarium, {"method": "plain", "rate": 60, "speed": 0.8}),
     (planetarium, {"method": "order 6", "rate": 30, "speed": 0.7}),
     (chain, {"method": "order 6", "rate": 60, "links": 5, "compliance": -9}),
@@ -221,6 +229,27 @@ def test_friction_over_normal_force_is_what_coulomb_says(answers):
         assert page["ratio"][0] is None, "no step has ended yet"
         np.testing.assert_allclose(ratio[1:], min(slope_of_it, p["mu"]), rtol=1e-9)
     assert stood and slid
+
+
+def test_energy_counts_what_a_spring_has_stored(answers):
+    """m ω² A² / 2 = 100 J at 50 N/m and 2 m: without damping it stays, to the method's first order in ω h."""
+    told = next(
+        page["change"]
+        for (build, p), page in zip(CASES, answers, strict=False)
+        if build is oscillator and p["damping"] == 0
+    )
+
+    assert told["scale"] == pytest.approx(100.0, rel=0.02)
+    assert abs(told["change"]) < math.sqrt(50.0) / 60.0 * 100.0
+
+
+def test_the_edge_of_stability_lies_between_no_damping_and_a_tenth_of_a_step(answers):
+    gained = [
+        page["change"]["change"] for (build, _), page in zip(CASES, answers, strict=False) if build is edge
+    ]
+
+    assert not gained[0] < 1e6, "three rods of 1 kg hold 59 J"
+    assert gained[1] < 5.0
 
 
 def test_the_order_a_reader_sees_is_that_of_the_method(answers):

@@ -13,13 +13,13 @@ import pytest
 from spook_tracker.tracker.website import page_test
 from spook_tracker.tracker.website.page_mutants import read_mutants
 from spook_tracker.tracker.website.publish import publish
-from tests.browser import SEEN, STILL, arrive, look, wait_for
+from tests.browser import LIVE, SEEN, STILL, arrive, look, wait_for
 from tests.synthetic_history import DocumentHistory, with_rival
 from tests.test_site_causes import nights
 from tests.test_site_causes import recorded as recorded  # a fixture
 
 PAGES = (
-    "index.html", "tests/friction.html", "error-time.html", "stability.html", "live.html", "compare.html",
+    "index.html", "tests/friction.html", "error-time.html", "stability.html", *LIVE, "compare.html",
     "regressions.html", "versions.html", "data.html", "document.html", "engines.html", "engines/rival.html",
     "mutants.html", "tests/door.html", "../empty/index.html",
 )  # fmt: skip

@@ -12,12 +12,12 @@ from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
 from spook_tracker.tracker.judge.series_history import commit_of
 from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.website.publish import publish
-from tests.browser import SEEN, arrive, look, wait_for
+from tests.browser import LIVE, SEEN, arrive, look, wait_for
 from tests.synthetic_history import SEVEN, history
 
 PAGES = (
     "index.html", "tests/pendulum.html", "tests/friction.html", "error-time.html", "stability.html",
-    "compare.html", "regressions.html", "versions.html", "data.html", "document.html", "live.html",
+    "compare.html", "regressions.html", "versions.html", "data.html", "document.html", *LIVE,
 )  # fmt: skip
 CONTRAST = """
 const shades = [];

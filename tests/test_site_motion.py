@@ -353,7 +353,7 @@ def test_a_slider_of_the_live_page_runs_the_engine_again(driver, site):
     assert complaints(driver) == []
 
 
-LIVE = ("pendulum", "chain", "slope", "oscillator", "planetarium", "beam", "pile")
+LIVE = ("pendulum", "chain", "edge", "slope", "oscillator", "planetarium", "beam", "pile")
 FACT = "return document.querySelector('[data-fact=\"{}\"]').textContent"
 
 
@@ -396,7 +396,55 @@ def test_a_live_scene_opens_runs_and_a_link_restores_what_a_slider_says(driver, 
     assert complaints(driver) == []
 
 
-@pytest.mark.skipif(not (ROOT / "site" / "static" / "live.wasm").exists(), reason="not built: make wasm")
+BUILT = pytest.mark.skipif(
+    not (ROOT / "site" / "static" / "live.wasm").exists(), reason="not built: make wasm"
+)
+
+
+@BUILT
+def test_pictures_go_on_while_the_engine_computes_and_the_newest_question_is_answered(driver, site):
+    """A pile that takes far longer than a picture: its computing is in a worker."""
+    visit(driver, site, "live.html#scene=pile&p.count=24")
+    wait_for(driver, "!!document.querySelector('.live').page")
+    driver.set_script_timeout(60)
+    gap, milliseconds, first, last = driver.execute_async_script("""
+      const done = arguments[arguments.length - 1], page = document.querySelector('.live').page;
+      const fact = (name) => document.querySelector(`[data-fact="${name}"]`).textContent, first = fact('steps');
+      const rate = document.getElementById('live-rate');
+      for (const value of ['240', '300', '480']) { rate.value = value; rate.dispatchEvent(new Event('input')); }
+      let longest = 0, before = performance.now();
+      const from = before;
+      const look = (now) => {
+        if (fact('steps').startsWith('1920 of')) { done([longest, before - from, first, fact('steps')]); return; }
+        longest = Math.max(longest, now - before);
+        before = now;
+        requestAnimationFrame(look);
+      };
+      requestAnimationFrame(look);
+    """)
+
+    assert first.startswith("240 of") and last.startswith("1920 of")
+    assert gap < 0.5 * milliseconds, f"the longest picture took {gap} ms of {milliseconds}"
+
+
+@BUILT
+def test_without_webgl_the_live_page_has_numbers_and_curves(driver, site):
+    source = "HTMLCanvasElement.prototype.getContext = () => null;"
+    planted = driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": source})
+    try:
+        visit(driver, site, "live.html#scene=oscillator")
+        wait_for(driver, "!!document.querySelector('.live').page")
+        told = driver.execute_script("return document.querySelector('.live').innerText")
+        curves = driver.execute_script("return document.querySelectorAll('.curve path.line').length")
+    finally:
+        driver.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", planted)
+
+    assert "no WebGL" in told and "completed" in told
+    assert "largest extension" in told and "violation" not in told
+    assert curves >= 2
+
+
+@BUILT
 @pytest.mark.parametrize(("angle", "ratio"), [(20, 0.36397), (35, 0.5)], ids=["stands", "slides"])
 def test_the_box_on_a_slope_shows_friction_over_normal_force_while_it_runs(driver, site, angle, ratio):
     """tan 20° while it stands, mu = .5 where it slides (tan 35° = .7): in the list, and as a curve with the clock."""

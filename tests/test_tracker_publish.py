@@ -111,7 +111,7 @@ def test_no_page_runs_anything_but_its_own_files(site: Path) -> None:
         ]
         assert len(policy) == 1
         wasm = (
-            " 'wasm-unsafe-eval'" if page.name == "live.html" and MODULE.exists() else ""
+            " 'wasm-unsafe-eval'; worker-src blob:" if page.name == "live.html" and MODULE.exists() else ""
         )  # only where needed
         assert f"default-src 'none'; script-src 'self'{wasm};" in policy[0]
         scripts = [a for tag, a in reader.elements if tag == "script"]

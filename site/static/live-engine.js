@@ -12,7 +12,8 @@ const METHODS = {  // of particle scenes: what the step is asked for
 const WORLD = -1, ORIGIN = [0, 0, 0];
 
 class LiveEngine {
-  static async from(bytes) {
+  // `code`: the module's bytes, or the module once compiled.
+  static async from(code) {
     const memory = () => new DataView(engine.native.memory.buffer);
     // What WASI's C library wants of its system: a clock, and nowhere to write.
     const system = {
@@ -20,13 +21,13 @@ class LiveEngine {
       proc_exit: () => { throw new Error("the engine stopped"); },
     };
     const engine = new LiveEngine();
-    const module = await WebAssembly.compile(bytes);
+    engine.module = code instanceof WebAssembly.Module ? code : await WebAssembly.compile(code);
     const imports = {};
-    for (const { module: from, name } of WebAssembly.Module.imports(module)) {
+    for (const { module: from, name } of WebAssembly.Module.imports(engine.module)) {
       imports[from] = imports[from] || {};
       imports[from][name] = system[name] || (() => 52);  // not supported
     }
-    engine.native = (await WebAssembly.instantiate(module, imports)).exports;
+    engine.native = (await WebAssembly.instantiate(engine.module, imports)).exports;
     if (engine.native._initialize) { engine.native._initialize(); }
     return engine;
   }
@@ -130,12 +131,13 @@ class LiveEngine {
   // wall time in s, 0 for none.
   run(steps, every = 1, limit = 0) {
     const { drawn } = this;
-    const asked = { position: this.observe("position", -1, every), energy: this.observe("energy", -1, every) };
+    const asked = { position: this.observe("position", -1, every), energy: this.observe("energy", -1, every), kinetic: this.observe("kinetic_energy", -1, every) };
     if (drawn.rigid) { asked.orientation = this.observe("orientation", -1, every); }
     if (drawn.rows) { asked.violation = this.observe("violation", -1, every); }
     const joints = Array.from({ length: drawn.joints }, (_, joint) => this.observe("violation", joint, every));
     const forces = drawn.touching.map((body) => this.observe("contact_force", body, every));
     if (forces.length) { asked.penetration = this.observe("penetration", -1, every); }
+    const points = drawn.cones ? this.observe("contact_points", drawn.cones, every) : -1;
     const status = this.native.live_run(steps, limit);
     const read = Object.fromEntries(Object.entries(asked).map(([name, number]) => [name, this.values(number).values]));
     const count = this.native.live_samples(asked.position);
@@ -154,6 +156,7 @@ class LiveEngine {
         }
       });
     }
+    movie.cones = points < 0 ? null : this.contactPoints(points, drawn.cones);
     if (forces.length) {
       movie.contact = new Float64Array(3 * count * drawn.bodies);
       forces.forEach((number, i) => {
@@ -162,6 +165,22 @@ class LiveEngine {
       });
     }
     return movie;
+  }
+
+  // Ten numbers a point: where, axis, force (N), friction. Axes and forces of what the upper body feels.
+  contactPoints(observable, most) {
+    const { samples, values } = this.values(observable);
+    const parts = { point: [0, 3], axis: [3, 3], force: [6, 3], friction: [9, 1] }, found = {};
+    for (const [name, [first, width]] of Object.entries(parts)) {
+      found[name] = new Float64Array(samples * most * width);
+      for (let i = 0; i < samples * most; i += 1) { found[name].set(values.subarray(10 * i + first, 10 * i + first + width), i * width); }
+    }
+    const { axis, force } = found, pull = this.drawn.gravity;
+    for (let i = 0; i < axis.length; i += 3) {
+      if (axis[i] * pull[0] + axis[i + 1] * pull[1] + axis[i + 2] * pull[2] <= 0) { continue; }
+      for (let k = i; k < i + 3; k += 1) { axis[k] = -axis[k]; force[k] = -force[k]; }
+    }
+    return found;
   }
 
   stateHash() {
@@ -201,6 +220,20 @@ const LIVE_SCENES = {
       }
     },
   },
+  edge: {
+    title: "The edge of stability", about: "A chain of rods falls as it swings. With damping it stays together at any time step; without, the stretch that a step leaves is returned as motion, and where the step is long or the compliance small the chain explodes. Turn the damping from 0.1 to 0.",
+    duration: 5, smooth: true,
+    parameters: { rate: stepsPerSecond(30), damping: number("damping τ/h", 0, 5, 0.05, 0, "steps"), compliance: number("log₁₀ compliance", -13, -2, 1, -13, "m/N"), links: number("links", 1, 12, 1, 3) },
+    build(engine, p, h) {
+      engine.begin(false, [0, 0, -9.81], h);
+      let before = ORIGIN;
+      for (let i = 1; i <= p.links; i += 1) {
+        const sphere = engine.particle(1, [i, 0, 0]);
+        engine.distance(before, sphere, 1, Number(`1e${p.compliance}`), p.damping * h);
+        before = sphere;
+      }
+    },
+  },
   slope: {
     title: "Box on an inclined plane", about: "The plane is drawn level and gravity is tilted instead. Below the friction angle the box stays, and friction over normal force is the tangent of the slope; beyond it slides, and the ratio is µ.",
     duration: 3, smooth: false, ratio: true,
@@ -210,11 +243,12 @@ const LIVE_SCENES = {
       engine.begin(true, [pull * engine.cosine(along), pull * engine.sine(along), -10 * engine.cosine(tilt)], h, { friction: p.friction });
       engine.plane({ friction: p.mu });
       engine.box(1, [1, 1, 1], [0, 0, 0.5], { friction: p.mu });
+      engine.drawn.cones = 4;
     },
   },
   oscillator: {
     title: "Oscillator", about: "A mass on one compliant row: its stiffness and damping time are SPOOK's own. With the damping at 0 the energy stays, at any stiffness.",
-    duration: 5, smooth: true,
+    duration: 5, smooth: true, spring: (p) => 1 / p.stiffness,
     parameters: { rate: stepsPerSecond(), stiffness: number("stiffness", 1, 400, 1, 50, "N/m"), damping: number("damping τ/h", 0, 10, 0.25, 0, "steps") },
     build(engine, p, h) {
       engine.begin(false, [0, 0, 0], h);
@@ -272,7 +306,27 @@ function simulateLive(engine, name, parameters, { steps = 0, finer = 1, every = 
   const h = 1 / (p.rate * finer);
   scene.build(engine, p, h);
   const movie = engine.run(steps || Math.round(scene.duration * p.rate) * finer, every * finer, limit);
+  if (scene.spring) { movie.stored = storedEnergy(movie, scene.spring(p)); movie.violationName = "extension"; }
   return scene.ratio ? { ...movie, ratio: forceRatio(movie), bound: p.mu } : movie;
+}
+
+// What rows that are springs have stored at each sample, J: extension² / (2 compliance).
+function storedEnergy(movie, compliance) {
+  const stored = new Float64Array(movie.count);
+  movie.violation.forEach((g, i) => { stored[Math.floor(i / movie.rows)] += (g * g) / (2 * compliance); });
+  return stored;
+}
+
+// The energy that the motion should keep, J, and the share of it that came or went: of the most that moved or was
+// stored, as a level of potential energy is anybody's choice.
+function energyOf(movie) {
+  const total = movie.energy.map((e, i) => e + (movie.stored ? movie.stored[i] : 0));
+  let scale = 0, change = 0;
+  for (let i = 0; i < movie.count; i += 1) {
+    scale = Math.max(scale, movie.kinetic[i], movie.stored ? movie.stored[i] : 0);
+    if (!(Math.abs(total[i] - total[0]) <= Math.abs(change))) { change = total[i] - total[0]; }
+  }
+  return { total, change, scale };
 }
 
 // Friction over normal force of all that touches the level ground, at each sample; no number where nothing presses.
@@ -305,4 +359,30 @@ function observedOrder(engine, name, parameters) {
   return coarse > 1e-13 && fine > 1e-13 ? Math.log2(coarse / fine) : NaN;
 }
 
-if (typeof module !== "undefined") { module.exports = { LiveEngine, LIVE_SCENES, simulateLive, observedOrder, defaults }; }
+// In a worker: answers questions one after the other. The page ends the worker when it no longer wants the answer.
+async function serve({ data }) {
+  if (data.packed || data.module) {
+    serve.engine = await LiveEngine.from(data.module || (await unpacked(data.packed)));
+    postMessage({ ready: true, module: serve.engine.module });
+    return;
+  }
+  const { id, name, parameters, order, over } = data;
+  try {
+    if (order) { postMessage({ id, order: observedOrder(serve.engine, name, parameters) }); return; }
+    const { duration } = LIVE_SCENES[name], every = Math.max(1, Math.floor((duration * parameters.rate) / 1200));
+    const movie = simulateLive(serve.engine, name, parameters, { every, limit: 8 });
+    const other = over && simulateLive(serve.engine, name, { ...parameters, ...over.parameters }, { every, finer: over.finer, limit: 8 });
+    postMessage({ id, movie, other }, [...new Set([movie, other].flatMap(buffersOf))]);
+  } catch (error) { postMessage({ id, failed: error.message }); }
+}
+
+const buffersOf = (thing) => (ArrayBuffer.isView(thing) ? [thing.buffer] : thing && typeof thing === "object" && !Array.isArray(thing) ? Object.values(thing).flatMap(buffersOf) : []);
+
+// The module stands in a script as base64 of its deflated bytes: a page opened from a file may not fetch.
+async function unpacked(packed) {
+  const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
+  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer();
+}
+
+if (typeof WorkerGlobalScope !== "undefined") { onmessage = serve; }
+if (typeof module !== "undefined") { module.exports = { LiveEngine, LIVE_SCENES, simulateLive, observedOrder, defaults, energyOf }; }

@@ -1,16 +1,85 @@
-// The page on which the engine itself runs: sliders, the player, and what the run cost.
+// The page on which the engine itself runs, in a worker: sliders, the player, and what the run cost.
 "use strict";
 
-// The module stands in a script as base64 of its deflated bytes: a page opened from a file may not fetch.
-async function moduleBytes() {
-  const packed = Uint8Array.from(atob(LIVE_MODULE), (letter) => letter.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  return new Uint8Array(await new Response(stream).arrayBuffer());
+const PATIENCE = 250;  // ms that a newer question waits for the answer to an older one
+
+// The engine in a worker. Only the newest question is worth an answer: older ones are ended.
+class EngineWorker {
+  constructor(answer) {
+    this.answer = answer;
+    this.address = URL.createObjectURL(new Blob([LIVE_WORKER], { type: "text/javascript" }));
+    this.started = 0;
+    this.open({ packed: LIVE_MODULE });
+  }
+
+  open(code) {
+    this.ready = false;
+    this.worker = new Worker(this.address);
+    this.worker.onmessage = ({ data }) => this.hear(data);
+    this.worker.onerror = (error) => this.answer({ failed: error.message || "its worker does not start" });
+    this.worker.postMessage(code);
+  }
+
+  hear(data) {
+    if (data.ready) { this.ready = true; this.module = data.module; } else { this.asked = null; this.answer(data); }
+    this.send();
+  }
+
+  ask(question) {
+    this.next = question;
+    this.send();
+    if (this.next && this.ready) {
+      clearTimeout(this.waiting);
+      this.waiting = setTimeout(() => this.restart(), Math.max(0, this.started + PATIENCE - performance.now()));
+    }
+  }
+
+  send() {
+    if (!this.ready || this.asked || !this.next) { return; }
+    clearTimeout(this.waiting);
+    this.asked = this.next;
+    this.next = null;
+    this.started = performance.now();
+    this.worker.postMessage(this.asked);
+  }
+
+  restart() {
+    if (!this.asked || !this.next) { return; }
+    this.worker.terminate();
+    this.asked = null;
+    this.open({ module: this.module });
+  }
+}
+
+// Where the browser draws nothing in three dimensions: the curves and numbers say all but that.
+class NoView {
+  constructor(host, movie) {
+    this.movie = movie;
+    this.shown = {};
+    host.classList.add("none");
+    host.textContent = "This browser has no WebGL, so the scene is not drawn. The curves and numbers are complete.";
+  }
+
+  load(movie) { this.movie = movie; }
+
+  show() {}
+
+  say() {}
+
+  paint() {}
+
+  resize() {}
+}
+
+// The scene, where it can be drawn.
+function sceneOrWords(host, movie) {
+  try { return new SceneView(host, movie); } catch (error) { return new NoView(host, movie); }
 }
 
 class LivePage {
-  constructor(box, engine) {
-    Object.assign(this, { box, engine, player: null, costs: [] });
+  constructor(box) {
+    Object.assign(this, { box, player: null, costs: [], id: 0 });
+    this.engine = new EngineWorker((told) => this.hear(told));
     this.form = box.querySelector(".live-form");
     this.facts = box.querySelector(".live-facts");
     this.about = box.querySelector(".live-about");
@@ -28,6 +97,18 @@ class LivePage {
   clear() {
     for (const name of Object.keys(LIVE_SCENES[this.name].parameters)) { state.set(`p.${name}`, ""); }
     state.set("t", "");
+    state.set("over", "");
+  }
+
+  // What else may be drawn over the run: a finer step, or another choice of the scene's first list.
+  others() {
+    const [key, list] = Object.entries(LIVE_SCENES[this.name].parameters).find(([, p]) => p.options) || [];
+    const now = this.parameters(), words = (value) => value.replaceAll("_", " ");
+    const found = { "h/4": { finer: 4, name: "a step of h/4" } };
+    for (const value of list ? list.options : []) {
+      if (value !== now[key]) { found[value] = { finer: 1, parameters: { [key]: value }, name: `${list.label} ${words(value)}` }; }
+    }
+    return found;
   }
 
   parameters() {
@@ -44,6 +125,7 @@ class LivePage {
     const name = LIVE_SCENES[wanted] ? wanted : Object.keys(LIVE_SCENES)[0];
     const other = name !== this.name;
     this.name = name;
+    if (other) { this.shownFrom = this.id + 1; }
     this.scene.value = name;
     this.about.textContent = LIVE_SCENES[name].about;
     this.fields();
@@ -63,40 +145,72 @@ class LivePage {
       const change = () => {
         say();
         state.set(`p.${name}`, input.value === String(p.value) ? "" : input.value);
-        clearTimeout(this.waiting);
-        this.waiting = setTimeout(() => this.run(false), 30);
+        if (p.options) { this.overField(); }
+        this.run(false);
       };
       input.addEventListener("input", change);
       return make("div", { class: "live-field" }, make("label", { for: id }, p.label), input, told);
-    }));
+    }), this.over = make("div", { class: "live-field" }));
+    this.overField();
+  }
+
+  overField() {
+    const select = make("select", { id: "live-over" }, make("option", { value: "" }, "nothing"), ...Object.entries(this.others()).map(([key, one]) => make("option", { value: key }, one.name)));
+    select.value = this.others()[state.get("over")] ? state.get("over") : "";
+    select.addEventListener("change", () => { state.set("over", select.value); this.run(false); });
+    this.over.replaceChildren(make("label", { for: "live-over" }, "draw over it"), select);
   }
 
   run(other) {
-    const parameters = this.parameters(), scene = LIVE_SCENES[this.name];
-    const every = Math.max(1, Math.floor((scene.duration * parameters.rate) / 1200));
-    const movie = simulateLive(this.engine, this.name, parameters, { every, limit: 8 });
-    if (this.player) {
-      this.player.use(movie, !other);
-      if (other) { this.player.view.load(movie); this.player.seek(0); }
-    } else { this.player = new Player(this.figure, movie, "t"); this.figure.classList.add("moving"); }
-    const perStep = movie.seconds / Math.max(1, movie.steps);
-    if (other) { this.costs = []; }
-    this.costs.push(perStep * 1e6);
-    this.say(movie, perStep);
+    this.other = this.other || other;
+    this.id += 1;
     clearTimeout(this.later);
-    this.later = setTimeout(() => this.sayOrder(parameters), 120);
+    const over = this.others()[state.get("over")];
+    this.asked = { id: this.id, name: this.name, parameters: this.parameters(), over };
+    this.engine.ask(this.asked);
   }
 
-  say(movie, perStep) {
-    const drift = movie.energy.reduce((most, e) => Math.max(most, Math.abs(e - movie.energy[0])), 0);
+  hear({ id, movie, other, order, failed }) {
+    if (failed) { this.note(`The engine cannot run in this browser: ${failed}.`); return; }
+    if (order !== undefined) { if (id === this.id) { this.sayOrder(order); } return; }
+    if (movie.bodies === 0 || id < this.shownFrom) { return; }  // of the scene that was left
+    const energy = energyOf(movie);
+    movie.energy = energy.total;
+    if (other) {
+      const { name } = this.asked.over || { name: "" };
+      movie.ghost = { name, title: `distance from ${name}`, position: other.position, orientation: other.orientation, energy: energyOf(other).total };
+    }
+    if (!this.player) { this.player = new Player(this.figure, movie, "t", sceneOrWords); this.figure.classList.add("moving"); } else {
+      this.player.use(movie, !this.other);
+      if (this.other) { this.player.seek(0); }
+    }
+    if (this.other) { this.costs = []; }
+    this.other = false;
+    const perStep = movie.seconds / Math.max(1, movie.steps);
+    this.costs.push(perStep * 1e6);
+    this.say(movie, perStep, energy);
+    this.note("");
+    this.box.page = this;
+    if (id !== this.id) { return; }
+    if (LIVE_SCENES[this.name].smooth) { this.later = setTimeout(() => this.engine.ask({ id, name: this.name, parameters: this.parameters(), order: true }), 120); } else { this.sayOrder(null); }
+  }
+
+  note(words) {
+    const note = this.box.querySelector(".live-note");
+    note.hidden = !words;
+    note.textContent = words;
+  }
+
+  say(movie, perStep, energy) {
     const largest = movie.violation ? movie.violation.reduce((most, g) => Math.max(most, Math.abs(g) || 0), 0) : null;
     const lines = [
       ["outcome", ["completed", "unsettled"].includes(movie.status) ? movie.status : `${movie.status} after ${movie.steps} steps`],
       ["steps", `${movie.steps} of h = ${figureOf(movie.timeStep)} s`],
       ["run time", `${figureOf(perStep * 1e6, 3)} µs a step, ${figureOf(movie.seconds * 1e3, 3)} ms in all`],
-      ["largest change of energy", `${figureOf(drift)} J`],
+      ["energy gained or lost", energy.scale > 0 ? `${figureOf((100 * energy.change) / energy.scale)} % of ${figureOf(energy.scale)} J, the most that moved${movie.stored ? " or was stored" : ""}` : "none: nothing moves"],
       ...(movie.ratio ? [["friction / normal force", `${figureOf(movie.ratio[movie.count - 1])} in the end; µ = ${movie.bound}, tan of the slope ${figureOf(Math.tan((this.parameters().angle * Math.PI) / 180))}`]] : []),
-      ...(largest === null ? [] : [["largest violation", `${figureOf(largest)} ${movie.violationUnit || "m"}`]]),
+      ...(movie.error ? [["largest distance", `${figureOf(movie.error.reduce((most, d) => Math.max(most, d), 0))} m from ${movie.ghost.name}`]] : []),
+      ...(largest === null ? [] : [[`largest ${movie.violationName || "violation"}`, `${figureOf(largest)} ${movie.violationUnit || "m"}`]]),
       ["order of accuracy", "…"],
       ["final state", movie.stateHash],
     ];
@@ -106,10 +220,9 @@ class LivePage {
     if (recent.length > 1) { this.plot.querySelector(".value").textContent = `${figureOf(recent[recent.length - 1], 3)} µs a step`; }
   }
 
-  sayOrder(parameters) {
+  sayOrder(order) {
     const place = this.facts.querySelector('[data-fact="order of accuracy"]');
-    if (!LIVE_SCENES[this.name].smooth) { place.textContent = "none: contacts make the motion jump"; return; }
-    const order = observedOrder(this.engine, this.name, parameters);
+    if (order === null) { place.textContent = "none: contacts make the motion jump"; return; }
     place.textContent = Number.isFinite(order) ? `${order.toFixed(2)} of the positions (h halved twice, first second)` : "not measurable here: the differences are rounding, or a run failed";
   }
 }
@@ -117,13 +230,10 @@ class LivePage {
 (async function live() {
   const box = document.querySelector(".live");
   if (!box) { return; }
-  const note = box.querySelector(".live-note");
   try {
-    await threeFrom(box.dataset.three);
-    await script(box.dataset.module);
-    box.page = new LivePage(box, await LiveEngine.from(await moduleBytes()));
-    note.hidden = true;
+    await Promise.all([script(box.dataset.module), threeFrom(box.dataset.three)]);
+    new LivePage(box);
   } catch (error) {
-    note.textContent = `The engine cannot run in this browser: ${error.message}.`;
+    box.querySelector(".live-note").textContent = `The engine cannot run in this browser: ${error.message}.`;
   }
 })();

@@ -110,7 +110,7 @@ function apart(one, other, bodies, count) {
 
 class Player {
   // `box` is a figure whose still picture the player replaces; `name` is what its time is called in the address.
-  constructor(box, movie, name) {
+  constructor(box, movie, name, View = SceneView) {
     Object.assign(this, { box, name, playing: false, speed: 1, sample: 0, cost: 0 });
     this.stage = make("div", { class: "stage" });
     this.play = make("button", { type: "button", class: "play" }, "Play");
@@ -121,7 +121,7 @@ class Player {
     this.curvesBox = make("div", { class: "curves" });
     this.element = make("div", { class: "player", tabIndex: -1 }, this.stage, this.controls, this.tools, this.curvesBox);
     box.prepend(this.element);
-    this.view = new SceneView(this.stage, movie);
+    this.view = new View(this.stage, movie);
     this.view.say("The scene in three dimensions");
     this.play.addEventListener("click", () => this.toggle());
     this.slider.addEventListener("input", () => { this.pause(); this.seek(Number(this.slider.value)); this.remember(); });
@@ -168,13 +168,13 @@ class Player {
     tools.forces.hidden = !movie.contact;
     tools.cones.hidden = !movie.cones;
     const given = [];
-    if (movie.ghost) { movie.error = apart(movie.position, movie.ghost.position, movie.bodies, movie.count); given.push(["difference from the reference run", "m", [{ values: movie.error, colour: 1 }]]); }
-    if (movie.rows) { movie.largest = largestEach(movie.violation, movie.rows, movie.count); given.push(["largest violation", movie.violationUnit || "m", [{ values: movie.largest, colour: 1 }]]); }
+    if (movie.ghost) { movie.error = apart(movie.position, movie.ghost.position, movie.bodies, movie.count); given.push([movie.ghost.title || "difference from the reference run", "m", [{ values: movie.error, colour: 1 }]]); }
+    if (movie.rows) { movie.largest = largestEach(movie.violation, movie.rows, movie.count); given.push([`largest ${movie.violationName || "violation"}`, movie.violationUnit || "m", [{ values: movie.largest, colour: 1 }]]); }
     if (movie.energy) { given.push(["energy", "J", movie.ghost && movie.ghost.energy ? [{ values: movie.energy, colour: 0 }, { values: movie.ghost.energy, colour: 1 }] : [{ values: movie.energy, colour: 0 }]]); }
     if (movie.penetration) { given.push(["deepest penetration", "m", [{ values: movie.penetration, colour: 3 }]]); }
     if (movie.ratio) { given.push(["friction / normal force, and µ", "", [{ values: movie.ratio, colour: 0 }, { values: movie.ratio.map(() => movie.bound), colour: 1 }], 0]); }
     this.worst.hidden = !movie.error && !movie.largest;
-    this.worst.textContent = movie.error ? "Largest distance" : "Largest violation";
+    this.worst.textContent = movie.error ? "Largest distance" : `Largest ${movie.violationName || "violation"}`;
     this.curves = given.map(([title, unit, curves, ground]) => new TimeCurve(title, unit, curves, (share) => { this.pause(); this.seek(share * (this.movie.count - 1)); this.remember(); }, ground));
     this.curvesBox.replaceChildren(...this.curves.map((curve) => curve.element));
     this.seek(seconds / movie.step);

@@ -124,7 +124,9 @@ function facesOf(size) {
   return faces;
 }
 
-function extentOf(movie) {
+const EXPLODES = 10;  // times the extent of the first half: then that half is framed, and the rest leaves the picture
+
+function extentOf(movie, count = movie.count) {
   const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity];
   const see = (x, y, z, r) => [x, y, z].forEach((v, k) => {
     if (Math.abs(v) < 1e6) { low[k] = Math.min(low[k], v - r); high[k] = Math.max(high[k], v + r); }
@@ -144,8 +146,8 @@ function extentOf(movie) {
       solid.kind === "facets" ? Math.max(...facesOf(solid.size).flat().map((p) => Math.hypot(...p))) : solid.size[0] || 0;
     if (solid.body === WORLD_BODY) { see(...solid.position, r); } else { reach[solid.body] = Math.max(reach[solid.body], r); drawn[solid.body] = 1; }
   }
-  const stride = Math.max(1, Math.floor(movie.count * movie.bodies / 60000));
-  for (let sample = 0; sample < movie.count; sample += stride) {
+  const stride = Math.max(1, Math.floor(count * movie.bodies / 60000));
+  for (let sample = 0; sample < count; sample += stride) {
     for (let body = 0; body < movie.bodies; body += 1) {
       if (!drawn[body]) { continue; }
       const i = 3 * (sample * movie.bodies + body);
@@ -156,5 +158,9 @@ function extentOf(movie) {
     link.bodies.forEach((body, end) => { if (body === WORLD_BODY) { see(...link.anchors[end], 0); } });
   }
   for (const centre of movie.attractors) { see(...centre, 0); }
+  if (count === movie.count && count > 20) {
+    const first = extentOf(movie, Math.ceil(count / 2)), wide = (box) => Math.max(...box.high.map((v, k) => v - box.low[k]));
+    if (wide({ low, high }) > EXPLODES * wide(first)) { return first; }
+  }
   return low[0] <= high[0] ? { low, high } : { low: [-1, -1, -1], high: [1, 1, 1] };
 }

@@ -14,6 +14,7 @@ class SceneView {
   constructor(host, movie) {
     this.host = host;
     this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
+    this.renderer.debug.checkShaderErrors = false;  // asking waits for the compiler
     this.renderer.setPixelRatio(Math.min(devicePixelRatio || 1, 2));
     this.canvas = this.renderer.domElement;
     host.append(this.canvas);
@@ -29,6 +30,7 @@ class SceneView {
     this.scene.add(sun);
     this.controls = new THREE.OrbitControls(this.camera, this.canvas);
     this.controls.enableZoom = false;  // the wheel scrolls the page
+    this.canvas.style.touchAction = "pan-y";  // and so does a finger up and down; across, it turns the scene
     this.controls.addEventListener("change", () => this.draw());
     this.watch = new ResizeObserver(() => this.resize());
     this.watch.observe(host);
@@ -42,7 +44,8 @@ class SceneView {
     this.movie = movie;
     this.poses = new Poses(movie, movie.position, movie.orientation);
     this.ghost = movie.ghost ? new Poses(movie, movie.ghost.position, movie.ghost.orientation) : null;
-    if (this.world) { this.scene.remove(this.world); this.world.traverse((part) => { part.geometry?.dispose(); part.material?.dispose(); part.dispose?.(); }); }
+    const before = this.world;
+    if (before) { this.scene.remove(before); }
     this.world = new THREE.Group();
     this.scene.add(this.world);
     const { low, high } = extentOf(movie);
@@ -53,6 +56,8 @@ class SceneView {
     if (!keepCamera) { this.home(low, high); }
     this.resize();
     this.paint();
+    // Last: while something uses a shader it is not compiled again, which takes longer than a picture.
+    before?.traverse((part) => { part.geometry?.dispose(); part.material?.dispose(); part.dispose?.(); });
   }
 
   home(low, high) {

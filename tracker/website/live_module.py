@@ -1,11 +1,12 @@
 """The engine for the reader's browser: the WebAssembly module as a script, and the page that runs it.
 
-The module is built by `make wasm` and is not part of the repository. Without it the page says so.
+The module is built by `make wasm` and is not part of the repository. Without it there is no such page.
 """
 
 from __future__ import annotations
 
 import base64
+import json
 import zlib
 from pathlib import Path
 
@@ -20,13 +21,14 @@ def built_module(static: Path) -> bytes | None:
     return built.read_bytes() if built.is_file() else None
 
 
-def module_script(module: bytes) -> bytes:
-    """The module as a script, which a page opened from a file may load."""
-    return b'const LIVE_MODULE="' + base64.b64encode(zlib.compress(module, 9)) + b'";\n'
+def module_script(module: bytes, worker: bytes) -> bytes:
+    """The module and the worker's source as a script, which a page opened from a file may load."""
+    source = json.dumps(worker.decode()).replace("</", "<\\/").encode()
+    return b'const LIVE_MODULE="%b",LIVE_WORKER=%b;\n' % (base64.b64encode(zlib.compress(module, 9)), source)
 
 
 def live_page(module: str) -> Page:
-    """The page on which the engine runs; `module` is the address of its script, empty if there is none."""
+    """The page on which the engine runs; `module` is the address of its script."""
     return Page(
         "live.html",
         "live.html",

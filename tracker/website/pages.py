@@ -18,14 +18,14 @@ from spook_tracker.tracker.website.page_mutants import PATH, Mutant, mutants_pag
 from spook_tracker.tracker.website.page_rows import Page, address
 from spook_tracker.tracker.website.page_test import test_page
 
-NAVIGATION = (
+NAVIGATION = (  # in the order of need
     ("index.html", "Tonight"),
+    ("regressions.html", "Regressions"),
     ("error-time.html", "Error and run time"),
     ("stability.html", "Stability"),
-    ("live.html", "Live"),
     ("engines.html", "Engines"),
+    ("live.html", "Live"),
     ("compare.html", "Compare"),
-    ("regressions.html", "Regressions"),
     ("versions.html", "Versions"),
     ("data.html", "Data"),
 )
@@ -58,7 +58,8 @@ def pages(
     yield Planned("index.html", "Tonight", partial(index, book, causes))
     yield Planned("error-time.html", "Error against run time", partial(page_overviews.error_time, book))
     yield Planned("stability.html", "Stability", partial(page_overviews.stability, book, events))
-    yield Planned("live.html", "Live", partial(live_page, module))
+    if module:
+        yield Planned("live.html", "Live", partial(live_page, module))
     yield Planned("engines.html", "Engines", partial(page_engines.engines, book))
     for chapter in book.others:
         path = page_engines.engine_address(chapter.name)

@@ -127,10 +127,12 @@ def publish(
     with replacing(out) as folder:
         for name, content in contents.items():
             folder.add(f"assets/{names[name]}", digest(content), partial(bytes, content))
-        module = ""
+        module, navigation = "", tuple(entry for entry in NAVIGATION if entry[0] != "live.html")
         if (engine := built_module(static)) is not None:
-            module = f"assets/{_hashed('live-module.js', engine)}"
-            folder.add(module, digest(making.encode(), engine), partial(module_script, engine))
+            worker = contents["live_engine"]
+            module = f"assets/{_hashed('live-module.js', engine + worker)}"
+            folder.add(module, digest(making.encode(), engine), partial(module_script, engine, worker))
+            navigation = NAVIGATION
         for file in PLAIN_ASSETS:
             content = (static / file).read_bytes()
             folder.add(f"assets/{file}", digest(content), partial(bytes, content))
@@ -150,7 +152,7 @@ def publish(
                 "database": database is not None,
                 "wrong_on_purpose": bool(mutants),
             }
-            context |= whose
+            context |= whose | {"navigation": navigation}
             source = digest(making.encode(), page.template.encode(), _bytes_of(context))
             if folder.unchanged(page.path, source):
                 return source, b""
@@ -260,7 +262,6 @@ def _context(page: Page, assets: dict[str, str], night: Any) -> dict[str, Any]:
         "description": page.description,
         "root": "../" * page.path.count("/"),
         "here": page.path,
-        "navigation": NAVIGATION,
         "assets": assets,
         "plotly": page.plotly,
         "module": "",  # the live page has one
