@@ -57,7 +57,10 @@ class NotSupported(EngineError):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Capabilities:
-    """What an engine can be asked. What is not listed is not supported."""
+    """What an engine can be asked through its adapter. What is not listed is not supported.
+
+    Most of that an engine may have and its adapter does not ask for; what it is known not to have is `absent`.
+    """
 
     shapes: frozenset[type[Shape]] = frozenset()  # that can touch
     joints: frozenset[type[Constraint]] = frozenset()
@@ -79,6 +82,9 @@ class Capabilities:
     kinematic: bool = False
     particles: bool = True
     rigid_bodies: bool = True
+    absent: frozenset[str] = (
+        frozenset()
+    )  # as `unsupported` words it: the engine's own lack, not its adapter's
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -328,8 +334,16 @@ def refuse_unsupported(
     }
     can = replace(adapter.capabilities, **absent) if absent else adapter.capabilities
     lacking = unsupported(can, scene, observe)
-    if lacking:
-        raise NotSupported(f"{adapter.name} ({configuration.name}) does not support {', '.join(lacking)}")
+    if not lacking:
+        return
+    always = unsupported(adapter.capabilities, scene, observe)
+    own = [
+        one for one in lacking if one in can.absent or one not in always
+    ]  # the engine's, or this configuration's
+    ours = [one for one in lacking if one not in own]
+    said = [f"{adapter.name} ({configuration.name}) does not support {', '.join(own)}"] if own else []
+    said += [f"our adapter cannot ask {adapter.name} for {', '.join(ours)}"] if ours else []
+    raise NotSupported("; ".join(said))
 
 
 def _result(task: Task, recording: Recording, observe: Mapping[str, Observable]) -> Result:

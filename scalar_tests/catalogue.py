@@ -38,6 +38,8 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "rotating_box": "rotating_box",
     "swinging_door": "swinging_door",
     "lock_ring": "lock_ring",
+    "resting_box": "resting_box",
+    "resting_ball": "resting_ball",
     "resting_stack": "resting_stack",
     "rolling_sphere": "rolling_sphere",
     "pile": "pile",

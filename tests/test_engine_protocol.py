@@ -6,6 +6,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -30,7 +31,15 @@ from spook_tracker.engine import (
     Spring,
 )
 from spook_tracker.engine.find import BUILT, EXTRAS, NODE, EngineMissing, Peer, find
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task, run, unsupported
+from spook_tracker.engine.protocol import (
+    Capabilities,
+    Configuration,
+    NotSupported,
+    Task,
+    refuse_unsupported,
+    run,
+    unsupported,
+)
 from spook_tracker.engine.stepped import Stepped
 from tests.stepping_engine import ENGINE
 
@@ -106,6 +115,24 @@ def test_motors_loops_and_forces_that_are_not_shown() -> None:
         "the observable contact force",
     )
     assert unsupported(replace(can, motors=True, loops=True), scene, {"f": observe["f"]}) == ()
+
+
+def test_the_engine_s_lack_its_configuration_s_and_its_adapter_s_are_told_apart() -> None:
+    hinge = Hinge(name="axle", between=("world", "a"), motor=Motor(speed=1.0))
+    lock = Lock(name="lock", between=("world", "a"))
+    scene = Scene(bodies=(box("a", position=(0, 0, 0)),), constraints=(hinge, lock))
+    can = Capabilities(joints=frozenset({Hinge}), motors=True, absent=frozenset({"the joint lock"}))
+    adapter = SimpleNamespace(name="ours", capabilities=can)
+    strict = Configuration(name="strict", reason="", lacks=("motors", "loops"))
+
+    with pytest.raises(
+        NotSupported,
+        match=r"^ours \(strict\) does not support a motor in a joint, the joint lock, closed loops of joints$",
+    ):
+        refuse_unsupported(adapter, strict, scene, {})
+    with pytest.raises(NotSupported, match=r"^our adapter cannot ask ours for the observable contact force$"):
+        observe = {"c": Final(quantity=ContactForce("a"))}
+        refuse_unsupported(adapter, strict, replace(scene, constraints=()), observe)
 
 
 def test_a_body_alone_or_without_contacts_needs_no_shape() -> None:

@@ -11,6 +11,8 @@ import pytest
 from spook_tracker.engine import (
     Ball,
     Box,
+    Capsule,
+    ContactForce,
     Distance,
     Final,
     Hinge,
@@ -21,6 +23,7 @@ from spook_tracker.engine import (
     Position,
     RigidBody,
     Scene,
+    Sphere,
     Trace,
 )
 from spook_tracker.engine.find import EngineMissing, find
@@ -109,5 +112,48 @@ def test_friction_holds_below_its_coefficient_and_not_above() -> None:
 def test_what_it_lacks_is_not_supported_by_name() -> None:
     ball = Particle(name="ball", mass=1.0, position=(1.0, 0.0, 0.0))
     rod = Distance(name="rod", between=((0.0, 0.0, 0.0), "ball"), compliance=0.0)
-    with pytest.raises(NotSupported, match="the joint distance"):
+    with pytest.raises(NotSupported, match=r"many-iterations. does not support the joint distance"):
         RAPIER.simulate(Scene(bodies=(ball,), constraints=(rod,), gravity=GRAVITY), time_step=STEP, steps=1)
+
+
+def lying(friction: float) -> Scene:
+    """Two balls of 1 kg and 3 kg on a plane; the plane comes last among the bodies."""
+    surface = Material(friction=friction)
+    balls = (
+        RigidBody(
+            name=f"ball {i}", mass=mass, shape=Sphere(0.5), position=(2.0 * i, 0.0, 0.5), material=surface
+        )
+        for i, mass in enumerate((1.0, 3.0))
+    )
+    plane = RigidBody(
+        name="plane", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=surface
+    )
+    return Scene(bodies=(*balls, plane), gravity=GRAVITY)
+
+
+def test_the_force_of_a_contact_is_told_of_either_body_and_of_every_step() -> None:
+    observe = {
+        "up": Trace(quantity=ContactForce("ball 1", "plane")),
+        "down": Final(quantity=ContactForce("plane", "ball 1")),
+        "light": Final(quantity=ContactForce("ball 0")),
+        "between": Final(quantity=ContactForce("ball 0", "ball 1")),
+    }
+    run = RAPIER.simulate(lying(0.0), time_step=STEP, duration=2.0, observe=observe)
+
+    assert run["up"][-1] == pytest.approx([0.0, 0.0, 3.0 * 9.81], rel=1e-4)
+    assert run["up"][0] == pytest.approx([0.0, 0.0, 0.0]), "before the first step"
+    assert run["down"] == pytest.approx(-run["up"][-1])
+    assert run["light"] == pytest.approx([0.0, 0.0, 9.81], rel=1e-4)
+    assert run["between"] == pytest.approx([0.0, 0.0, 0.0])
+
+
+def test_what_only_its_adapter_cannot_ask_is_said_so() -> None:
+    """Rapier has capsules, and tells no direction of a contact's friction."""
+    log = RigidBody(name="log", mass=1.0, shape=Capsule(0.5, 1.0), position=(0.0, 0.0, 0.5))
+    plane = RigidBody(name="plane", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
+    asked = {"f": Final(quantity=ContactForce("ball 0"))}
+
+    with pytest.raises(NotSupported, match=r"^our adapter cannot ask rapier for the shape capsule$"):
+        RAPIER.simulate(Scene(bodies=(log, plane), gravity=GRAVITY), time_step=STEP, steps=1)
+    with pytest.raises(NotSupported, match="our adapter cannot ask rapier for a contact force with friction"):
+        RAPIER.simulate(lying(0.5), time_step=STEP, steps=1, observe=asked)

@@ -10,7 +10,7 @@ import pytest
 
 from spook_tracker.engine import PLAIN, Load, RigidBody, Scene, simulate
 from spook_tracker.engine.joints import Joint
-from spook_tracker.scalar_tests import resting_stack
+from spook_tracker.scalar_tests import resting_box, resting_stack
 from spook_tracker.scalar_tests.beam import scene as beam_scene
 from spook_tracker.scalar_tests.cantilever import scene as cantilever
 from spook_tracker.scalar_tests.cantilever import statics
@@ -33,6 +33,9 @@ KNOWN = (
     ("friction", "box", "anisotropy", 0.1, 1e-3),
     ("cantilever", "dynamic", "tip_against_statics", 0.0, 1e-7),
     ("cantilever", "self-weight", "self_weight_ratio", 0.9925, 1e-4),
+    ("resting_box", "direct", "depth_on_plane", 0.0, 1e-12),
+    ("resting_box", "direct", "depth_on_box", 0.0, 1e-12),
+    ("resting_ball", "direct", "weight_error", 0.0, 1e-12),
     ("resting_stack", "direct", "load_error", 0.0, 1e-9),
     ("resting_stack", "direct", "overlap", 0.0, 1e-9),
 )
@@ -57,6 +60,14 @@ def test_the_ringing_of_the_printed_door_is_the_known_one() -> None:
     printed = next(m for m in CATALOGUE["door"].measurements if m.configuration == "printed")
 
     assert abs(abs(printed.measure(simulate)["weight_error_to_65_s"]) - 0.0193) < 5e-5
+
+
+def test_a_box_on_soft_ground_lies_as_deep_as_its_weight_pushes_it() -> None:
+    """Each of four contact points carries a quarter of the weight, by the compliance of both surfaces: c m g / 2."""
+    on_plane = resting_box.depth(with_scene(yielding), "plane")
+
+    assert on_plane == pytest.approx(1e-7 * resting_box.MASS * resting_box.GRAVITY / 2.0, rel=1e-6)
+    assert resting_box.depth(with_scene(yielding), "box") == pytest.approx(on_plane, rel=1e-6)
 
 
 def test_the_overlap_of_a_stack_is_that_of_its_boxes_and_none_where_they_have_fallen() -> None:
@@ -109,6 +120,14 @@ def overloaded(scene: Scene) -> Scene:
     return replace(scene, forces=tuple(forces))
 
 
+def yielding(scene: Scene) -> Scene:
+    bodies = [
+        replace(b, material=replace(b.material, compliance=1e-7)) if isinstance(b, RigidBody) else b
+        for b in scene.bodies
+    ]
+    return replace(scene, bodies=tuple(bodies))
+
+
 def lighter(scene: Scene) -> Scene:
     x, y, z = scene.gravity
     return replace(scene, gravity=(0.999 * x, 0.999 * y, 0.999 * z))
@@ -152,6 +171,8 @@ BROKEN: dict[str, Simulate] = {
     "loaded_rods": with_scene(much_lighter),
     "motor": with_scene(overdriven),
     "lock_ring": with_joints(compliance=1e-6),
+    "resting_box": with_scene(yielding),
+    "resting_ball": with_scene(lighter),
     "resting_stack": with_scene(lighter),
     "rolling_sphere": with_scene(lighter),
 }

@@ -177,6 +177,31 @@ def test_an_engine_that_gates_nothing_is_shown_against_the_limits_and_counted_ap
     assert "keeps 1 of the 2 limits it can be asked; 1 are not supported" in table
 
 
+def test_what_an_engine_lacks_and_what_its_adapter_does_not_ask_are_summed_up_apart() -> None:
+    from spook_tracker.tracker.cli.report_table import failures
+    from tests.run_documents import definition, run, sample
+
+    said = {
+        "rod/a/m": "rapier (a) does not support the joint distance; our adapter cannot ask rapier for friction",
+        "log/a/m": "our adapter cannot ask rapier for the shape capsule, friction",
+        "bag/a/m": "no engine has bags",
+    }
+    document = run(
+        series=tuple(definition(key, test=key[:3], role="gate", limit=1.0) for key in said),
+        samples=tuple(
+            sample(key, float("nan"), outcome="not_supported", passed=False, failure=why)
+            for key, why in said.items()
+        ),
+    )
+
+    assert failures(document) == [
+        "not supported by our adapter: friction: 2 values of rod, log",
+        "not supported by our adapter: the shape capsule: 1 value of log",
+        "not supported: no engine has bags: 1 value of bag",
+        "not supported: the joint distance: 1 value of rod",
+    ]
+
+
 def test_at_80_columns_the_configurations_of_a_metric_are_told_apart() -> None:
     """One wide limit among all of a night left twelve columns to every name."""
     from spook_tracker.tracker.cli.report_table import pass_table

@@ -1,8 +1,8 @@
 // What every engine in JavaScript shares: tasks as lines of JSON on standard input, the loop with its clock, and for each
 // task an answer, a line of JSON with the number of bytes that follow, the float64 states. A state is 13 numbers a body:
 // position, orientation (w, x, y, z), velocity, angular velocity (SI, world axes); then the forces of constraints that
-// are asked for, one number for a rod's tension, six for a joint's force and torque; then the deepest penetration, if
-// asked for. One process answers task after task, so an engine is compiled once; nothing of a scene is kept.
+// are asked for, one number for a rod's tension, six for a joint's force and torque; then the force between each pair of
+// bodies whose contact forces are asked for, on its first; then the deepest penetration, if asked for. One process answers task after task, so an engine is compiled once; nothing of a scene is kept.
 import { readSync, writeSync } from "node:fs";
 
 const BLOCK = 1000; // steps between two looks at the clock where nothing is recorded between, at most

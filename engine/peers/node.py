@@ -190,11 +190,14 @@ def _prepared() -> None:
 
 
 def _recording(task: dict[str, Any], head: dict[str, Any], states: Array) -> Recording:
-    """`forces_of` says how many numbers follow the bodies' for which constraint; `depth` that one more is the deepest."""
-    forces = task.get("forces_of", {})
-    widths = [13 * len(task["bodies"]), *forces.values(), int(task.get("depth", False))]
+    """`forces_of` says how many numbers follow the bodies' for which constraint, `contacts_of` which pairs of bodies
+    have three more each, and `depth` that one more is the deepest.
+    """
+    forces, pairs = task.get("forces_of", {}), task.get("contacts_of", ())
+    widths = [13 * len(task["bodies"]), *forces.values(), 3 * len(pairs), int(task.get("depth", False))]
     rows = states.reshape(head["kept"], sum(widths))
-    states, *forced, depth = np.split(rows, np.cumsum(widths)[:-1], axis=1)
+    states, *forced, contacts, depth = np.split(rows, np.cumsum(widths)[:-1], axis=1)
+    names = task.get("names", ())
     whole = states.reshape(head["kept"], -1, 13)
     samples = range(task["steps"] + 1) if task["every_step"] else (0, task["steps"])
     return Recording(
@@ -210,6 +213,9 @@ def _recording(task: dict[str, Any], head: dict[str, Any], states: Array) -> Rec
         constraint_forces={
             name: rows[:, 0] if forces[name] == 1 else rows for name, rows in zip(forces, forced, strict=True)
         },
+        contact_forces={
+            (names[i], names[j]): contacts[:, 3 * place : 3 * place + 3] for place, (i, j) in enumerate(pairs)
+        },
         penetration=depth[:, 0] if depth.size else None,
         status=head["status"],
         failure=head["failure"],
@@ -218,7 +224,8 @@ def _recording(task: dict[str, Any], head: dict[str, Any], states: Array) -> Rec
 
 def _nothing(task: dict[str, Any], failure: str) -> Recording:
     bodies = [[*b["position"], *b["orientation"], *b["velocity"], *b["spin"]] for b in task["bodies"]]
-    more = sum(task.get("forces_of", {}).values()) + int(task.get("depth", False))
+    more = sum(task.get("forces_of", {}).values()) + 3 * len(task.get("contacts_of", ()))
+    more += int(task.get("depth", False))
     start = np.array([*chain.from_iterable(bodies), *[0.0] * more])
     head = {
         "kept": 1,

@@ -20,7 +20,8 @@ serve(async (task) => {
     return new R.HalfSpace(vec(shape.normal));
   }
 
-  function bodyOf(given) {
+  const bodyOfCollider = new Map(); // handle → place among the bodies
+  function bodyOf(given, place) {
     const kind = given.mass > 0 ? R.RigidBodyDesc.dynamic() : R.RigidBodyDesc.fixed();
     const described = kind.setTranslation(...given.position).setRotation(quat(given.orientation)).setCanSleep(false);
     const body = world.createRigidBody(
@@ -30,7 +31,10 @@ serve(async (task) => {
     if (given.mass > 0) body.setAdditionalMassProperties(given.mass, vec([0, 0, 0]), inertia, upright, true);
     if (given.shape && task.contacts) {
       const collider = new R.ColliderDesc(shapeOf(given.shape)).setDensity(0).setRestitution(0);
-      world.createCollider(collider.setFriction(given.friction), body);
+      collider.setFriction(given.friction);
+      if (task.contacts_of.length > 0)
+        collider.setActiveEvents(R.ActiveEvents.CONTACT_FORCE_EVENTS).setContactForceEventThreshold(0);
+      bodyOfCollider.set(world.createCollider(collider, body).handle, place);
     }
     return body;
   }
@@ -52,12 +56,35 @@ serve(async (task) => {
     bodies[load.body].addTorque(vec(load.torque), true);
   }
 
-  function state() {
-    return bodies.flatMap((body) => {
-      const [p, q, v, w] = [body.translation(), body.rotation(), body.linvel(), body.angvel()];
-      return [p.x, p.y, p.z, q.w, q.x, q.y, q.z, v.x, v.y, v.z, w.x, w.y, w.z];
+  const column = new Map(task.contacts_of.map(([i, j], place) => [`${i} ${j}`, 3 * place]));
+  const forces = new Float64Array(3 * column.size); // of the last step, N, on the first of each pair
+  const events = column.size > 0 ? new R.EventQueue(true) : undefined;
+
+  function step() {
+    world.step(events);
+    forces.fill(0);
+    events?.drainContactForceEvents((event) => {
+      const [i, j] = [event.collider1(), event.collider2()].map((handle) => bodyOfCollider.get(handle));
+      const force = event.totalForce(); // on the second
+      const [place, sign] = i < j ? [column.get(`${i} ${j}`), -1] : [column.get(`${j} ${i}`), 1];
+      [force.x, force.y, force.z].forEach((part, axis) => {
+        forces[place + axis] += sign * part;
+      });
     });
   }
 
-  return { step: () => world.step(), state, free: () => world.free() };
+  function state() {
+    const all = bodies.flatMap((body) => {
+      const [p, q, v, w] = [body.translation(), body.rotation(), body.linvel(), body.angvel()];
+      return [p.x, p.y, p.z, q.w, q.x, q.y, q.z, v.x, v.y, v.z, w.x, w.y, w.z];
+    });
+    return column.size > 0 ? all.concat(...forces) : all;
+  }
+
+  function free() {
+    events?.free();
+    world.free();
+  }
+
+  return { step, state, free };
 });

@@ -1,11 +1,14 @@
 """Rapier in Node, by its WebAssembly package: single precision, joints and contacts by sequential impulses.
 
 It has no rod of constant length (its rope only pulls), shows no forces of joints, and single precision bounds every
-answer from below.
+answer from below. The force of a contact is the one its contact force events tell, which is along the normal: with
+friction it would be a part, so that it is asked of smooth surfaces only.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
@@ -15,17 +18,20 @@ from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
 from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.forces import Load
 from spook_tracker.engine.joints import Ball, Hinge, Joint, Lock
+from spook_tracker.engine.observe import ContactForce
 from spook_tracker.engine.peers import node
 from spook_tracker.engine.peers.described import described as common
 from spook_tracker.engine.peers.described import numbered
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
 from spook_tracker.engine.recorded_joints import conjugate, joint_point, turned_back
 from spook_tracker.engine.recording import Recording
+from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Box, Plane, Sphere
 
 PACKAGE = "@dimforge/rapier3d-compat"
 SCRIPT = Path(__file__).with_suffix(".mjs")
 FOUND = node.package(PACKAGE)
+MOST_PAIRS = 2000  # of bodies whose contact forces are kept, 48 kB a sample
 
 
 class Rapier:
@@ -36,7 +42,9 @@ class Rapier:
         shapes=frozenset({Sphere, Box, Plane}),
         joints=frozenset({Lock, Ball, Hinge}),
         forces=frozenset({Load}),
+        shows=frozenset({ContactForce}),
         friction=True,
+        absent=frozenset({"the joint distance", "the observable constraint force"}),
     )
     configurations = (
         Configuration(
@@ -66,9 +74,26 @@ def described(task: Task) -> dict[str, Any]:
     scene = task.scene
     joined = {frozenset(c.between) for c in scene.constraints if isinstance(c, Joint)}
     if scene.contacts and any(frozenset(pair) not in joined for pair in scene.no_contact):
-        raise NotSupported("rapier does not support single pairs that must not touch")
+        raise NotSupported("our adapter cannot ask rapier for single pairs that must not touch")
     places = numbered(task)
-    return common(task, FOUND, [_joint(task, constraint, places) for constraint in scene.constraints])
+    constraints = [_joint(task, constraint, places) for constraint in scene.constraints]
+    pairs = _touching(scene, places) if task.contacts else []
+    return {**common(task, FOUND, constraints), "contacts_of": pairs, "names": list(places)}
+
+
+def _touching(scene: Scene, places: Mapping[str, int]) -> list[tuple[int, int]]:
+    """Pairs of bodies that may touch, by their places. Raises NotSupported where their forces would be told in part."""
+    solid = [b for b in scene.bodies if isinstance(b, RigidBody) and b.shape is not None]
+    if any(body.material.friction for body in solid):
+        raise NotSupported("our adapter cannot ask rapier for a contact force with friction")
+    pairs = [
+        (places[a.name], places[b.name])
+        for a, b in combinations(solid, 2)
+        if "dynamic" in (a.motion, b.motion)
+    ]
+    if len(pairs) > MOST_PAIRS:
+        raise NotSupported("our adapter cannot ask rapier for the contact forces of so many bodies")
+    return pairs
 
 
 def _joint(task: Task, joint: Any, places: dict[str, int]) -> dict[str, Any]:
@@ -79,7 +104,7 @@ def _joint(task: Task, joint: Any, places: dict[str, int]) -> dict[str, Any]:
     axes = [turned_back(turn, np.array(getattr(joint, "axis", (0.0, 0.0, 1.0)))) for _, turn in frames]
     if isinstance(joint, Hinge) and np.abs(axes[0] - axes[1]).max() > 1e-12:
         raise NotSupported(
-            "rapier does not support a hinge between bodies that are turned against each other"
+            "our adapter cannot ask rapier for a hinge between bodies that are turned against each other"
         )
     return {
         "kind": {Ball: "ball", Lock: "lock", Hinge: "hinge"}[type(joint)],

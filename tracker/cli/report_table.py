@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections import Counter
 from collections.abc import Sequence
 
@@ -237,12 +238,15 @@ def _lacking(found: Sequence[Pair]) -> list[str]:
     """What an engine cannot be asked, by what it lacks: how many values wait for it, and of which tests."""
     waiting: dict[str, list[str]] = {}
     for definition, sample in found:
-        said, does_not, lacks = clean(sample.failure).partition("does not support ")
-        for lack in lacks.split(", ") if does_not else (said,):
-            waiting.setdefault(lack, []).append(definition.test)
+        for said in clean(sample.failure).split("; "):
+            lead = re.match(r".*?(?:does not support |our adapter cannot ask \S+ for )", said)
+            lacks = said[lead.end() :].split(", ") if lead else [said]
+            by = " by our adapter" if lead and "adapter" in lead[0] else ""
+            for lack in lacks:
+                waiting.setdefault(f"not supported{by}: {lack}", []).append(definition.test)
     most_first = sorted(waiting.items(), key=lambda one: (-len(one[1]), one[0]))
     return [
-        f"not supported: {lack}: {len(tests)} {'value' if len(tests) == 1 else 'values'} of {_some(tests)}"
+        f"{lack}: {len(tests)} {'value' if len(tests) == 1 else 'values'} of {_some(tests)}"
         for lack, tests in most_first
     ]
 

@@ -1,0 +1,130 @@
+"""Is the force under one ball at rest its weight?"""
+
+from __future__ import annotations
+
+import math
+
+from spook_tracker.engine import (
+    PLAIN,
+    ContactForce,
+    Final,
+    Method,
+    Plane,
+    Result,
+    RigidBody,
+    Scene,
+    Sphere,
+)
+from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Example,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
+
+RADIUS = 0.5  # m
+MASS = 1.0  # kg
+GRAVITY = 9.81  # m/s²
+TIME_STEP = 1.0 / 60.0  # s
+DURATION = 2.0  # s, long after whatever gives has come to rest
+WEIGHT = MASS * GRAVITY  # N
+
+
+def scene() -> Scene:
+    """The ball on a smooth plane, touching from the start."""
+    smooth = Material(friction=0.0)
+    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=smooth)
+    ball = RigidBody(
+        name="ball", mass=MASS, shape=Sphere(RADIUS), position=(0.0, 0.0, RADIUS), material=smooth
+    )
+    return Scene(bodies=(floor, ball), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def force(simulate: Simulate, time_step: float = TIME_STEP, method: Method = PLAIN) -> dict[str, float]:
+    """What the plane does to the ball, over its weight: upwards, less one, and sideways."""
+    observe = {"force": Final(quantity=ContactForce("ball", "floor"))}
+    result = simulate(scene(), time_step=time_step, duration=DURATION, method=method, observe=observe)
+    x, y, z = (float(part) / WEIGHT for part in result["force"])
+    return {"weight_error": z - 1.0, "sideways": math.hypot(x, y)}
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """How far the force is from the weight, over the weight."""
+    return abs(force(simulate, time_step, method)["weight_error"])
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same with nothing observed."""
+    return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
+
+
+TEST = ScalarTest(
+    title="Resting ball",
+    question="Is the force under one ball at rest its weight?",
+    why="What an engine says of contact forces is read by games, robots and scales; one ball at rest shows whether it is so.",
+    model="A ball lies on a smooth plane, touching from the start, for two seconds.",
+    parameters=(
+        ("ball", "radius 0.5 m, 1 kg"),
+        ("gravity", "9.81 m/s²"),
+        ("friction coefficient", "0"),
+        ("time step", "1/60 s, 120 steps"),
+    ),
+    theory=("F = m g, along the normal.",),
+    reference="Statics (closed form).",
+    conclusion="Green: the force that is told is the one that acts. Red: it is another one, or the ball is not at rest.",
+    source="ours; users of Rapier 0.12 found a quarter of the weight (dimforge/rapier.js#261)",
+    measurements=(
+        Measurement(
+            configuration="direct",
+            time_step=TIME_STEP,
+            metrics=(
+                Metric(
+                    name="weight_error",
+                    description="upward force of the plane on the ball over its weight, less one, after 2 s",
+                    unit="1",
+                    role="gate",
+                    limit=1e-9,
+                    limit_source="statics, to rounding",
+                    reference=0.0,
+                    tolerance=1e-12,
+                ),
+                Metric(
+                    name="sideways",
+                    description="sideways force of the plane on the ball over its weight, after 2 s",
+                    unit="1",
+                    role="companion",
+                    limit=1e-9,
+                    limit_source="a smooth plane pushes along its normal alone",
+                    reference=0.0,
+                    tolerance=1e-12,
+                ),
+            ),
+            measure=force,
+            note="Direct solver.",
+        ),
+    ),
+    example=lambda: Example(scene=scene(), time_step=TIME_STEP),
+    ladders=(
+        Ladder(
+            name="force",
+            description="how far the force under the ball is from its weight, over its weight, after 2 s",
+            unit="1",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=None),
+                Configuration(
+                    name="iterative, 50 sweeps", method=Method(solver="iterative"), expected_order=None
+                ),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-3,
+            target_seconds=0.1,
+        ),
+    ),
+)

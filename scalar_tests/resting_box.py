@@ -1,0 +1,117 @@
+"""How deep does one box sink into what it stands on?"""
+
+from __future__ import annotations
+
+from spook_tracker.engine import PLAIN, Box, Final, Method, Plane, Position, Result, RigidBody, Scene
+from spook_tracker.engine.bodies import Material
+from spook_tracker.engine.shapes import Shape
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Example,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+)
+
+EDGE = 0.5  # m
+MASS = 1.0  # kg
+GRAVITY = 9.81  # m/s²
+TIME_STEP = 1.0 / 500.0  # s
+DURATION = 2.0  # s, long after whatever gives has come to rest
+FLOORS: dict[str, Shape] = {"plane": Plane(), "box": Box((EDGE, EDGE, EDGE))}
+
+
+def scene(floor: str) -> Scene:
+    """The box, touching from the start, on a fixed `floor`: a plane or an equal box."""
+    rough = Material(friction=0.5)
+    top = 0.5 * EDGE if floor == "box" else 0.0
+    under = RigidBody(
+        name="floor", motion="static", shape=FLOORS[floor], position=(0.0, 0.0, 0.0), material=rough
+    )
+    box = RigidBody(
+        name="box",
+        mass=MASS,
+        shape=Box((EDGE, EDGE, EDGE)),
+        position=(0.0, 0.0, top + 0.5 * EDGE),
+        material=rough,
+    )
+    return Scene(bodies=(under, box), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def depth(simulate: Simulate, floor: str, time_step: float = TIME_STEP, method: Method = PLAIN) -> float:
+    """How far the box lies below where it was put [m], once it rests."""
+    observe = {"moved": Final(quantity=Position("box"), from_start=True)}
+    result = simulate(scene(floor), time_step=time_step, duration=DURATION, method=method, observe=observe)
+    return -float(result["moved"][2])
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """The depth on a box [m]."""
+    return abs(depth(simulate, "box", time_step, method))
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same with nothing observed."""
+    return simulate(scene("box"), time_step=time_step, duration=DURATION, method=method)
+
+
+def _on(floor: str) -> Measurement:
+    return Measurement(
+        configuration="direct",
+        time_step=TIME_STEP,
+        metrics=(
+            Metric(
+                name=f"depth_on_{floor}",
+                description=f"how deep the box lies in the {floor} it stands on, after 2 s",
+                unit="m",
+                role="gate",
+                limit=1e-9,
+                limit_source="rigid bodies that only touch at the start stay so, to rounding",
+                reference=0.0,
+                tolerance=1e-12,
+            ),
+        ),
+        measure=lambda simulate: {f"depth_on_{floor}": depth(simulate, floor)},
+        note="Direct solver.",
+    )
+
+
+TEST = ScalarTest(
+    title="Resting box",
+    question="How deep does one box sink into the plane or the box it stands on?",
+    why="The most direct question about contact: one body, one depth. What changes here changes in every heap.",
+    model="A box stands on a plane, and one on an equal box that is fixed, touching from the start, for two seconds.",
+    parameters=(
+        ("box", "0.5 × 0.5 × 0.5 m, 1 kg"),
+        ("gravity", "9.81 m/s²"),
+        ("friction coefficient", "0.5"),
+        ("time step", "1/500 s, 1000 steps"),
+    ),
+    theory=("Rigid bodies at rest that touch have the depth 0.",),
+    reference="Rigid bodies (closed form); engines of soft contacts have a depth of their own, which must not change.",
+    conclusion="Green: contact holds bodies where they are. Red: it lets them sink.",
+    source="ours; the depth of a box on a box halved from MuJoCo 3.3.7 to 3.4.0",
+    measurements=(_on("plane"), _on("box")),
+    example=lambda: Example(scene=scene("box"), time_step=TIME_STEP),
+    ladders=(
+        Ladder(
+            name="depth",
+            description="how deep the box lies in the box it stands on after 2 s",
+            unit="m",
+            time_steps=tuple(1.0 / n for n in (60, 120, 240, 500)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=None),
+                Configuration(
+                    name="iterative, 50 sweeps", method=Method(solver="iterative"), expected_order=None
+                ),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-3,
+            target_seconds=0.1,
+        ),
+    ),
+)
