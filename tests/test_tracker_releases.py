@@ -17,10 +17,11 @@ import spook_tracker.tracker.cli.releases as command
 import spook_tracker.tracker.measure.releases as releases
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.cli.main import main
+from spook_tracker.tracker.document.run_document import DrawnSolid, SceneDrawing
 from spook_tracker.tracker.judge.comparison_document import Change
 from spook_tracker.tracker.judge.release_notes import read_changelog, visible
 from spook_tracker.tracker.library import record
-from tests.run_documents import engine, run_of
+from tests.run_documents import card, definition, engine, run, run_of, sample
 
 KEY = "falling_object/rk4/position_error/h=0.0166667"
 
@@ -146,6 +147,73 @@ def release(version: str, day: int, values: dict[str, Any]) -> Any:
     return run_of(values, engine=built, started=started, finished=started)
 
 
+def asked(version: str, day: int, values: dict[str, float], unit: str = "m") -> Any:
+    """Of a stack of three boxes of 1 m edge, and of one ball."""
+    named = {key: key.split("/") for key in values}
+    built = engine("", name="other", version=version, commit_time="", parents=())
+    started = f"2026-01-{day:02}T00:00:00+00:00"
+    floor = DrawnSolid(kind="plane", position=(0.0, 0.0, 0.0), size=(0.0, 0.0, 1.0), fixed=True)
+    box = DrawnSolid(kind="box", position=(0.0, 0.0, 0.0), size=(1.0, 1.0, 1.0))
+    ball = DrawnSolid(kind="sphere", position=(0.0, 0.0, 0.0), size=(0.5,))
+    drawn = {"stack": SceneDrawing(solids=(floor, box, box, box)), "ball": SceneDrawing(solids=(floor, ball))}
+    facts = {"role": "reported", "limit": None, "set_point": None, "parameters": {}, "unit": unit}
+    return run(
+        engine=built,
+        started=started,
+        finished=started,
+        tests=tuple(card(name=name, scene=scene) for name, scene in drawn.items()),
+        series=tuple(
+            definition(key, test=test, configuration=setting, metric=metric, **facts)
+            for key, (test, setting, metric, *_) in named.items()
+        ),
+        samples=tuple(sample(key, value) for key, value in values.items()),
+        id=f"{version}-{day}",
+        idempotency_key=f"{version}-{day}",
+    )
+
+
+def told_between(tmp_path: Path, before: dict[str, float], after: dict[str, float]) -> list[str]:
+    database = history(tmp_path, asked("1.0", 1, before), asked("1.1", 2, after))
+    return CliRunner().invoke(main, ["releases", "other", "--db", database]).output.splitlines()[1:]
+
+
+def test_one_body_comes_before_a_heap_however_much_the_heap_changed(tmp_path: Path) -> None:
+    before = {"stack/a/drift": 1e-6, "ball/a/depth": 2e-4}
+    told = told_between(tmp_path, before, {"stack/a/drift": 0.4, "ball/a/depth": 1e-4})
+
+    assert [line.split()[1] for line in told] == ["ball/a/depth", "stack/a/drift"]
+
+
+def test_a_collapse_is_told_once_and_as_one(tmp_path: Path) -> None:
+    """A box 7 m from its place is no stack: what else was asked of that run is named, and of others it is told."""
+    names = ["stack/a/drift", "stack/a/gain", "stack/a/overlap", "stack/b/overlap"]
+    told = told_between(
+        tmp_path, dict.fromkeys(names, 0.1), dict(zip(names, (7.0, 9e9, 0.2, 0.05), strict=True))
+    )
+
+    assert told == [
+        "  collapses      stack/a/drift  0.1 → 7 m, and with it gain, overlap",
+        "  improved       stack/b/overlap  0.1 → 0.05 m",
+    ]
+    back = told_between(tmp_path / "back", {"stack/a/drift": 7.0}, {"stack/a/drift": 0.1})
+    assert back == ["  holds          stack/a/drift  7 → 0.1 m"]
+
+
+def test_nothing_decisive_is_left_out_and_what_is_left_out_is_named(tmp_path: Path) -> None:
+    """Each quantity is told for the worse and for the better; of one body all is told."""
+    settings = [f"stack/{letter}/drift" for letter in "abcde"]
+    before = dict.fromkeys([*settings, "stack/f/drift", "stack/f/overlap"], 0.01)
+    after = {**dict.fromkeys(settings, 0.02), "stack/f/drift": 0.005, "stack/f/overlap": 0.005}
+    told = told_between(tmp_path, before, after)
+
+    assert [line.split()[1] for line in told[:-1]] == [*settings[:3], "stack/f/drift", "stack/f/overlap"]
+    assert told[-1].strip() == "… and 2 more of stack: drift in d, e"
+
+    balls = [f"ball/{letter}/depth" for letter in "abcdef"]
+    every = told_between(tmp_path / "balls", dict.fromkeys(balls, 0.01), dict.fromkeys(balls, 0.02))
+    assert [line.split()[1] for line in every] == balls
+
+
 def test_the_rest_goes_on_when_a_release_fails_and_a_second_call_measures_only_what_is_missing(
     tmp_path: Path,
 ) -> None:
@@ -174,6 +242,7 @@ def test_the_rest_goes_on_when_a_release_fails_and_a_second_call_measures_only_w
 
 
 def history(tmp_path: Path, *runs: Any) -> str:
+    tmp_path.mkdir(exist_ok=True)
     database = f"sqlite:///{tmp_path}/history.db"
     for one in runs:
         record(one, database)
@@ -204,7 +273,7 @@ def test_a_page_names_the_releases_it_was_made_of_and_every_quantity_that_change
     many = [f"falling_object/{setting}/position_error/h=0.0166667" for setting in ("a", "b", "c", "d")]
     other = "falling_object/e/velocity_error/h=0.0166667"
     before, after = dict.fromkeys([*many, other], 0.5), {**dict.fromkeys(many, 50.0), other: 0.51}
-    database = history(tmp_path, release("1.9", 1, before), release("1.10", 2, after))
+    database = history(tmp_path, asked("1.9", 1, before, "J"), asked("1.10", 2, after, "J"))
     told = CliRunner().invoke(main, ["releases", "other", "--markdown", "--db", database]).output
 
     assert "tracker backfill --engine other 1.9 1.10 --limit 5 --test=falling_object" in " ".join(

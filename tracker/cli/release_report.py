@@ -19,16 +19,26 @@ from spook_tracker.tracker.judge.release_notes import (
     told,
     visible,
 )
-
-SHOWN = 3  # changes of one test in a list; the database has them all
+from spook_tracker.tracker.judge.release_order import (
+    NOT_DRAWN,
+    Scene,
+    Told,
+    direct_first,
+    left_out,
+    scenes,
+    told_of,
+)
 
 
 def steps_between(history: Any, engine: str) -> tuple[list[Any], list[Step]]:
     """The newest run of each measured release, oldest first, and what changed from each to the next."""
     from spook_tracker.tracker.library import compare
 
+    drawn: dict[str, Scene] = {}
     newest = {run.engine.version: run for run in history.runs(engine)}
     runs = list(newest.values())
+    for run in runs:  # a test may be one that the newest was not asked
+        drawn |= scenes(history.cards(run.id))
     steps = []
     for before, after in itertools.pairwise(runs):
         found = compare(history, before.id, after.id)
@@ -37,16 +47,17 @@ def steps_between(history: Any, engine: str) -> tuple[list[Any], list[Step]]:
             Step(
                 release=after.engine.version,
                 before=before.engine.version,
-                changes=tuple(change for change in found.changes if visible(change)),
+                changes=tuple(direct_first((change for change in found.changes if visible(change)), drawn)),
                 asked=len(both),
                 alike=alike(found.changes),
+                scenes=drawn,
             )
         )
     return runs, steps
 
 
 def text_lines(engine: str, steps: Sequence[Step], changelog: Changelog | None) -> list[str]:
-    """A line for every release, and below it what changed, worst first."""
+    """A line for every release, and below it what changed: direct questions first, of each the worst."""
     if not steps:
         return [
             f"fewer than two releases of {engine} are recorded; measure more: tracker backfill --engine {engine}"
@@ -58,9 +69,11 @@ def text_lines(engine: str, steps: Sequence[Step], changelog: Changelog | None) 
             if test in step.alike:
                 lines += [f"  {test}: {sentence}" for sentence in told(found)]
                 continue
-            lines += [f"  {change.word:<14} {change.series}  {values(change)}" for change in found[:SHOWN]]
-            if len(found) > SHOWN:
-                lines.append(f"  {'':<14} … and {len(found) - SHOWN} more of {found[0].test}")
+            shown, out = told_of(found, step.scenes.get(test, NOT_DRAWN))
+            lines += [
+                f"  {one.word:<14} {one.change.series}  {values(one.change)}{_brought(one)}" for one in shown
+            ]
+            lines += [f"  {'':<14} {left_out(test, out)}"] if out else []
         lines += _unchanged(step)
     if changelog is None:
         return lines
@@ -124,7 +137,7 @@ def page(
     for step in without_models(steps):
         if step.changes:
             lines += [f"### {step.release}, after {step.before}", ""]
-            lines += [*_change_table(step.changes), ""]
+            lines += [*_change_table(step), ""]
     return "\n".join(lines).rstrip() + "\n"
 
 
@@ -173,25 +186,22 @@ def _against(checked: Checked, changelog: Changelog) -> list[str]:
     return [*lines, ""]
 
 
-def _change_table(changes: Sequence[Change]) -> list[str]:
+def _change_table(step: Step) -> list[str]:
     lines = ["| series | before | after | unit | |", "|---|---|---|---|---|"]
-    for found in by_test(changes).values():
-        told = _worst_of_each(found)
-        for change in told:
-            before, after = _words(change)
-            lines.append(f"| `{change.series}` | {before} | {after} | {change.unit} | {change.word} |")
-        if len(found) > len(told):
-            lines.append(f"| … and {len(found) - len(told)} more of {found[0].test} | | | | |")
+    for test, found in by_test(step.changes).items():
+        shown, out = told_of(found, step.scenes.get(test, NOT_DRAWN))
+        for one in shown:
+            before, after = _words(one.change)
+            said = f"{one.word}{_brought(one)}"
+            lines.append(f"| `{one.change.series}` | {before} | {after} | {one.change.unit} | {said} |")
+        lines += [f"| {left_out(test, out)} | | | | |"] if out else []
     return lines
 
 
-def _worst_of_each(found: Sequence[Change]) -> list[Change]:
-    """The worst three, and the worst of every other quantity: none is named by its number alone."""
-    told = list(found[:SHOWN])
-    for change in found[SHOWN:]:
-        if change.series.split("/")[2] not in {one.series.split("/")[2] for one in told}:
-            told.append(change)
-    return told
+def _brought(one: Told) -> str:
+    """What a collapse changed besides, by name alone."""
+    names = ", ".join(dict.fromkeys(change.metric for change in one.brought))
+    return f", and with it {names}" if names else ""
 
 
 def values(change: Change) -> str:

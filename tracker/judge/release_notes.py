@@ -17,6 +17,7 @@ from typing import Any
 from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.judge.comparison_document import Change
 from spook_tracker.tracker.judge.model_words import Moved, severity, words
+from spook_tracker.tracker.judge.release_order import Scene
 
 SEEN = 1e-6  # relative: below it a value that changed is rounding to a reader of releases
 NOTHING = 1e-12  # of any unit: below it a value is zero to a reader of releases
@@ -28,9 +29,10 @@ class Step:
 
     release: str
     before: str
-    changes: tuple[Change, ...]  # that a reader can see, the worst first
+    changes: tuple[Change, ...]  # that a reader can see: direct questions first, of each the worst
     asked: int  # series measured in both
     alike: Mapping[str, tuple[int, int]] = field(default_factory=dict)  # model: same bits; rounding
+    scenes: Mapping[str, Scene] = field(default_factory=dict)  # by test
 
 
 @dataclass(frozen=True, kw_only=True)
