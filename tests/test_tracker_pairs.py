@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 import random
 import shutil
 from collections.abc import Callable, Sequence
@@ -13,11 +14,13 @@ import pytest
 from click.testing import CliRunner
 from msgspec.structs import replace
 
+from spook_tracker.tracker.cli.change import _usual
 from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import Asked, RunDocument, Timing
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
-from spook_tracker.tracker.judge.pairs import BLOCKS
+from spook_tracker.tracker.judge.pairs import BLOCKS, usual_spread
+from spook_tracker.tracker.library import History, record
 from spook_tracker.tracker.measure.commits import CommitError
 from spook_tracker.tracker.pairs import compare_by_pairs
 from tests.run_documents import definition, engine, run, sample
@@ -311,3 +314,54 @@ def test_a_question_that_is_deleted_is_red(pebble: Pebble) -> None:
 
     assert shown.exit_code == 1, shown.output
     assert "removed" in shown.output
+
+
+def slow(seconds: float, spread: float, seed: int) -> Callable[[], float]:
+    draw = random.Random(seed)
+    return lambda: seconds * (1.0 + spread * draw.gauss(0.0, 1.0))
+
+
+def test_the_stored_history_says_how_much_noise_is_usual_and_decides_nothing() -> None:
+    """Processes that differ by 1 % where nights differ by .2 %: said, and +10 % is found all the same."""
+    asked: list[Any] = []
+
+    def usual(machine: str, rungs: Any) -> dict[str, float]:
+        asked.append((machine, dict(rungs)))
+        return {RUN_TIME: 0.002}
+
+    sides = [Side(BASE, seconds=slow(0.01, 0.01, 1)), Side(CHANGE, seconds=slow(0.011, 0.01, 2))]
+    again = [Side(BASE, seconds=slow(0.01, 0.01, 1)), Side(CHANGE, seconds=slow(0.011, 0.01, 2))]
+    told_of, without = compared(*sides, usual=usual), compared(*again)
+
+    assert asked == [(told_of.after.machine, {RUN_TIME: (RUNG,)})]
+    assert "(0.2 % is usual)" in told(told_of, RUN_TIME).sentence
+    assert any(note.startswith("busy: 1 of 1 run times differ") for note in told_of.notes)
+    assert (told_of.exit_code, without.exit_code) == (1, 1)
+    assert not any("usual" in text for text in (*without.notes, told(without, RUN_TIME).sentence))
+
+
+def test_what_is_usual_is_the_spread_between_nights_and_a_level_that_changed_once_adds_nothing() -> None:
+    draw = random.Random(3)
+    quiet = [0.01 * (1.0 + 0.003 * draw.gauss(0.0, 1.0)) for _ in range(30)]
+    shifted = [level * (1.0 if night < 15 else 2.0) for night, level in enumerate(quiet)]
+    middle = 0.003 * 0.6745  # the median distance of normal noise
+
+    assert usual_spread(quiet) == pytest.approx(middle, rel=0.35)
+    assert usual_spread(shifted) == pytest.approx(usual_spread(quiet), rel=0.25)
+    assert math.isnan(usual_spread(quiet[:4])), "too few nights"
+
+
+def test_what_is_usual_is_read_from_the_nights_of_that_machine(tmp_path: Path) -> None:
+    database = f"sqlite:///{tmp_path}/x.db"
+    levels = itertools.cycle((0.0100, 0.0102))
+    side = Side(BASE, seconds=lambda: next(levels))
+    for night in range(12):
+        record(replace(side(()), id=f"{night:02}", idempotency_key=f"{night:02}"), database)
+
+    with History.open(database) as history:
+        machine = history.runs()[0].machine.fingerprint
+        found = _usual(database, machine, {RUN_TIME: (RUNG,)})
+
+    assert found == {RUN_TIME: pytest.approx(math.log(1.02) / math.sqrt(2.0))}
+    assert _usual(database, "another", {RUN_TIME: (RUNG,)}) == {}
+    assert _usual(f"sqlite:///{tmp_path}/none.db", machine, {RUN_TIME: (RUNG,)}) == {}

@@ -32,7 +32,15 @@ from spook_tracker.tracker.judge.compare import (
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
 from spook_tracker.tracker.judge.explaining import EXPLAINING, beside_run_times
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
-from spook_tracker.tracker.judge.pairs import BLOCKS, SMALLEST, Decision, Paired, to_be_repeated
+from spook_tracker.tracker.judge.pairs import (
+    BLOCKS,
+    SMALLEST,
+    UNUSUAL,
+    Decision,
+    Paired,
+    to_be_repeated,
+    usual_spread,
+)
 from spook_tracker.tracker.judge.series_history import is_read_off
 from spook_tracker.tracker.judge.verdict import badness, same_bits
 from spook_tracker.tracker.judge.work import with_work
@@ -41,6 +49,9 @@ from spook_tracker.tracker.measure.commits import CommitError
 Ask = Callable[[Sequence[str]], RunDocument]  # puts these tests, all if none are named, to a fresh process
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 Line = Callable[[str], None]
+Usual = Callable[
+    [str, Mapping[str, Sequence[str]]], Mapping[str, float]
+]  # spread of run times on a machine, relative
 GONE = ("removed", "missing")  # what a second process would not bring back
 
 
@@ -92,10 +103,12 @@ def compare_by_pairs(
     accepted: Sequence[Accepted] = (),
     seed: str = "",
     tell: Line = lambda line: None,
+    usual: Usual = lambda machine, rungs: {},
 ) -> CompareDocument:
     """The change against its base. `seed` draws the order of the processes. Raises what asking raises.
 
-    `by_old` puts the base's questions to the change, where its own are others; what CommitError it raises is said.
+    `usual` is what the history knows of a machine and of run times made of these series; it is told beside the spread
+    between processes, and decides nothing. `by_old` puts the base's questions to the change, where its own are others; what CommitError it raises is said.
     """
     sides = _Sides(base, change, random.Random(seed))
     before, after = map(sides.compared, sides.first())
@@ -137,7 +150,8 @@ def compare_by_pairs(
             decided[key] = paired.decision(count)
             if decided[key] != "open":
                 del left[key]
-    changes = [_told(c, times | tested, decided) for c in document.changes]
+    known = usual(after.side.machine, {key: rungs[key][0] for key in tested if key in times})
+    changes = [_told(c, times | tested, decided, known) for c in document.changes]
     changes = beside_run_times(changes, before.samples, after.samples)
     changes, why_not = _by_old_questions(sides, before, changes, by_old)
     changes = [accept(c, accepted, after.night) for c in changes]
@@ -148,7 +162,7 @@ def compare_by_pairs(
     )
     return msgspec.structs.replace(
         document, changes=tuple(changes), verdict=verdict, exit_code=exit_code(verdict),
-        counts=dict(Counter(c.word for c in changes)), notes=(*document.notes, note, *why_not),
+        counts=dict(Counter(c.word for c in changes)), notes=(*document.notes, note, *_unusual(tested, known), *why_not),
     )  # fmt: skip
 
 
@@ -241,7 +255,38 @@ def _repeated(key: str, first: Samples, again: Sequence[Samples]) -> bool:
     )
 
 
-def _told(change: Change, times: Mapping[str, Paired], decided: Mapping[str, Decision]) -> Change:
+def usual_spreads(
+    history: Any, nights: Sequence[Any], rungs: Mapping[str, Sequence[str]]
+) -> dict[str, float]:
+    """What is usual between nights, of run times made of these series; those of too few nights are left out."""
+    measured = history.samples_of(
+        [night.id for night in nights], keys={k for keys in rungs.values() for k in keys}
+    )
+    told = {
+        key: usual_spread([_level(measured[night.id], keys) for night in nights])
+        for key, keys in rungs.items()
+    }
+    return {key: spread for key, spread in told.items() if math.isfinite(spread)}
+
+
+def _unusual(tested: Mapping[str, Paired], known: Mapping[str, float]) -> list[str]:
+    """A sentence where processes differ more than nights of this machine do: small changes may not be proven."""
+    ratios = [tested[key].spread / usual for key, usual in known.items() if usual > 0.0]
+    more = [ratio for ratio in ratios if ratio > UNUSUAL]
+    if not more:
+        return []
+    return [
+        f"busy: {len(more)} of {len(ratios)} run times differ between processes by up to {max(more):.1f} times what is "
+        "usual between nights of this machine, so small changes may not be proven"
+    ]
+
+
+def _told(
+    change: Change,
+    times: Mapping[str, Paired],
+    decided: Mapping[str, Decision],
+    known: Mapping[str, float],
+) -> Change:
     """A change as the processes decided it."""
     paired, decision = times.get(change.series), decided.get(change.series)
     if paired is None or decision is None:  # what is read off the clock of one process says nothing
@@ -250,6 +295,8 @@ def _told(change: Change, times: Mapping[str, Paired], decided: Mapping[str, Dec
     processes = 1 + sum(len(base) for base, _ in paired.blocks)
     of = f"in {processes} process{'es' * (processes > 1)} of either side"
     spread = f", which differ by {100.0 * paired.spread:.1f} %" if math.isfinite(paired.spread) else ""
+    if spread and change.series in known:
+        spread += f" ({100.0 * known[change.series]:.1f} % is usual)"
     red = decision == "slower"
     if change.kind not in TIMES:
         words = f"{change.sentence}; differs from process to process, {'worse' if red else 'no worse'} {of}"

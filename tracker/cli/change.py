@@ -10,6 +10,7 @@ from spook_tracker.tracker.cli.options import complain
 from spook_tracker.tracker.measure.bounds import MEMORY, TIME_LIMIT
 
 PROCESS = "process"  # the executor by default
+NIGHTS = 30  # of a machine, from which what is usual is taken
 NEAREST = 10  # ancestors of a base that does not build which are tried instead of it
 
 
@@ -38,7 +39,22 @@ def beside_its_base(
         accepted,
         f"{first} {head}",
         say,
+        lambda machine, rungs: _usual(database, machine, rungs),
     )
+
+
+def _usual(database: str, machine: str, rungs: Mapping[str, Sequence[str]]) -> Mapping[str, float]:
+    """The spread of run times between the last nights of a machine; nothing without a history."""
+    from spook_tracker.tracker.cli.history import history_of
+    from spook_tracker.tracker.document.errors import TrackerError
+    from spook_tracker.tracker.pairs import usual_spreads
+
+    try:
+        with history_of(database) as history:
+            nights = [run for run in history.runs() if run.machine.fingerprint == machine]
+            return usual_spreads(history, nights[-NIGHTS:], rungs)
+    except TrackerError:  # there is none yet
+        return {}
 
 
 def _base_of(team: Any, base: str, head: str, database: str) -> str:

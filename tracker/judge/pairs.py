@@ -15,6 +15,7 @@ processes of the base alike and n of the change alike and worse in (q (1 − q))
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -33,6 +34,9 @@ LOOKS = (
     len(BLOCKS) - 1
 )  # that may call it slower: of the first block there are too few orders, it only lets go
 HOPELESS = 0.2  # probability by chance above which a run time is not pursued
+
+NIGHTS = 5  # of a machine, before what is usual on it is known
+UNUSUAL = 2.0  # times what is usual: a spread between processes beyond it is said
 
 Decision = Literal["open", "slower", "not slower", "not proven"]
 
@@ -86,6 +90,17 @@ class Paired:
 
     def _all(self, side: Literal[0, 1]) -> list[float]:
         return [level for block in self.blocks for level in block[side]]
+
+
+def usual_spread(levels: Sequence[float]) -> float:
+    """How far a night of a machine lies from its level, in the middle, relatively; NaN of less than NIGHTS.
+
+    From night to the next, so that a level that changed once counts once: two nights differ by √2 of what one is off.
+    """
+    sound = [level for level in levels if 0.0 < level < math.inf]
+    if len(sound) < NIGHTS:
+        return math.nan
+    return median([abs(math.log(b / a)) for a, b in itertools.pairwise(sound)]) / math.sqrt(2.0)
 
 
 def to_be_repeated(values: int) -> int:
