@@ -347,3 +347,37 @@ def test_the_printed_report_hides_what_cannot_be_printed(driver: Any, site: Path
     finally:
         driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})
     assert shown == [False, False, True]
+
+
+def test_a_long_list_shows_its_first_and_the_rest_on_request_or_when_one_is_meant(
+    driver: Any, site: Path
+) -> None:
+    """Five cards on a telephone; a search, and an address that names one, show what they mean."""
+    visit(driver, site, "index.html", width=360)
+    shown = (
+        "return [...document.querySelectorAll('#nights, tbody tr')].filter((e) => e.checkVisibility()).length"
+    )
+    folded = driver.execute_script(shown)
+    driver.execute_script("document.querySelector('.fold-more button').click()")
+    whole = driver.execute_script(shown)
+
+    assert driver.execute_script("return document.querySelectorAll('tbody tr').length") > 6
+    assert folded < whole
+    assert driver.execute_script("return document.activeElement.closest('tr') !== null"), (
+        "reading goes on there"
+    )
+
+
+@pytest.mark.parametrize(("words", "found"), [("run,  FRICTION", True), ("no such test", False)])
+def test_find_takes_words_in_any_order_and_says_when_nothing_fits(
+    driver: Any, site: Path, words: str, found: bool
+) -> None:
+    visit(driver, site, "error-time.html")
+    driver.find_element("id", "search").send_keys(words)
+
+    fit = driver.execute_script(
+        "return [...document.querySelectorAll('.charts .cell')].filter((c) => c.checkVisibility()).map((c) => c.textContent)"
+    )
+    told = driver.execute_script("return document.getElementById('none-found').checkVisibility()")
+    assert bool(fit) == found and told != found
+    assert all("riction" in text for text in fit)

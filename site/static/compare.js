@@ -133,6 +133,7 @@
       make("p", {}, [0, 1].map((side) => `${names[side]} keeps ${kept[side]} of ${answered[side]} limits it has an answer to`).join("; ") + "."),
       make("p", { class: "small soft" }, "Engines are not held to each other’s values: nothing here is red. Who is ahead at equal error stands on the page ", make("a", { href: "engines.html" }, "Engines"), "."),
       ...listed("Every gate that one of them was asked; first those that one of them breaks.", [["Gate"], [names[0], "num"], [names[1], "num"], ["Who keeps the limit"]], shown, row));
+    folds(told);
   }
 
   // A table of as many lines as one reads, and the rest on request.
@@ -191,6 +192,7 @@
         [["Test"], ["Configuration"], ["Run time at equal error", "num"], ["Error at equal time", "num"], ["Work at equal error", "num"]], lines)));
     }
     told.replaceChildren(...parts);
+    folds(told);
     told.dataset.shown = `${i},${j}`;
   }
 

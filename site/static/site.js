@@ -200,34 +200,74 @@ function sortBy(table, head, down) {
   head.setAttribute("aria-sort", down ? "descending" : "ascending");
 }
 
-// --- the filter of a list: what it hides is a line of a table, or a group of lines, with data-state ---
+// --- long lists: the first entries and a button for the rest ---
+const FIRST = { charts: { wide: 12, narrow: 5 }, rows: { wide: 40, narrow: 5 } };  // as site.css hides them
+
+function fold(list) {
+  const kind = list.tagName === "TBODY" ? "rows" : "charts", first = FIRST[kind], count = list.children.length;
+  if (count <= first.narrow + 1 || list.dataset.fold) { return; }
+  list.dataset.fold = kind;
+  const button = document.createElement("button"), line = document.createElement("p");
+  button.type = "button";
+  button.className = "button";
+  button.textContent = kind === "rows" ? `Show all ${count} rows` : "Show all of them";
+  button.addEventListener("click", () => {
+    const next = [...list.children].find((entry) => !entry.checkVisibility());
+    unfold(list);
+    next?.querySelector("a, summary, button")?.focus();
+  });
+  line.className = count > first.wide ? "fold-more" : "fold-more narrow";
+  line.append(button);
+  (list.closest(".scroll") || list).after(line);
+  list.foldLine = line;
+}
+
+function unfold(list) {
+  list.dataset.fold = "open";
+  list.foldLine?.remove();
+}
+
+function folds(within = document) {
+  within.querySelectorAll(".card.scroll > table > tbody, .cause > .scroll > table > tbody, .charts").forEach(fold);
+}
+
+// What an address names, or a reader looks for, is not hidden.
+function unfoldTo(element) {
+  const list = element?.parentElement?.closest("[data-fold]");
+  if (list) { unfold(list); unfoldTo(list); }
+}
+
+// --- the filter of a list: what it hides is a line of a table, a chart, or a group of lines, with data-state ---
 function filter() {
   const tools = document.getElementById("filter");
   if (!tools) { return; }
   const search = document.getElementById("search"), show = document.getElementById("show"), none = document.getElementById("none-found");
   const groups = [...document.querySelectorAll("details.cause")];
-  const lines = groups.length ? groups : [...tools.parentElement.querySelectorAll("tbody tr")];
+  const lines = groups.length ? groups : [...tools.parentElement.querySelectorAll(".charts .cell, tbody tr")];
   const known = new Map();
   const textOf = (element) => {
     if (!known.has(element)) { known.set(element, `${element.dataset.search || ""} ${element.textContent}`.toLowerCase()); }
     return known.get(element);
   };
   const apply = () => {
-    const words = search.value.toLowerCase().trim();
+    const words = search.value.toLowerCase().split(/[\s:,_-]+/).filter(Boolean);  // in any order
+    const fits = (element) => words.every((word) => textOf(element).includes(word));
+    const kind = show ? show.value : "";
+    if (words.length || kind) { document.querySelectorAll("[data-fold]").forEach(unfold); }
     lines.forEach((line) => {
-      line.hidden = !(textOf(line).includes(words) && (!show.value || line.dataset.state === show.value));
+      line.hidden = !(fits(line) && (!kind || line.dataset.state === kind));
       const head = line.querySelector("summary");
       if (head) {  // of a group only the series that fit, unless the group itself does
-        const whole = textOf(head).includes(words);
-        line.querySelectorAll("tbody tr").forEach((row) => { row.hidden = !whole && !textOf(row).includes(words); });
-        if (words && !whole && !line.hidden) { line.open = true; }
+        const whole = fits(head);
+        line.querySelectorAll("tbody tr").forEach((row) => { row.hidden = !whole && !fits(row); });
+        if (words.length && !whole && !line.hidden) { line.open = true; }
       }
     });
     if (none) { none.hidden = lines.some((line) => !line.hidden) || !lines.length; }
   };
-  const restore = () => { search.value = state.get("q"); show.value = state.get("show"); apply(); };
+  const restore = () => { search.value = state.get("q"); if (show) { show.value = state.get("show"); } apply(); };
   search.addEventListener("input", () => { state.set("q", search.value.trim()); apply(); });
-  show.addEventListener("change", () => { state.set("show", show.value); apply(); });
+  show?.addEventListener("change", () => { state.set("show", show.value); apply(); });
   addEventListener("hashchange", restore);
   tools.hidden = false;
   restore();
@@ -252,7 +292,8 @@ function switches() {
 
 function openDetails() {
   const meant = () => location.hash.length > 1 && !location.hash.includes("=") && document.querySelector(`details[id="${CSS.escape(location.hash.slice(1))}"]`);
-  const open = () => { const box = meant(); if (box) { box.open = true; box.scrollIntoView(); } };
+  const named = () => location.hash.length > 1 && !location.hash.includes("=") && document.getElementById(location.hash.slice(1));
+  const open = () => { const folded = named(); if (folded && folded.closest("[data-fold]")) { unfoldTo(folded); folded.scrollIntoView(); } const box = meant(); if (box) { box.open = true; box.scrollIntoView(); } };
   addEventListener("hashchange", open);
   open();
   document.querySelectorAll("details[id]").forEach((box) => {
@@ -289,6 +330,7 @@ const grown = new ResizeObserver(scrollers);  // pages as long as the report are
 document.querySelectorAll(".scroll > *").forEach((content) => grown.observe(content));
 document.addEventListener("toggle", scrollers, true);
 document.querySelectorAll("table.sortable").forEach(sortable);
+folds();
 filter();
 switches();
 openDetails();
