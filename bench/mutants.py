@@ -21,6 +21,7 @@ import sys
 import sysconfig
 import tempfile
 import time
+import tomllib
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -53,6 +54,16 @@ def git(place: Path, *arguments: str) -> None:
     subprocess.run(["git", "-C", str(place), *who, *arguments], check=True, capture_output=True)
 
 
+def build(place: Path) -> None:
+    """As tracker.toml says; ends the program where it does not build."""
+    command = tomllib.loads((ROOT / "tracker.toml").read_text(encoding="utf-8"))["build"]["command"]
+    path = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    line, said = ["bash", "-euo", "pipefail", "-c", command], {**os.environ, "PATH": path}
+    done = subprocess.run(line, cwd=place, env=said, capture_output=True, text=True)
+    if done.returncode:
+        sys.exit(f"{place} does not build: {commits.last_words(done.stderr or done.stdout)}")
+
+
 def measure(place: Path, tests: Sequence[str], sweep: bool) -> RunDocument:
     """What the clone answers, to its own questions."""
     file = place / "run.json"
@@ -67,7 +78,7 @@ def caught_by_scalar_test(place: Path, mutant: Mutant, sound: RunDocument) -> tu
     """Whether a series of the named test regressed, and which did most."""
     git(place, "commit", "-qam", mutant.story)
     try:
-        commits.build_in_place(place)
+        build(place)
         document = compare_documents(sound, measure(place, (mutant.caught_by,), mutant.sweep))
     finally:
         git(place, "reset", "-q", "--hard", "HEAD~1")
@@ -80,7 +91,7 @@ def caught_by_scalar_test(place: Path, mutant: Mutant, sound: RunDocument) -> tu
 def caught_by_native_test(place: Path, mutant: Mutant) -> tuple[bool, str]:
     """Whether the named function of a C++ test fails: the program says its name, and at which line."""
     file, _, name = mutant.caught_by.partition("::")
-    commits.build_in_place(place)
+    build(place)
     cmake, folder = str(Path(sys.executable).with_name("cmake")), place / "build" / "cpp-tests"
     (library,) = (place / "build").rglob("libspook.a")
     source = (f"-S{place / 'engine/native/tests'}", f"-B{folder}", "-DCMAKE_BUILD_TYPE=Release")
@@ -112,7 +123,7 @@ def caught_by_test(place: Path, mutant: Mutant) -> tuple[bool, str]:
     if ".cpp::" in mutant.caught_by:
         return caught_by_native_test(place, mutant)
     if mutant.native:
-        commits.build_in_place(place)
+        build(place)
     search = os.pathsep.join([str(place), sysconfig.get_path("purelib")])
     command = [sys.executable, "-S", "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider", mutant.caught_by]
     done = subprocess.run(
@@ -173,7 +184,8 @@ def main() -> int:
     rows: list[tuple[Mutant, bool, str]] = []
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
         head = commits.full_hash(ROOT, given.commit)
-        place = commits.built(ROOT, head, (given.keep or Path(folder)).resolve())
+        place = commits.checked_out(ROOT, head, (given.keep or Path(folder)).resolve())
+        build(place)
         sound = {
             sweep: measure(place, sorted(tests), sweep)
             for sweep in (False, True)
@@ -198,7 +210,7 @@ def main() -> int:
             )
         same = True
         if False in sound:
-            commits.build_in_place(place)
+            build(place)
             again = compare_documents(
                 sound[False], measure(place, sorted({d.test for d in sound[False].series}), False)
             )

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
+from dataclasses import replace as replaced
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,9 @@ import pytest
 from click.testing import CliRunner
 from msgspec.structs import replace
 
+import spook_tracker.engine as engine
+import spook_tracker.tracker.cli.settings as settings
+import spook_tracker.tracker.measure.builds as builds
 import spook_tracker.tracker.measure.commits as commits
 import spook_tracker.tracker.past as past
 from spook_tracker.tracker.cli.main import main
@@ -29,6 +34,7 @@ class Repository:
         self.git("init", "-q", "-b", "main")
         (folder / "engine" / "native").mkdir(parents=True)
         (folder / "engine" / "native" / "CMakeLists.txt").write_text("")
+        (folder / "tracker.toml").write_text('[build]\ncommand = "true"\n')
         self.git("add", "-A")
 
     def git(self, *arguments: str) -> str:
@@ -69,6 +75,13 @@ def repository(tmp_path: Path) -> Repository:
     folder = tmp_path / "repository"
     folder.mkdir()
     return Repository(folder)
+
+
+def answering(monkeypatch: pytest.MonkeyPatch, ask: Any) -> None:
+    """Commits that are not built give these answers."""
+    monkeypatch.setattr(
+        builds.TeamRepository, "measure", lambda self, commit, folder, tests, *options: ask(commit, options)
+    )
 
 
 def test_the_first_bad_commit_is_found_in_few_steps(repository: Repository) -> None:
@@ -136,12 +149,7 @@ def test_old_commits_join_the_history_once(
 ) -> None:
     made = [repository.commit(value) for value in (0.1, -1.0, 0.3)]
     monkeypatch.chdir(repository.folder)
-    monkeypatch.setattr(commits, "built", lambda where, commit, folder: Path(commit))
-    monkeypatch.setattr(
-        commits,
-        "ask_commit",
-        lambda place, tests, *options: (repository.measure(str(place)), "its own questions"),
-    )
+    answering(monkeypatch, lambda commit, options: (repository.measure(commit), "its own questions"))
     asked = ["backfill", *reversed(made), "--db", f"sqlite:///{tmp_path}/t.db"]
     first, second = (CliRunner().invoke(main, asked) for _ in range(2))
 
@@ -158,13 +166,12 @@ def test_old_commits_are_asked_only_with_the_options_that_were_given(
     """An engine of long ago refuses what its own command did not know yet."""
     made, passed = repository.commit(0.1), []
 
-    def ask(place: Path, tests: object, *options: str) -> object:
+    def ask(commit: str, options: tuple[str, ...]) -> object:
         passed.append(options)
-        return repository.measure(str(place)), "its own questions"
+        return repository.measure(commit), "its own questions"
 
     monkeypatch.chdir(repository.folder)
-    monkeypatch.setattr(commits, "built", lambda where, commit, folder: Path(commit))
-    monkeypatch.setattr(commits, "ask_commit", ask)
+    answering(monkeypatch, ask)
     for number, given in enumerate(([], ["--time-limit", "60", "--memory", "100"])):
         CliRunner().invoke(main, ["backfill", made, *given, "--db", f"sqlite:///{tmp_path}/{number}.db"])
 
@@ -184,12 +191,7 @@ def test_what_the_history_blames_is_where_a_search_begins(
         engine = replace(found.engine, commit_time=f"2026-01-0{place + 1}T00:00:00+00:00", parents=())
         record(replace(found, engine=engine, started=f"2026-01-0{place + 1}T00:00:00+00:00"), database)
     monkeypatch.chdir(repository.folder)
-    monkeypatch.setattr(commits, "built", lambda where, commit, folder: Path(commit))
-    monkeypatch.setattr(
-        commits,
-        "ask_commit",
-        lambda place, tests, *options: (repository.measure(str(place)), "today's questions"),
-    )
+    answering(monkeypatch, lambda commit, options: (repository.measure(commit), "today's questions"))
     repository.asked.clear()
     shown = CliRunner().invoke(main, ["bisect", "t", "--db", database])
 
@@ -198,50 +200,63 @@ def test_what_the_history_blames_is_where_a_search_begins(
     assert repository.asked[:2] == [made[2], made[7]]
 
 
-def test_a_folder_without_the_engine_is_no_place_to_search(
+def test_a_folder_that_says_nothing_of_builds_is_no_place_to_search(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
     shown = CliRunner().invoke(main, ["bisect", "pendulum", "--good", "a", "--bad", "b"])
 
     assert shown.exit_code == 2
-    assert "is in no repository of the engine" in shown.stderr
+    assert "says how a commit is built; say it in tracker.toml: [build] with a command" in shown.stderr
     assert "name commits to measure" in CliRunner().invoke(main, ["backfill"]).stderr
 
 
-def test_todays_questions_are_put_to_the_engine_of_then(tmp_path: Path) -> None:
-    (tmp_path / "engine").mkdir()
-    package = commits._with_todays_questions(tmp_path) / commits.PACKAGE
-
-    assert (package / "engine").resolve() == (tmp_path / "engine").resolve()
-    assert (package / "scalar_tests" / "catalogue.py").exists()
-    assert not (package / "scalar_tests").resolve().is_relative_to(tmp_path)
+def of_this_repository() -> builds.TeamRepository:
+    root = Path(__file__).resolve().parent.parent
+    found = builds.team_repository(root, settings.read(root).build)
+    assert found is not None
+    return found
 
 
-def test_a_commit_from_before_the_package_answers_its_own_questions(tmp_path: Path) -> None:
+def test_todays_questions_are_put_to_a_commit_of_this_repository(tmp_path: Path) -> None:
+    """What was compiled here stands for its build; the questions of then, which cannot be asked, are laid over."""
+    team, commit = of_this_repository(), engine.build_info.git_hash
+    place = tmp_path / commit[:12]
+    commits.check_out(team.repository, commit, place)
+    (place / ".git" / "built").write_text(team.today.command)
+    shutil.copy(engine._core.__file__, place / "engine")
+    (place / "scalar_tests" / "catalogue.py").write_text("nothing can be asked")
+
+    answers, whose = team.measure(commit, tmp_path, ["falling_object"])
+
+    assert whose == "today's questions"
+    assert answers.engine.git_hash == commit
+    assert {sample.outcome for sample in answers.samples} == {"value"}
+
+
+def test_a_commit_from_before_the_package_answers_its_own_questions(repository: Repository) -> None:
     """Its rooms lie side by side at the top, and its tracker is called by its own name."""
     from spook_tracker.tracker.document.json_form import encode
 
-    place = tmp_path / "abcdef123456"
+    place, found = repository.folder, night(0, one(0.1))
     for room in ("engine", "tracker"):
-        (place / room).mkdir(parents=True)
-        (place / room / "__init__.py").write_text(
-            "import engine  # as they did\n" if room == "tracker" else ""
-        )
-    (place / "answers.json").write_bytes(encode(night(0, one(0.1))))
+        (place / room).mkdir(parents=True, exist_ok=True)
+        (place / room / "__init__.py").write_text("")
+    (place / "answers.json").write_bytes(encode(replace(found, engine=replace(found.engine, git_hash=""))))
     (place / "tracker" / "__main__.py").write_text(
         "import shutil, sys\nshutil.copy('answers.json', sys.argv[sys.argv.index('--json') + 1])\n"
     )
-    document, whose = commits.ask_commit(place, ["t"])
+    today, commit = of_this_repository().today, repository.commit(0.1)
+    (place / "tracker.toml").unlink()
+    team = builds.TeamRepository(repository=place, home=place, today=replaced(today, questions=()))
 
-    assert whose == "its own questions"
-    assert [sample.value for sample in document.samples] == [0.1]
+    answers = team.ask_its_own(commit, place, ["t"])
+
+    assert [sample.value for sample in answers.samples] == [0.1]
 
 
 def test_what_a_changed_definition_hides_is_told_by_the_old_one(tmp_path: Path) -> None:
     """The questions of an old commit, where the fall lasts half as long, are put to the engine of today."""
-    import shutil
-
     import spook_tracker.scalar_tests as questions
     from spook_tracker.tracker import library
     from spook_tracker.tracker.cli.report_compare import old_answer_lines

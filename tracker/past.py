@@ -1,6 +1,6 @@
 """What earlier commits of this project answer: a history measured afterwards, and the first bad commit found.
 
-Commits are built and asked by tracker/measure/commits.py and judged by tracker/judge/; git says which commit to try
+Commits are built and asked by tracker/measure/builds.py and judged by tracker/judge/; git says which commit to try
 next, also where ways part and meet again, and where one cannot be built.
 """
 

@@ -126,20 +126,20 @@ def _commits(
 ) -> tuple[Path, Callable[..., Any]]:
     """The repository one stands in, and a function that builds and asks a commit and says whose questions it answered.
 
-    A team's where tracker.toml says how it is built; else this project's own.
+    CommitError where no tracker.toml says how a commit is built.
     """
     from spook_tracker.tracker.measure.builds import team_repository
-    from spook_tracker.tracker.measure.commits import ask_commit, built, repository_at, subject
+    from spook_tracker.tracker.measure.commits import CommitError, subject
 
     team = team_repository(present().folder, present().build)
-    repository = team.repository if team else repository_at(Path.cwd())
+    if team is None:
+        raise CommitError(
+            f"nothing in {Path.cwd()} or above says how a commit is built; say it in tracker.toml: [build] with a command"
+        )
 
     def measure(commit: str, *options: str) -> Any:
-        if team is None:
-            document, whose = ask_commit(built(repository, commit, folder), tests, *options)
-        else:
-            document, whose = team.measure(commit, folder, tests, *options)
-        say(f"{commit[:12]} answers {whose}: {subject(repository, commit)}")
+        document, whose = team.measure(commit, folder, tests, *options)
+        say(f"{commit[:12]} answers {whose}: {subject(team.repository, commit)}")
         return document
 
-    return repository, measure
+    return team.repository, measure

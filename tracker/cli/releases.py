@@ -78,9 +78,9 @@ def backfill(
 ) -> None:
     """Measure earlier commits of a repository, or released versions of another engine, and record them.
 
-    REV are commits, tags or ranges A..B of the repository one stands in: a team's, where tracker.toml says in
-    [build] how it is built, else this project's. Each is built in a folder of its own and asked today's questions
-    where it can answer them, else its own; which they were is said.
+    REV are commits, tags or ranges A..B of the repository one stands in; [build] of tracker.toml says how it is
+    built. Each is built in a folder of its own and asked today's questions where it can answer them, else its own;
+    which they were is said.
 
     With --engine, released versions are installed and measured in release order.
     A release that is recorded already is not measured again, so an interrupted backfill is gone on with by

@@ -1,8 +1,7 @@
-"""Earlier commits of this project's own engine, each built in a folder of its own and asked.
+"""Commits by name, checked out into clones; and what today's engine of this project answers to an old commit's questions.
 
-A commit is checked out into a clone that shares the repository's objects; the repository itself is left alone.
-Where the engine of then can answer today's questions it is asked those, because only equal questions have comparable
-answers; else it is asked its own. The other way round, today's engine is asked what a commit asked.
+A clone shares the repository's objects; the repository itself is left alone. How commits are built and asked is said
+in tracker.toml (tracker/measure/builds.py).
 """
 
 from __future__ import annotations
@@ -23,7 +22,6 @@ from spook_tracker.tracker.document.run_document import RunDocument
 
 PACKAGE = "spook_tracker"
 NATIVE = Path("engine/native")
-WORKS = "works"  # a file in a commit's folder, once its engine is built
 OURS = ("engine", "scalar_tests", "tracker", "migrations", "site")
 
 
@@ -36,10 +34,7 @@ def repository_at(folder: Path) -> Path:
     done = _run(["git", "-C", str(folder), "rev-parse", "--show-toplevel"])
     place = Path(done.stdout.strip()) if done.returncode == 0 else None
     if place is None or not (place / NATIVE / "CMakeLists.txt").exists():
-        raise CommitError(
-            f"{folder} is in no repository of the engine; call this inside a clone of it, or say in "
-            "tracker.toml how your own is built: [build] with a command"
-        )
+        raise CommitError(f"{folder} is in no repository of the engine; call this inside a clone of it")
     return place
 
 
@@ -88,7 +83,7 @@ def subject(repository: Path, commit: str) -> str:
 def checked_out(repository: Path, commit: str, folder: Path) -> Path:
     """The folder with that commit, not built; what is there already is used again. Raises CommitError."""
     place = folder / commit[:12]
-    if not (place / WORKS).exists():
+    if not (place / "scalar_tests").is_dir():
         check_out(repository, commit, place)
     return place
 
@@ -100,51 +95,6 @@ def check_out(repository: Path, commit: str, place: Path) -> None:
     clone = ["git", "clone", "-q", "--shared", "--no-checkout", str(repository), str(place)]
     for command in (clone, ["git", "-C", str(place), "checkout", "-q", "--detach", commit]):
         _must(command, f"commit {commit[:12]} cannot be checked out")
-
-
-def built(repository: Path, commit: str, folder: Path) -> Path:
-    """The folder with that commit and its engine, built; what is there already is used again. Raises CommitError."""
-    place = checked_out(repository, commit, folder)
-    if (place / WORKS).exists():
-        return place
-    build_in_place(place)
-    (place / WORKS).touch()
-    return place
-
-
-def build_in_place(place: Path) -> None:
-    """Build the engine of a checkout, so that Python finds it there. Raises CommitError."""
-    if not (place / NATIVE / "CMakeLists.txt").exists():
-        raise CommitError(f"{place.name} has no {NATIVE}: it is from before the engine")
-    beside = Path(sys.executable).with_name("cmake")
-    cmake = str(beside) if beside.exists() else shutil.which("cmake")
-    if cmake is None:
-        raise CommitError("building a commit needs cmake; install the tools of development: make develop")
-    source, output = str(place / NATIVE), str(place / "build")
-    configure = [cmake, "-S", source, "-B", output, f"-DPython_EXECUTABLE={sys.executable}"]
-    for command in (configure, [cmake, "--build", output, "-j2"]):
-        _must(command, f"{place.name} does not build")
-    modules = [file for file in (place / "build").iterdir() if file.name.endswith(tuple(EXTENSION_SUFFIXES))]
-    if not modules:
-        raise CommitError(f"{place.name} builds, but without a module for Python")
-    for module in modules:
-        module.replace(place / "engine" / module.name)
-
-
-def ask_commit(place: Path, tests: Sequence[str], *options: str) -> tuple[RunDocument, str]:
-    """What the engine of a checkout answers, and whose questions these were, in words. Raises CommitError.
-
-    `options` are those of `tracker run`.
-    """
-    reasons = []
-    for whose, search in (("today's questions", _with_todays_questions(place)), ("its own questions", place)):
-        file = place / "run.json"
-        file.unlink(missing_ok=True)
-        done = call(search, "run", *tests, "--no-record", "--json", str(file), *options)
-        if done.returncode in (0, 1) and file.exists():
-            return decode(file.read_bytes(), RunDocument), whose
-        reasons.append(f"{whose}: {last_words(done.stderr)}")
-    raise CommitError(f"{place.name} gives no answers; " + "; ".join(reasons))
 
 
 def ask_today(place: Path, tests: Sequence[str], *options: str) -> RunDocument:
@@ -176,11 +126,6 @@ def call(search: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
         PACKAGE if (search / PACKAGE).exists() else "tracker"
     )  # before the package its rooms lay at the top
     return _run([sys.executable, "-S", "-m", module, *arguments], cwd=search, env=environment)
-
-
-def _with_todays_questions(place: Path) -> Path:
-    """A folder in which the package is today's, but for the engine."""
-    return _mixed(place / "today", {"engine": place / "engine"})
 
 
 def _with_old_questions(place: Path, tracker: Path | None) -> Path:
