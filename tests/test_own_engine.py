@@ -52,10 +52,15 @@ def repository(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def night(repository: Path) -> dict[str, object]:
-    """One run of a question of theirs and one of ours, everything else said by tracker.toml."""
-    done = tracker(repository, "run", "throw", "falling_object", "--json", "run.json")
+    """A question of theirs, one of ours, one its engine cannot be asked, and two whose limits our method alone owes.
+
+    Everything else is said by tracker.toml. It is a first night, and it is green.
+    """
+    asked = ("throw", "falling_object", "door", "hanging_chain", "simple_pendulum")
+    done = tracker(repository, "run", *asked, "--json", "run.json")
     assert done.returncode == 0, done.stderr
     assert "throw" in done.stdout
+    assert "door: " not in done.stderr, "what it cannot do is not told as red"
     return json.loads((repository / "run.json").read_text())
 
 

@@ -33,7 +33,10 @@ from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.chain import small_motion
 from spook_tracker.scalar_tests.inclined_plane import scene as inclined_plane
 from spook_tracker.scalar_tests.inclined_plane import slip_angle
+from spook_tracker.scalar_tests.multibody import simple_pendulum
+from spook_tracker.scalar_tests.multibody.library import library_error
 from spook_tracker.scalar_tests.n_pendulum import measure as chain
+from spook_tracker.scalar_tests.pendulum.scene import angle
 from spook_tracker.scalar_tests.planetarium import scene as planetarium
 from tests import oracle_chain, oracle_rigid_simulate, oracle_simulate
 from tests.oracle_ball import dropped
@@ -398,3 +401,40 @@ def test_a_box_on_the_belt_is_late_by_a_whole_step_or_not_at_all() -> None:
         asked = math.ceil(abs(sorting.SLIP) / (friction * sorting.GRAVITY * sorting.TIME_STEP))
         assert limit.passes(float(abs(steps - asked)))
         assert not limit.passes(float(abs(steps + 1 - asked)))
+
+
+SUZUKI = (0.41449077179437573714,) * 2 + (-0.65796308717750294857,) + (0.41449077179437573714,) * 2
+KAHAN_LI = (
+    0.13020248308889008088, 0.56116298177510838456, -0.38947496264484728641, 0.15884190655515560090,
+    -0.39590389413323757734, 0.18453964097831570709, 0.25837438768632204729, 0.29501172360931029887,
+    -0.60550853383003451170, 0.29501172360931029887, 0.25837438768632204729, 0.18453964097831570709,
+    -0.39590389413323757734, 0.15884190655515560090, -0.38947496264484728641, 0.56116298177510838456,
+    0.13020248308889008088,
+)  # fmt: skip
+
+
+def late(time_step: float, stages: tuple[float, ...]) -> float:
+    """The library's error of 2000 s of a pendulum by its angle: leapfrog, composed of these shares of a step."""
+    turn, rate, every, turns = 0.5 * math.pi, 0.0, round(simple_pendulum.EVERY / time_step), []
+    for n in range(1, round(simple_pendulum.DURATION / time_step) + 1):
+        for share in stages:
+            k = share * time_step
+            turn += 0.5 * k * rate
+            rate -= 9.81 * k * math.sin(turn)
+            turn += 0.5 * k * rate
+        if n % every == 0:
+            turns.append(turn)
+    found, exact = np.array(turns), angle(simple_pendulum.EVERY * np.arange(1.0, len(turns) + 1.0))
+    return library_error(
+        np.stack([np.sin(found), -np.cos(found)], axis=1), np.stack([np.sin(exact), -np.cos(exact)], axis=1)
+    )
+
+
+def test_a_pendulum_keeps_its_time_for_2000_s_by_high_orders_alone() -> None:
+    """At these steps the classes of the library measure the order of a method: an engine of order two rightly misses."""
+    high, low = (asked.metrics[0] for asked in CATALOGUE["simple_pendulum"].measurements)
+
+    assert high.passes(late(1 / 20, KAHAN_LI))
+    assert low.passes(late(1 / 40, SUZUKI))
+    assert late(1 / 20, (1.0,)) > 100.0 * high.limit
+    assert high.limit_kind == low.limit_kind == "method"

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from spook_tracker.engine import PLAIN, Method, Result, RigidBody
-from spook_tracker.scalar_tests.case import Configuration, Ladder, Metric, Role, Simulate
+from spook_tracker.scalar_tests.case import Configuration, Ladder, LimitKind, Metric, Role, Simulate
 
 GRAVITY = 9.81  # m/s²
 LOW, HIGH = 1e-1, 1e-3  # allowed errors of the two classes
@@ -81,8 +81,10 @@ def ladders(
     )
 
 
-def error_metric(role: Role, allowed: float, outputs: str, **told: Any) -> Metric:
-    """The library's error of a run, against one of its classes."""
+def error_metric(
+    role: Role, allowed: float, outputs: str, kind: LimitKind = "physical", **told: Any
+) -> Metric:
+    """The library's error of a run, against one of its classes; `kind` is whose its limit is at this time step."""
     return Metric(
         name="library_error",
         description=f"root mean square of |y − y_ref| / max(|y_ref|, 1e-3) over {outputs}",
@@ -90,7 +92,7 @@ def error_metric(role: Role, allowed: float, outputs: str, **told: Any) -> Metri
         role=role,
         limit=allowed,
         limit_source="allowed in the library's " + ("low" if allowed == LOW else "high") + " precision class",
-        limit_kind="physical",
+        limit_kind=kind,
         reference=0.0,
         relative_tolerance=1e-4,
         **told,

@@ -63,14 +63,14 @@ TEST = ScalarTest(
         Measurement(
             configuration="order 8",
             time_step=1 / 20,
-            metrics=(error_metric("gate", HIGH, OUTPUTS),),
+            metrics=(error_metric("gate", HIGH, OUTPUTS, kind="method"),),
             measure=order_8,
             note="symmetric composition of order 8",
         ),
         Measurement(
             configuration="order 4",
             time_step=1 / 40,
-            metrics=(error_metric("companion", LOW, OUTPUTS),),
+            metrics=(error_metric("companion", LOW, OUTPUTS, kind="method"),),
             measure=order_4,
             note="symmetric composition of order 4",
         ),

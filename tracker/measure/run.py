@@ -313,7 +313,11 @@ def _perform_all(
             parts = _lost(task, tests[task.test], parts)
         left[task.test] -= 1
         bad = tuple(
-            s.key for p in parts if isinstance(p, tuple) for s, m in p if not m.passed and s.role == "gate"
+            s.key
+            for p in parts
+            if isinstance(p, tuple)
+            for s, m in p
+            if s.role == "gate" and not m.passed and m.outcome != "not_supported"
         )
         watch(Progress(done, _total(tasks, tests, request), task.test, left[task.test] == 0, bad))
         yield task, parts
