@@ -51,6 +51,18 @@ def test_those_after_a_missed_limit_run_all_the_same_and_it_is_named(tmp_path: P
     assert "limits missed in: a, c" in done.stderr
 
 
+def test_a_bench_reads_none_of_the_names_as_its_own_arguments(tmp_path: Path) -> None:
+    reads = "import argparse\nargparse.ArgumentParser().parse_args()\n"
+
+    assert run(tmp_path, {"a": reads, "b": reads}, "a", "b").returncode == 0
+
+
+def test_what_takes_minutes_answers_last(tmp_path: Path) -> None:
+    done = run(tmp_path, dict.fromkeys(("growth", "storage"), KEEPS))
+
+    assert done.stdout.index("== storage ==") < done.stdout.index("== growth ==")
+
+
 def test_only_those_named_run(tmp_path: Path) -> None:
     benches = {"a": MISSES, "b": KEEPS}
 
