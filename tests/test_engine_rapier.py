@@ -12,6 +12,7 @@ from spook_tracker.engine import (
     Ball,
     Box,
     Capsule,
+    Cone,
     ContactForce,
     Distance,
     Final,
@@ -21,6 +22,7 @@ from spook_tracker.engine import (
     Particle,
     Plane,
     Position,
+    Prismatic,
     RigidBody,
     Scene,
     Sphere,
@@ -148,12 +150,75 @@ def test_the_force_of_a_contact_is_told_of_either_body_and_of_every_step() -> No
 
 
 def test_what_only_its_adapter_cannot_ask_is_said_so() -> None:
-    """Rapier has capsules, and tells no direction of a contact's friction."""
-    log = RigidBody(name="log", mass=1.0, shape=Capsule(0.5, 1.0), position=(0.0, 0.0, 0.5))
+    """Rapier has cones, and tells no direction of a contact's friction."""
+    log = RigidBody(name="log", mass=1.0, shape=Cone(0.5, 1.0), position=(0.0, 0.0, 0.5))
     plane = RigidBody(name="plane", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
     asked = {"f": Final(quantity=ContactForce("ball 0"))}
 
-    with pytest.raises(NotSupported, match=r"^our adapter cannot ask rapier for the shape capsule$"):
+    with pytest.raises(NotSupported, match=r"^our adapter cannot ask rapier for the shape cone$"):
         RAPIER.simulate(Scene(bodies=(log, plane), gravity=GRAVITY), time_step=STEP, steps=1)
     with pytest.raises(NotSupported, match="our adapter cannot ask rapier for a contact force with friction"):
         RAPIER.simulate(lying(0.5), time_step=STEP, steps=1, observe=asked)
+
+
+def test_a_ball_bounces_by_the_larger_of_two_restitutions() -> None:
+    """From 1 m, half a step's fall g h²/2 or a step's speed off at each end."""
+    dull, bouncy = Material(restitution=0.2), Material(restitution=0.5)
+    ball = RigidBody(name="ball", mass=1.0, shape=Sphere(0.1), position=(0.0, 0.0, 1.1), material=bouncy)
+    plane = RigidBody(name="plane", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=dull)
+    path = {"path": Trace(quantity=Position("ball"))}
+    run = RAPIER.simulate(
+        Scene(bodies=(ball, plane), gravity=GRAVITY), time_step=1e-3, duration=0.8, observe=path
+    )
+    heights = run["path"][:, 2] - 0.1
+    met = int(np.argmin(heights[:500]))
+
+    assert heights[met:].max() == pytest.approx(0.25, rel=0.03)
+
+
+def test_a_capsule_lies_along_its_own_axis() -> None:
+    """Upright it stands on its cap, half its length and a radius high; its axis is z, as ours is."""
+    upright = RigidBody(name="log", mass=1.0, shape=Capsule(0.2, 1.0), position=(0.0, 0.0, 0.72))
+    plane = RigidBody(name="plane", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
+    end = {"end": Final(quantity=Position("log"))}
+    run = RAPIER.simulate(
+        Scene(bodies=(upright, plane), gravity=GRAVITY), time_step=STEP, steps=30, observe=end
+    )
+
+    assert float(run["end"][2]) == pytest.approx(0.7, abs=2e-3)
+
+
+def test_a_slide_lets_a_body_fall_along_it_and_nowhere_else() -> None:
+    """Down a rail of 30°: half of gravity along it."""
+    down = (math.cos(math.radians(30.0)), 0.0, -0.5)
+    box = RigidBody(name="box", mass=2.0, shape=Box((0.2, 0.2, 0.2)), position=(0.0, 0.0, 0.0))
+    rail = Prismatic(name="rail", between=("world", "box"), at=(0.0, 0.0, 0.0), axis=down)
+    end = {"end": Final(quantity=Position("box"))}
+    run = RAPIER.simulate(
+        Scene(bodies=(box,), constraints=(rail,), gravity=GRAVITY), time_step=1e-3, duration=1.0, observe=end
+    )
+
+    assert run["end"] == pytest.approx(0.25 * 9.81 * np.array(down), abs=0.01)
+
+
+def test_a_belt_carries_what_lies_on_it_by_the_geometric_mean_of_frictions() -> None:
+    """µ = √(0.9 · 0.1) = 0.3 on a platform at 2 m/s: the box slips for 2 / (µ g) s and is 2 t − µ g t²/2 behind."""
+    belt = RigidBody(
+        name="belt", motion="kinematic", shape=Box((50.0, 2.0, 1.0)), position=(0.0, 0.0, -0.5),
+        velocity=(2.0, 0.0, 0.0), material=Material(friction=0.9),
+    )  # fmt: skip
+    box = RigidBody(
+        name="box",
+        mass=1.0,
+        shape=Box((0.5, 0.5, 0.5)),
+        position=(0.0, 0.0, 0.25),
+        material=Material(friction=0.1),
+    )
+    observe = {"x": Final(quantity=Position("box")), "belt": Final(quantity=Position("belt"))}
+    run = RAPIER.simulate(
+        Scene(bodies=(belt, box), gravity=GRAVITY), time_step=STEP, duration=2.0, observe=observe
+    )
+    slipping = 2.0 / (0.3 * 9.81)
+
+    assert float(run["belt"][0]) == pytest.approx(4.0, rel=1e-3)
+    assert float(run["x"][0]) == pytest.approx(4.0 - slipping, rel=1e-3)

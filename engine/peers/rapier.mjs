@@ -17,12 +17,19 @@ serve(async (task) => {
   function shapeOf(shape) {
     if (shape.kind === "sphere") return new R.Ball(shape.radius);
     if (shape.kind === "box") return new R.Cuboid(...shape.half);
+    if (shape.kind === "capsule") return new R.Capsule(shape.half, shape.radius); // along y
     return new R.HalfSpace(vec(shape.normal));
   }
 
   const bodyOfCollider = new Map(); // handle → place among the bodies
+  const KINDS = {
+    static: R.RigidBodyDesc.fixed,
+    kinematic: R.RigidBodyDesc.kinematicVelocityBased,
+    dynamic: R.RigidBodyDesc.dynamic,
+    particle: R.RigidBodyDesc.dynamic,
+  };
   function bodyOf(given, place) {
-    const kind = given.mass > 0 ? R.RigidBodyDesc.dynamic() : R.RigidBodyDesc.fixed();
+    const kind = KINDS[given.motion]();
     const described = kind.setTranslation(...given.position).setRotation(quat(given.orientation)).setCanSleep(false);
     const body = world.createRigidBody(
       described.setLinvel(...given.velocity).setAngvel(vec(given.spin)).setLinearDamping(0).setAngularDamping(0),
@@ -30,8 +37,10 @@ serve(async (task) => {
     const inertia = given.motion === "particle" ? pointInertia : vec(given.inertia);
     if (given.mass > 0) body.setAdditionalMassProperties(given.mass, vec([0, 0, 0]), inertia, upright, true);
     if (given.shape && task.contacts) {
-      const collider = new R.ColliderDesc(shapeOf(given.shape)).setDensity(0).setRestitution(0);
-      collider.setFriction(given.friction);
+      const collider = new R.ColliderDesc(shapeOf(given.shape)).setDensity(0).setRestitution(given.restitution);
+      collider.setRestitutionCombineRule(R.CoefficientCombineRule.Max);
+      collider.setFriction(Math.sqrt(given.friction)).setFrictionCombineRule(R.CoefficientCombineRule.Multiply);
+      if (given.shape.kind === "capsule") collider.setRotation(quat([Math.SQRT1_2, Math.SQRT1_2, 0, 0])); // y to z
       if (task.contacts_of.length > 0)
         collider.setActiveEvents(R.ActiveEvents.CONTACT_FORCE_EVENTS).setContactForceEventThreshold(0);
       bodyOfCollider.set(world.createCollider(collider, body).handle, place);
@@ -48,6 +57,7 @@ serve(async (task) => {
     const [a, b] = given.points.map(vec);
     let joint = R.JointData.spherical(a, b);
     if (given.kind === "lock") joint = R.JointData.fixed(a, quat(given.turns[0]), b, quat(given.turns[1]));
+    if (given.kind === "prismatic") joint = R.JointData.prismatic(a, b, vec(given.axis));
     if (given.kind === "hinge") joint = R.JointData.revolute(a, b, vec(given.axis));
     world.createImpulseJoint(joint, ends[0], ends[1], true).setContactsEnabled(false);
   }

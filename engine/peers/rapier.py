@@ -17,7 +17,7 @@ import numpy as np
 from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
 from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.forces import Load
-from spook_tracker.engine.joints import Ball, Hinge, Joint, Lock
+from spook_tracker.engine.joints import Ball, Hinge, Joint, Lock, Prismatic
 from spook_tracker.engine.observe import ContactForce
 from spook_tracker.engine.peers import node
 from spook_tracker.engine.peers.described import described as common
@@ -26,7 +26,7 @@ from spook_tracker.engine.protocol import Capabilities, Configuration, NotSuppor
 from spook_tracker.engine.recorded_joints import conjugate, joint_point, turned_back
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.shapes import Box, Plane, Sphere
+from spook_tracker.engine.shapes import Box, Capsule, Plane, Sphere
 
 PACKAGE = "@dimforge/rapier3d-compat"
 SCRIPT = Path(__file__).with_suffix(".mjs")
@@ -39,11 +39,13 @@ class Rapier:
 
     name = "rapier"
     capabilities = Capabilities(
-        shapes=frozenset({Sphere, Box, Plane}),
-        joints=frozenset({Lock, Ball, Hinge}),
+        shapes=frozenset({Sphere, Box, Capsule, Plane}),
+        joints=frozenset({Lock, Ball, Hinge, Prismatic}),
         forces=frozenset({Load}),
         shows=frozenset({ContactForce}),
         friction=True,
+        restitution=True,
+        kinematic=True,
         absent=frozenset({"the joint distance", "the observable constraint force"}),
     )
     configurations = (
@@ -102,12 +104,12 @@ def _joint(task: Task, joint: Any, places: dict[str, int]) -> dict[str, Any]:
     frames = [_frame(None if end == WORLD else scene.body(end)) for end in joint.between]
     points = [list(turned_back(turn, at - place)) for place, turn in frames]
     axes = [turned_back(turn, np.array(getattr(joint, "axis", (0.0, 0.0, 1.0)))) for _, turn in frames]
-    if isinstance(joint, Hinge) and np.abs(axes[0] - axes[1]).max() > 1e-12:
+    if isinstance(joint, Hinge | Prismatic) and np.abs(axes[0] - axes[1]).max() > 1e-12:
         raise NotSupported(
-            "our adapter cannot ask rapier for a hinge between bodies that are turned against each other"
+            "our adapter cannot ask rapier for a hinge or slide between bodies that are turned against each other"
         )
     return {
-        "kind": {Ball: "ball", Lock: "lock", Hinge: "hinge"}[type(joint)],
+        "kind": {Ball: "ball", Lock: "lock", Hinge: "hinge", Prismatic: "prismatic"}[type(joint)],
         "ends": [places.get(end, -1) if end != WORLD else None for end in joint.between],
         "points": points,
         "turns": [list(conjugate(turn)) for _, turn in frames],
