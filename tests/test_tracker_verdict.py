@@ -112,6 +112,15 @@ def test_a_halved_value_is_regressed_where_larger_is_better(limit):
     assert verdict(100.0, 50.0, better="smaller", unit="s").word == "improved"
 
 
+def test_a_gain_is_as_bad_as_a_loss_where_a_reference_says_what_is_right():
+    """Energy, % of what it was, nothing to be lost: 1.7 % to 40 % gained is worse, whatever the limit on losses."""
+    gain = verdict(1.7, 40.0, better="larger", limit=-0.205, reference=0.0)
+
+    assert gain.word == "regressed" and "by 1.4 decades" in gain.sentence
+    assert verdict(40.0, -0.1, better="larger", limit=-0.205, reference=0.0).word == "improved"
+    assert verdict(9.0, 8.0, better="smaller", reference=10.0).word == "regressed"
+
+
 def test_six_decades_worse_far_inside_the_limit_is_changed():
     found = verdict(1e-15, 1e-9, limit=1e-6)
 

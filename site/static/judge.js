@@ -103,16 +103,15 @@ function ulpsBetween(a, b) {
 }
 
 function decadesBetween(definition, old, now) {
-  if (definition.better === "inside" && definition.reference !== null) { old -= definition.reference; now -= definition.reference; }
+  if (definition.better !== "smaller_magnitude" && definition.reference !== null) { old -= definition.reference; now -= definition.reference; }
   if (!Number.isFinite(old) || !Number.isFinite(now) || old === 0 || now === 0) { return null; }
   return Math.log10(Math.abs(now)) - Math.log10(Math.abs(old));
 }
 
 function badness(definition, value) {
-  if (definition.better === "larger") { return -value; }
-  if (definition.better === "smaller") { return value; }
   if (definition.better === "smaller_magnitude") { return Math.abs(value); }
-  return definition.reference === null ? null : Math.abs(value - definition.reference);
+  if (definition.reference !== null) { return Math.abs(value - definition.reference); }
+  return definition.better === "larger" ? -value : definition.better === "smaller" ? value : null;
 }
 
 function halfWidth(definition) {

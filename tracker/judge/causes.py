@@ -75,7 +75,7 @@ class Hit:
             return ""
         if self.of_limit:
             return times(margin, "its limit", "beyond its limit")
-        if d.reference is not None and d.better == "inside":
+        if d.reference is not None and d.better != "smaller_magnitude":
             of = number(d.reference)
             return times(margin, f"as far from {of}", f"further from {of}")
         if d.better == "larger" and self.value > 0.0:

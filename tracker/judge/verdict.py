@@ -224,14 +224,15 @@ def _called(definition: SeriesDefinition) -> str:
 
 
 def badness(definition: SeriesDefinition, value: float) -> float | None:
-    """A number that grows as the value gets worse; None where one value is as good as another."""
-    if definition.better == "larger":
-        return -value
-    if definition.better == "smaller":
-        return value
+    """A number that grows as the value gets worse; None where one value is as good as another.
+
+    Where a reference says what is right, the distance from it decides: energy that is gained is no better than lost.
+    """
     if definition.better == "smaller_magnitude":
         return abs(value)
-    return None if definition.reference is None else abs(value - definition.reference)
+    if definition.reference is not None:
+        return abs(value - definition.reference)
+    return {"larger": -value, "smaller": value}.get(definition.better)
 
 
 def half_width(definition: SeriesDefinition) -> float | None:
@@ -292,7 +293,7 @@ def _rank(bits: int) -> int:
 
 
 def _decades(definition: SeriesDefinition, old: float, new: float) -> float | None:
-    if definition.better == "inside" and definition.reference is not None:
+    if definition.better != "smaller_magnitude" and definition.reference is not None:
         old, new = old - definition.reference, new - definition.reference
     if not (math.isfinite(old) and math.isfinite(new)) or old == 0.0 or new == 0.0:
         return None
