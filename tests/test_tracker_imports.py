@@ -6,6 +6,7 @@ The files in tests/data/tools are ours, in the form of real ones: names, numbers
 from __future__ import annotations
 
 import json
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -118,6 +119,72 @@ def test_a_run_of_a_few_benchmarks_misses_none_of_the_others(tmp_path: Path) -> 
     (tmp_path / "data.js").write_text("window.BENCHMARK_DATA = " + json.dumps(said))
 
     assert len(Imported(tmp_path, tmp_path / "data.js").of(2)) == 1
+
+
+def test_thousands_of_repeats_are_thinned_by_rank(tmp_path: Path) -> None:
+    """The least, the middle and the most stay; pytest-benchmark keeps all it took."""
+    said = json.loads(next((TOOLS / "pytest-benchmark").glob("0001*")).read_text())
+    said["benchmarks"][0]["stats"] |= {
+        "data": [1e-6 * (1 + i * 7919 % 5000) for i in range(5000)],
+        "iterations": 31,
+    }
+    (tmp_path / "many.json").write_text(json.dumps(said))
+    ((sample,),) = (run["samples"] for run in Imported(tmp_path, tmp_path / "many.json").runs())
+    seconds = sample["timing"]["seconds"]
+
+    assert (len(seconds), sample["value"], sample["timing"]["runs_per_repeat"]) == (101, 1e-6, 31)
+    assert (seconds[0], seconds[50], seconds[-1]) == pytest.approx((1e-6, 2.5e-3, 5e-3), rel=1e-3)
+
+
+def test_what_failed_says_why_and_where_it_ran_is_kept(tmp_path: Path) -> None:
+    broken = Imported(tmp_path, TOOLS / "google-benchmark").of(0)["BM_Mesh run_time"]
+
+    assert (broken["outcome"], broken["failure"]) == ("crashed", "no such file")
+    (tmp_path / "more").mkdir()
+    run = Imported(tmp_path / "more", *(TOOLS / "pytest-benchmark").glob("0001*")).runs()[0]
+    assert run["machine"]["operating_system"] == "Linux 6.11.0-1018-azure"
+    assert run["machine"]["fingerprint"] == "Example Server Processor 7000, 4 cores"
+
+
+def test_a_detached_head_is_no_branch(tmp_path: Path) -> None:
+    """CI checks out a commit: what pytest-benchmark calls its branch then is none."""
+    said = json.loads(next((TOOLS / "pytest-benchmark").glob("0001*")).read_text())
+    said["commit_info"]["branch"] = "(detached head)"
+    (tmp_path / "ci.json").write_text(json.dumps(said))
+    found = Imported.__new__(Imported)
+    found.folder = tmp_path
+
+    assert "does not say on which branch" in found.tracker(
+        "import", "--branch", "main", tmp_path / "ci.json", code=2
+    )
+
+
+def test_the_repository_says_what_lies_on_a_branch_where_a_file_does_not(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def git(*words: str) -> str:
+        who = ("-c", "user.name=A", "-c", "user.email=a@example.org")
+        done = subprocess.run(
+            ["git", "-C", str(tmp_path), *who, *words], capture_output=True, text=True, check=True
+        )
+        return done.stdout.strip()
+
+    git("init", "-q", "-b", "main")
+    git("commit", "-q", "--allow-empty", "-m", "one")
+    kept = git("rev-parse", "HEAD")
+    git("checkout", "-q", "-b", "aside")
+    git("commit", "-q", "--allow-empty", "-m", "two")
+    said = json.loads((TOOLS / "github-action-benchmark" / "data.js").read_text().partition("=")[2])
+    entries = said["entries"]["Gravel"][:2]
+    for entry, commit in zip(entries, (kept, git("rev-parse", "HEAD")), strict=True):
+        entry["commit"]["id"] = commit
+    said["entries"]["Gravel"] = entries
+    (tmp_path / "data.js").write_text("window.BENCHMARK_DATA = " + json.dumps(said))
+    monkeypatch.chdir(tmp_path)
+
+    found = Imported(tmp_path, "--branch", "main", "data.js")
+
+    assert [run["engine"]["git_hash"] for run in found.runs()] == [kept]
 
 
 def test_records_of_several_files_are_one_run_a_commit(tmp_path: Path) -> None:

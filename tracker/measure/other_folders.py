@@ -37,18 +37,20 @@ def beside(file: Path, engine: str, machine: str, branch: str) -> Beside:
         engine=engine,
         machine=machine,
         branch=branch,
-        commits=_commits(branch) if branch else {},
+        commits=_commits(branch, Path.cwd()) if branch else {},
         project=_setting(results.parent / "asv.conf.json", "project"),
         benchmarks=_benchmarks(results / "benchmarks.json"),
     )
 
 
 @lru_cache(maxsize=8)
-def _commits(branch: str) -> dict[str, bool]:
-    """The commits that the repository here knows, and whether each lies on the branch; none without a repository."""
+def _commits(branch: str, here: Path) -> dict[str, bool]:
+    """The commits that the repository around `here` knows, and whether each lies on the branch; none without a repository."""
 
     def those(*words: str) -> list[str]:
-        done = subprocess.run(["git", "rev-list", *words, "--"], capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            ["git", "-C", str(here), "rev-list", *words, "--"], capture_output=True, text=True, check=False
+        )
         return done.stdout.split() if done.returncode == 0 else []
 
     on_it = those(branch) or those(f"origin/{branch}")

@@ -30,6 +30,7 @@ DIRECTIONS: dict[str, Literal["smaller", "larger"]] = {
     "customBiggerIsBetter": "larger",
     "customSmallerIsBetter": "smaller",
 }
+MOST_REPEATS = 101  # kept of one benchmark in one run; pytest-benchmark times tens of thousands
 MIXED = "not said: may mix processors"
 
 
@@ -100,9 +101,10 @@ def _is_wanted(run: ShortRun, told: str, beside: Beside, origin: str) -> bool:
 
 
 def _branch_of(said: Mapping[str, Any]) -> str:
-    """pytest-benchmark's; the others do not say."""
+    """pytest-benchmark's, which puts "(detached head)" where it does not know; the others do not say."""
     commit = said.get("commit_info")
-    return str(commit.get("branch") or "") if isinstance(commit, dict) else ""
+    told = str(commit.get("branch") or "") if isinstance(commit, dict) else ""
+    return "" if told.startswith("(") else told
 
 
 def _reader(said: Mapping[str, Any]) -> Callable[[Mapping[str, Any], Beside], Iterator[ShortRun]] | None:
@@ -132,7 +134,8 @@ def _pytest(said: Mapping[str, Any], _: Beside) -> Iterator[ShortRun]:
     for one in said["benchmarks"]:
         stats = one["stats"]
         seconds = stats.get("data") or [stats["min"], stats["median"], stats["max"]]
-        results.append(_timed(one["fullname"], [float(s) for s in seconds]))
+        result = _timed(one["fullname"], [float(s) for s in seconds])
+        results.append(msgspec.structs.replace(result, runs_per_repeat=int(stats.get("iterations") or 1)))
     cpu = machine.get("cpu") if isinstance(machine.get("cpu"), dict) else {}
     lane, cores = _lane(cpu.get("brand_raw"), cpu.get("count"))
     yield ShortRun(
@@ -143,6 +146,7 @@ def _pytest(said: Mapping[str, Any], _: Beside) -> Iterator[ShortRun]:
         started=said.get("datetime") or "",
         machine=lane,
         cores=cores,
+        operating_system=_words(machine.get("system"), machine.get("release")),
         results=tuple(results),
     )
 
@@ -152,6 +156,7 @@ def _google(said: Mapping[str, Any], _: Beside) -> Iterator[ShortRun]:
     context = said["context"]
     seconds: dict[str, list[float]] = {}
     medians: dict[str, list[float]] = {}
+    why: dict[str, str] = {}
     for one in said["benchmarks"]:
         run = one.get("run_type", "iteration") == "iteration" and not one.get("error_occurred")
         if run or one.get("aggregate_name") == "median":
@@ -161,8 +166,14 @@ def _google(said: Mapping[str, Any], _: Beside) -> Iterator[ShortRun]:
             name = one.get("run_name") or one["name"]
             (seconds if run else medians).setdefault(name, []).append(float(one["real_time"]) * read.scale)
         elif one.get("error_occurred"):
+            why[one.get("run_name") or one["name"]] = str(one.get("error_message") or "")
             seconds.setdefault(one.get("run_name") or one["name"], [])
     seconds = medians | seconds
+    results = [_timed(name, repeats) for name, repeats in seconds.items()]
+    results = [
+        msgspec.structs.replace(one, failure=why[one.test]) if not one.seconds and why.get(one.test) else one
+        for one in results
+    ]
     lane, cores = _lane(None, context["num_cpus"])
     yield ShortRun(
         engine=str(context.get("executable", "unknown")).rpartition("/")[2] or "unknown",
@@ -170,7 +181,7 @@ def _google(said: Mapping[str, Any], _: Beside) -> Iterator[ShortRun]:
         started=context["date"],
         machine=lane,
         cores=cores,
-        results=tuple(_timed(name, repeats) for name, repeats in seconds.items()),
+        results=tuple(results),
     )
 
 
@@ -200,7 +211,7 @@ def _asv(said: Mapping[str, Any], beside: Beside) -> Iterator[ShortRun]:
                 )
             )
     host = str(machine.get("machine") or "")
-    words = ", ".join(str(part) for part in (machine.get("cpu"), machine.get("gpu")) if part)
+    words = _words(machine.get("cpu"), machine.get("gpu"), between=", ")
     lane, cores = _lane(words, machine.get("num_cpu"))
     if host:  # chosen by the team, and kept: two machines of one model are two
         lane = f"{lane}, no. {hashlib.sha256(host.encode()).hexdigest()[:6]}"
@@ -211,6 +222,7 @@ def _asv(said: Mapping[str, Any], beside: Beside) -> Iterator[ShortRun]:
         started=_moment(said["date"]),
         machine=lane,
         cores=cores,
+        operating_system=_words(machine.get("os")),
         results=tuple(results),
     )
 
@@ -237,7 +249,7 @@ def _repeated(result: ShortResult, told: Mapping[str, Any], place: int, scale: f
     of_case = {name: row[place] for name, row in told.items() if isinstance(row, list) and place < len(row)}
     quartiles = of_case.get("stats_q_25"), result.value, of_case.get("stats_q_75")
     kept: Sequence[Any] = of_case.get("samples") or (() if None in quartiles else quartiles)
-    seconds = tuple(float(one) * (1.0 if one is result.value else scale) for one in kept)
+    seconds = _thinned([float(one) * (1.0 if one is result.value else scale) for one in kept])
     if not seconds or not all(math.isfinite(s) and s >= 0.0 for s in seconds):
         return result
     often = of_case.get("stats_number")
@@ -314,9 +326,18 @@ def sampled(test: str, value: Any, unit: Unit) -> ShortResult:
 def _timed(test: str, seconds: list[float]) -> ShortResult:
     """Run time of each repeat, s; none: it failed."""
     if seconds and all(math.isfinite(s) and s >= 0.0 for s in seconds):
-        return ShortResult(test=test, metric="run_time", value=Number(min(seconds)), seconds=tuple(seconds))
+        value, kept = Number(min(seconds)), _thinned(seconds)
+        return ShortResult(test=test, metric="run_time", value=value, seconds=kept)
     failure = _failed(seconds[0] if seconds else None)
     return ShortResult(test=test, metric="run_time", unit="s", better="smaller", noisy=True, **failure)
+
+
+def _thinned(seconds: Sequence[float]) -> tuple[float, ...]:
+    """At most MOST_REPEATS of them: where there are more, those of evenly spaced ranks, with the least and the most."""
+    if len(seconds) <= MOST_REPEATS:
+        return tuple(seconds)
+    ranked = sorted(seconds)
+    return tuple(ranked[i * (len(ranked) - 1) // (MOST_REPEATS - 1)] for i in range(MOST_REPEATS))
 
 
 def _failed(value: Any) -> dict[str, Any]:
@@ -330,6 +351,10 @@ def _lane(processor: Any, cores: Any) -> tuple[str, int]:
     text = str(cores or "")
     count = int(text) if text.isdecimal() and len(text) < 7 else 1
     return f"{processor or 'processor ' + MIXED}, {count} cores", count
+
+
+def _words(*parts: Any, between: str = " ") -> str:
+    return between.join(str(part) for part in parts if part)
 
 
 def _moment(milliseconds: Any) -> str:

@@ -72,6 +72,7 @@ class ShortRun(Struct, frozen=True, kw_only=True):
     machine: Name = "unknown"
     processor: Text = ""  # as a reader sees it; else the machine's name
     cores: int = 1
+    operating_system: Text = ""
 
 
 class _Peek(msgspec.Struct):
@@ -122,7 +123,7 @@ def document_of(short: ShortRun, identity: str, origin: str) -> RunDocument:
             fingerprint=short.machine,
             processor=short.processor or short.machine,
             cores=short.cores,
-            operating_system="",
+            operating_system=short.operating_system,
             float_environment="",
         ),
         tests=(),
