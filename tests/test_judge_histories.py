@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -119,14 +120,35 @@ def test_the_branch_itself_is_judged_by_its_fork_point(tracker: Any) -> None:
     assert tracker(branched(), "judge", "latest")[0] == 1
 
 
-def test_the_night_that_confirms_a_slow_one_shows_the_level_both_left(tracker: Any) -> None:
+def test_two_versions_are_compared_with_each_other_and_with_the_history_where_asked(tracker: Any) -> None:
+    """Two slow nights: no change from one to the other, though both are slow by their history."""
     runs = [night(n, rungs(1e-3 * noise(n) * (1.4 if n >= 12 else 1.0))) for n in range(14)]
     runs[-1] = night(13, rungs(1e-3 * 1.3))
 
     code, said = tracker(runs, "compare", "previous", "latest", "--format", "json")
-    assert code == 1
+    told = json.loads(said)
+    assert code == 0
+    assert not any(change["red"] for change in told["changes"])
+    assert "1 time is red against the history" in told["notes"][-1]
+
+    code, said = tracker(runs, "compare", "previous", "latest", "--against-history", "--format", "json")
     (slow,) = (c for c in json.loads(said)["changes"] if c["red"])
-    assert slow["before"] < slow["after"]
+    assert code == 1
+    assert slow["before"] < slow["after"] and "against the history" in slow["sentence"]
+
+
+@pytest.mark.parametrize("pair", [(3, 9), (9, 3), (10, 12), (12, 13), (5, 13)])
+def test_a_printed_pair_agrees_with_its_percentage(tracker: Any, pair: tuple[int, int]) -> None:
+    """Levels that came and went before do not enter: V1 to V2 is what is printed and what is judged."""
+    level = (1.0, 1.0, 1.0, 1.6, 1.6, 1.6, 1.6, 1.6, 1.6, 1.2, 1.2, 1.2, 1.25, 1.3)
+    runs = [night(n, rungs(1e-3 * noise(n) * level[n])) for n in range(14)]
+
+    told = json.loads(tracker(runs, "compare", *(runs[n].id for n in pair), "--format", "json")[1])
+    for change in told["changes"]:
+        if change["kind"] == "run_time" and (said := re.search(r"([+-][\d.]+) % for", change["sentence"])):
+            ratio = 100.0 * (change["after"] / change["before"] - 1.0)
+            assert float(said[1]) == pytest.approx(ratio, abs=0.06)
+            assert change["red"] <= (ratio > 1.0)
 
 
 def test_timing_is_told_from_a_clock_that_stands_still(tracker: Any) -> None:

@@ -116,8 +116,17 @@ def _earlier(history: History, before: str, after: str) -> Any:
 
 
 @no_collection()
-def compare(history: History, before: str, after: str, accepted: Sequence[Accepted] = ()) -> CompareDocument:
-    """What changed between two versions, each named as on the command line; `before` may be fork-point."""
+def compare(
+    history: History,
+    before: str,
+    after: str,
+    accepted: Sequence[Accepted] = (),
+    against_history: bool = False,
+) -> CompareDocument:
+    """What changed between two versions, each named as on the command line; `before` may be fork-point.
+
+    With `against_history` run times that are red against their history are red here, too.
+    """
     from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
     from spook_tracker.tracker.judge.maps import may_be_dropped
     from spook_tracker.tracker.judge.work import with_work
@@ -134,7 +143,7 @@ def compare(history: History, before: str, after: str, accepted: Sequence[Accept
         )
         for run in (old, new)
     )
-    return compare_in(history, (old, earlier), (new, later), accepted)
+    return compare_in(history, (old, earlier), (new, later), accepted, against_history)
 
 
 @no_collection()

@@ -70,6 +70,11 @@ def accepted_levels(file: Path | None = None) -> Any:
     help="What ends with exit code 1.",
 )
 @click.option("--all", "everything", is_flag=True, help="Show what is identical, too.")
+@click.option(
+    "--against-history",
+    is_flag=True,
+    help="Run times that are red against their history are red here, too, whatever V1 took.",
+)
 @engine_option
 @test_option
 @kind_options
@@ -80,6 +85,7 @@ def compare(
     after: str,
     form: str,
     fail_on: str,
+    against_history: bool,
     everything: bool,
     engine: str | None,
     tests: tuple[str, ...],
@@ -109,7 +115,7 @@ def compare(
             say("\n".join(ranking.table_lines(history, (before, after), tests)))  # nobody regressed
             return
         old = before if before == FORK_POINT else of_engine(engine, before)
-        document = compared(history, old, of_engine(engine, after), levels)
+        document = compared(history, old, of_engine(engine, after), levels, against_history)
     document = choice.of_comparison(document)
     if form == "json":
         from spook_tracker.tracker.document.json_form import readable

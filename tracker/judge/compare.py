@@ -19,7 +19,7 @@ from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.compare_ladders import frontiers, run_times
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Side
 from spook_tracker.tracker.judge.explaining import beside_run_times, calm
-from spook_tracker.tracker.judge.known import Known, known
+from spook_tracker.tracker.judge.known import Known, judged_in, known
 from spook_tracker.tracker.judge.lane import (
     Records,
     asked_for,
@@ -31,6 +31,7 @@ from spook_tracker.tracker.judge.lane import (
 )
 from spook_tracker.tracker.judge.maps import NO_MAP, map_key, stands_of
 from spook_tracker.tracker.judge.series_history import (
+    Judged,
     Told,
     is_read_off,
     judge_all,
@@ -45,6 +46,7 @@ from spook_tracker.tracker.judge.work import FAMILIES
 
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 TIMES = ("time", "run_time")
+MOST_NAMES = 5  # of series, in a note
 DOUBLED = 0.3  # decades: a time read off one session that doubled is worth a line, though it proves nothing
 
 
@@ -112,8 +114,13 @@ def compare_in(
     before: tuple[Any, ComparedRun],
     after: tuple[Any, ComparedRun],
     accepted: Sequence[Accepted] = (),
+    against_history: bool = False,
 ) -> CompareDocument:
-    """`compare` with what the history knows: the noise of run times, the first bad commit of what is red."""
+    """`compare` with what the history knows: the noise of run times, the first bad commit of what is red.
+
+    The two measurements decide. Times that are red against their history and not against the earlier run are told by
+    name; with `against_history` they are red here, too.
+    """
     (old, earlier), (new, later) = before, after
     runs = [run for run in records.runs() if run.engine.name == new.engine.name]
     newest = next((run for run in reversed(runs) if run.id in (old.id, new.id)), new)
@@ -128,10 +135,49 @@ def compare_in(
     later = replace(later, whole=asked_whole(new), asked=asked_for(new, later.samples))
     document = compare(earlier, later, accepted, known(told, old.id, new.id))
     reds = {change.series for change in document.changes if change.red} - told.keys()
-    if not reds:
+    times = dict(told)
+    if reds:
+        told |= judge_all(histories(records, line, reds))
+        document = compare(earlier, later, accepted, known(told, old.id, new.id))
+    standing = {key: judged for key, judged in judged_in(times, (new.id,))[new.id].items() if judged.red}
+    return _beside_history(document, standing, against_history)
+
+
+def _beside_history(
+    document: CompareDocument, standing: Mapping[str, Judged], decides: bool
+) -> CompareDocument:
+    """The same, with the times that only their history calls red: in a note, or red where they decide."""
+    only = {c.series for c in document.changes if not c.red and c.stands != "accepted"} & standing.keys()
+    if not only:
         return document
-    told |= judge_all(histories(records, line, reds))
-    return compare(earlier, later, accepted, known(told, old.id, new.id))
+    if not decides:
+        names = ", ".join(sorted(only)[:MOST_NAMES]) + (", …" if len(only) > MOST_NAMES else "")
+        many = "1 time is" if len(only) == 1 else f"{len(only)} times are"
+        words = f"{many} red against the history and not against {document.before.version}: {names}; --against-history decides by that"
+        return msgspec.structs.replace(document, notes=(*document.notes, words))
+    changes = [
+        _by_history(change, standing[change.series]) if change.series in only else change
+        for change in document.changes
+    ]
+    changes.sort(key=lambda change: (WORD_RANK[change.word], change.role != "gate", change.series))
+    verdict = overall(changes)
+    return msgspec.structs.replace(
+        document,
+        changes=tuple(changes),
+        counts=dict(Counter(change.word for change in changes)),
+        verdict=verdict,
+        exit_code=exit_code(verdict),
+    )
+
+
+def _by_history(change: Change, judged: Judged) -> Change:
+    """The change from the level before to tonight's, as the history tells it."""
+    told = judged.verdict
+    before, after = judged.levels or (change.before, change.after)
+    return msgspec.structs.replace(
+        change, word="regressed", red=True, stands="watch", name=told.name or "slower", decades=told.decades, before=before, after=after,
+        sentence=f"{told.sentence}, against the history",
+    )  # fmt: skip
 
 
 def overall(changes: Sequence[Change]) -> Overall:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
@@ -13,7 +14,7 @@ from spook_tracker.tracker.judge.slower import Usual
 class Known:
     """What the history knows about two runs: see `known`."""
 
-    usual: Mapping[str, Usual] = field(default_factory=dict)  # level and noise of times at the earlier run
+    usual: Mapping[str, Usual] = field(default_factory=dict)  # times of the earlier run, and the noise of two
     values: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # of made series of run time
     suspected: tuple[str, ...] = ()  # times whose slow night is not confirmed yet
     first_bad: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # last good, first bad commit
@@ -22,7 +23,7 @@ class Known:
 def known(told: Mapping[str, Told], before: str, after: str) -> Known:
     """What judged histories know about two runs, by their ids.
 
-    A red series is blamed on the commit where it last became worse up to the later run.
+    Times are compared with the earlier run's own: of the history they have the noise alone. A red series is blamed on the commit where it last became worse up to the later run.
     """
     found = judged_in(told, (before, after))
     return known_of(told, found[before], found[after])
@@ -55,14 +56,17 @@ def known_of(told: Mapping[str, Told], before: Mapping[str, Judged], after: Mapp
             first_bad[key] = (commit_of(good.run) if good else "", commit_of(new.worse_at.run))
         if series.definition.kind != "time" or old is None or old.usual is None:
             continue
-        level, threshold = old.usual
-        usual[key] = (_time(old), threshold) if old.red else (level, threshold)
+        usual[key] = of_two(_time(old), old.usual)
         if new is not None:
-            confirmed = new.confirms and old.state == "suspected"  # by what both are slower than
-            values[key] = (level if confirmed else _time(old), _time(new))
+            values[key] = (_time(old), _time(new))
             if new.state == "suspected":
                 suspected.append(key)
     return Known(usual=usual, values=values, suspected=tuple(suspected), first_bad=first_bad)
+
+
+def of_two(value: float, usual: Usual) -> Usual:
+    """One night's time with the noise of a difference: of two nights, where a threshold is of one against a level."""
+    return (value, math.sqrt(2.0) * usual[1])
 
 
 def _time(judged: Judged) -> float:

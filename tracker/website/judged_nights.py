@@ -18,6 +18,7 @@ from spook_tracker.tracker.document.json_form import boxed
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
 from spook_tracker.tracker.document.wording import clean, conditions, limit, named, slug
 from spook_tracker.tracker.judge.accepted import Accepted
+from spook_tracker.tracker.judge.known import of_two
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
 from spook_tracker.tracker.judge.rank import question
 from spook_tracker.tracker.judge.series_history import Told, commit_of, is_read_off
@@ -131,8 +132,7 @@ def all_marks(told: Mapping[str, Told]) -> dict[str, Marks]:
         ):
             usual = None
             if timed and judged.usual is not None:
-                level, threshold = judged.usual
-                usual = (judged.night.value if judged.red else level, threshold)
+                usual = of_two(judged.night.value, judged.usual)
             blamed = judged.red and judged.worse_at is not None
             suspected = timed and judged.state == "suspected"
             if usual is None and not blamed and not suspected:
