@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
+from spook_tracker.tracker import importing
 from spook_tracker.tracker.cli.main import main
 
 TOOLS = Path(__file__).parent / "data" / "tools"
@@ -253,3 +254,19 @@ def test_records_that_make_no_sense_are_one_sentence_and_nothing_is_stored(
 
     assert words in said
     assert said.count("\n") == 1
+
+
+def test_a_document_of_ours_is_not_read_as_anybody_else_s(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A look at its top tells: reading each of a thousand nights once more in vain took a third of an import."""
+    first = Imported(tmp_path, TOOLS / "asv")
+    first.tracker("export", "--out", tmp_path / "ours")
+
+    def never(*given: Any) -> None:
+        raise AssertionError("it was read as another tool's")
+
+    monkeypatch.setattr(importing, "of_other_tools", never)
+    (tmp_path / "again").mkdir()
+
+    assert Imported(tmp_path / "again", tmp_path / "ours").said.startswith("3 runs recorded")

@@ -12,7 +12,7 @@ from spook_tracker.tracker.measure.disappeared import Listed, with_missing
 from spook_tracker.tracker.measure.other_folders import beside
 from spook_tracker.tracker.measure.other_tools import of_other_tools
 from spook_tracker.tracker.measure.record_tables import is_table, meanings, of_tables
-from spook_tracker.tracker.measure.short_form import is_short, whole
+from spook_tracker.tracker.measure.short_form import is_short, is_whole, whole
 from spook_tracker.tracker.store.border import MAX_BYTES
 from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.transfer import record_all
@@ -41,6 +41,8 @@ def read(
         if not file.is_file() or file.stat().st_size > MAX_BYTES:
             continue
         content = file.read_bytes()
+        if is_whole(content):
+            continue
         around = beside(file, engine, machine, branch)
         if is_table(file, content):
             tables[file] = content

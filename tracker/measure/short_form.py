@@ -82,11 +82,20 @@ class _Peek(msgspec.Struct):
 
 def is_short(content: bytes) -> bool:
     """Whether this is meant to be a run in short form: it has results and no schema version."""
-    try:
-        seen = msgspec.json.decode(content, type=_Peek)
-    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
-        return False
+    seen = _peek(content)
     return seen.results is not msgspec.UNSET and seen.schema_version is msgspec.UNSET
+
+
+def is_whole(content: bytes) -> bool:
+    """Whether this is meant to be a run document of ours; a look that costs a twentieth of reading it."""
+    return _peek(content).schema_version is not msgspec.UNSET
+
+
+def _peek(content: bytes) -> _Peek:
+    try:
+        return msgspec.json.decode(content, type=_Peek)
+    except (msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        return _Peek()
 
 
 def whole(content: bytes, origin: str) -> RunDocument:
