@@ -36,6 +36,8 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "leaning_cards": "leaning_cards",
     "card_house": "card_house",
     "rotating_box": "rotating_box",
+    "thrown_die": "thrown_die",
+    "steady_turns": "steady_turns",
     "swinging_door": "swinging_door",
     "lock_ring": "lock_ring",
     "resting_box": "resting_box",

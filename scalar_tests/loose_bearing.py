@@ -281,7 +281,7 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
-LAG = "rods and cranks lag by (1 + 2 τ/h)/4 h² of the acceleration across a joint and run ahead by (h ω)²/6"
+LAG = "rods and cranks lag by (1 + 2 τ/h)/4 h² of the acceleration across a joint"
 
 TEST = ScalarTest(
     title="Slider-crank with clearance",

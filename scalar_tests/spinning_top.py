@@ -210,6 +210,9 @@ def draw(simulate: Simulate) -> Drawing:
 
 
 ASLEEP = "20 s upright, nudged by 1e-7 rad/s, without a lean above 1e-4 rad, or doubling in the last third"
+# s: turns are exact, so that only the axis' nutation is left; at 1/40 order 8 is off by 3e-14 m, rounding of the steps
+COARSE = tuple(1.0 / n for n in (20, 24, 30))
+
 TEST = ScalarTest(
     title="Spinning top",
     question="Does a leaning top precess steadily, at the rate that gravity and spin give it?",
@@ -246,8 +249,8 @@ TEST = ScalarTest(
                     role="gate",
                     limit=0.5 * TIME_STEP * PRECESSION * ARM * (1.0 + math.sin(LEAN)),
                     limit_source="half a step of the path, ½ h v = 2.1 mm, and the nutation it may wake, ½ h Ω l = 4.2 mm",
-                    set_point=_around(4.5745039e-3),
-                    set_point_source=ORACLE + "4.575 mm",
+                    set_point=_around(4.7082119e-3),
+                    set_point_source=ORACLE + "4.708 mm",
                     reference=0.0,
                     relative_tolerance=1e-6,
                 ),
@@ -256,10 +259,11 @@ TEST = ScalarTest(
                     description="mean rate of precession over 1 rad/s, minus one",
                     unit="1",
                     role="companion",
-                    limit=1.9e-5,
-                    limit_source=ORACLE + "1.881e-5, second order in h",
-                    set_point=_around(1.8814935e-5),
-                    set_point_source=ORACLE + "1.881e-5",
+                    limit=1.9e-4,
+                    limit_source=ORACLE
+                    + "1.854e-4; of 1/240 s it is 2.1e-4 and from there on of first order in h, 0.05 h",
+                    set_point=_around(1.8535693e-4),
+                    set_point_source=ORACLE + "1.854e-4",
                     reference=0.0,
                     relative_tolerance=1e-5,
                 ),
@@ -270,8 +274,8 @@ TEST = ScalarTest(
                     role="companion",
                     limit=0.0085,
                     limit_source="half a step of Ω, ½ h Ω = 8.3 mrad, bounds what the start wakes",
-                    set_point=_around(6.1468142e-3),
-                    set_point_source=ORACLE + "6.147 mrad",
+                    set_point=_around(6.4428292e-3),
+                    set_point_source=ORACLE + "6.443 mrad",
                     reference=0.0,
                     relative_tolerance=1e-6,
                 ),
@@ -282,7 +286,7 @@ TEST = ScalarTest(
                     role="companion",
                     limit=9.4e-4,
                     limit_source=ORACLE + "9.39e-4, half a step of the nutation's power",
-                    set_point=_around(9.3895169e-4),
+                    set_point=_around(9.3763733e-4),
                     set_point_source=ORACLE + "9.39e-4",
                     reference=0.0,
                     relative_tolerance=1e-6,
@@ -294,14 +298,14 @@ TEST = ScalarTest(
                     role="companion",
                     limit=9.2e-4,
                     limit_source=ORACLE + "9.12e-4 m; linearised rows leave out curvature of the fast spin",
-                    set_point=_around(9.1245961e-4),
+                    set_point=_around(9.1013307e-4),
                     set_point_source=ORACLE + "9.12e-4 m",
                     reference=0.0,
                     relative_tolerance=1e-6,
                 ),
             ),
             measure=steady,
-            note="Plain SPOOK, variational rotation.",
+            note="Plain SPOOK.",
         ),
     ),
     example=lambda: Example(scene=scene(), time_step=TIME_STEP, observe=OBSERVE),
@@ -322,9 +326,7 @@ TEST = ScalarTest(
                 Configuration(
                     name="order 6", method=ORDER_6, expected_order=6.0, order_range=(1 / 120, 1 / 40)
                 ),
-                Configuration(
-                    name="order 8", method=ORDER_8, expected_order=8.0, order_range=(1 / 60, 1 / 40)
-                ),
+                Configuration(name="order 8", method=ORDER_8, expected_order=8.0, time_steps=COARSE),
                 Configuration(name="half step", method=Method(half_step_velocities=True), expected_order=2.0),
                 Configuration(
                     name="curved", method=Method(half_step_velocities=True, corrections=1), expected_order=2.0
@@ -345,8 +347,8 @@ TEST = ScalarTest(
                     name=order,
                     method=Method(composition=order),
                     expected_order=float(order[-1]),
-                    # Order 8 at 1/80 is off by 1e-12 m, a few roundings of the 1600 steps.
-                    order_range=(1 / 64, 1 / 32) if order == "order8" else (1 / 80, 1 / 48),
+                    order_range=None if order == "order8" else (1 / 80, 1 / 48),
+                    time_steps=COARSE if order == "order8" else (),
                 )
                 for order in ORDERS
             ),

@@ -13,7 +13,7 @@ def cranked(crank: float, speed: float, steps: int, guided: bool = False) -> np.
     """Places of the slider [m], or, `guided`, of the rod's far end, which then has nothing but its row across the guide.
 
     Rows are as many as there are speeds, so no mass has a say: G v₊ = −a g + (1 − b) G v of pin and wrist, the crank's speed
-    as the motor wants; a step turns by asin(h w). It ends where h w of the rod reaches 1.
+    as the motor wants; a step turns by h w. It ends where h w of the rod reaches 1.
     """
     s, h = slider_crank, slider_crank.TIME_STEP
     spread = 1.0 + 4.0 * s.RELAXATION
@@ -51,7 +51,7 @@ def cranked(crank: float, speed: float, steps: int, guided: bool = False) -> np.
         v = np.linalg.solve(rows, right)
         if abs(h * v[3]) >= 1.0:
             break
-        turn, lean = turn + math.asin(h * v[0]), lean + math.asin(h * v[3])
+        turn, lean = turn + h * v[0], lean + h * v[3]
         middle, slider = middle + h * v[1:3], slider + h * v[4]
         found.append(float((middle + 0.5 * s.ROD * along(lean))[0]) if guided else slider)
     return np.array(found)

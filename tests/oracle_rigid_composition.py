@@ -1,6 +1,7 @@
 """Symmetric compositions for rigid bodies, written only from the equations: dense, Newton on Λ by least squares.
 
-The base step over τ is RATTLE with the variational turn of tests.oracle_rigid:
+The base step over τ is RATTLE with the free turn of tests.oracle_rigid, or, where the engine takes joint coordinates, with that
+of the discrete Lagrangian φ·I φ/2τ for a turn φ:
 
     p ← p + (τ/2) f(q) + G(q)ᵀ Λ        (p: momenta and world angular momenta)
     q ← the free motion of p over τ     with Λ such that g(q) = 0
@@ -25,9 +26,10 @@ from spook_tracker.engine import (
     Scene,
     Trace,
     Velocity,
+    explain,
     simulate,
 )
-from tests.oracle_rigid import RigidOracle
+from tests.oracle_rigid import RigidOracle, free_turn, momentum_of_turn, product, rotation
 
 Array = npt.NDArray[Any]
 _SUZUKI = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
@@ -40,17 +42,19 @@ STATE = {
 }
 
 
-def assert_dense_steps(scene: Scene, h: float, steps: int, within: float = 1e-9) -> None:
+def assert_dense_steps(
+    scene: Scene, h: float, steps: int, within: float = 1e-9, *, oracle: type[ComposedOracle] | None = None
+) -> None:
     """The engine takes the oracle's steps of order 4: m, m/s and rad/s to `within`, quaternions to a tenth of it."""
-    oracle = ComposedOracle(scene, h)
+    dense = (oracle or ComposedOracle)(scene, h)
     run = simulate(scene, time_step=h, steps=steps, method=Method(composition="order4"), observe=STATE)
 
     for k in range(1, steps + 1):
-        oracle.step()
-        same = np.sign(np.sum(run["q"][k] * oracle.q, axis=1))[:, None]
-        for quantity, exact in (("x", oracle.x), ("v", oracle.v), ("w", oracle.angular_velocity())):
+        dense.step()
+        same = np.sign(np.sum(run["q"][k] * dense.q, axis=1))[:, None]
+        for quantity, exact in (("x", dense.x), ("v", dense.v), ("w", dense.angular_velocity())):
             assert np.abs(run[quantity][k] - exact).max() < within, quantity
-        assert np.abs(same * run["q"][k] - oracle.q).max() < 0.1 * within
+        assert np.abs(same * run["q"][k] - dense.q).max() < 0.1 * within
 
 
 class ComposedOracle(RigidOracle):
@@ -106,3 +110,55 @@ class ComposedOracle(RigidOracle):
         slip = rows @ np.hstack([self.v, self.angular_velocity()]).ravel()
         if len(rows):
             self._push(-rows.T @ np.linalg.lstsq(rows @ inverse @ rows.T, slip, rcond=1e-10)[0])
+
+
+class TreeOracle(ComposedOracle):
+    """With the turn φ whose discrete momentum is that of the body, by Newton from the free one's."""
+
+    def _turn(self, body: int) -> None:
+        h, moments = self.h, self.inertia[body]
+        p = rotation(self.q[body]).T @ self.ell[body]
+        turn = free_turn(moments, h, p)
+        for _ in range(30):
+            wrong = p - momentum_of_turn(moments, h, turn)
+            if np.abs(wrong).max() <= 4e-16 * np.abs(p).max():
+                break
+            change = h * wrong / moments
+            turn = product(turn, np.concatenate([[1.0], 0.5 * change]))
+            turn /= np.linalg.norm(turn)
+        q = product(self.q[body], turn)
+        self.q[body] = q / np.linalg.norm(q)
+
+
+class PivotOracle(ComposedOracle):
+    """Bodies on balls of the world: each turns about its pivot as a free one with the inertia about it."""
+
+    def _stage(self, tau: float) -> None:
+        self._push(0.5 * tau * self.force().ravel())
+        for joint in self.joints:
+            (i,) = (body for body in joint.bodies if body >= 0)
+            pivot = joint.points(self.x, self.q, self)[joint.bodies.index(-1)]
+            arm = joint.anchors[joint.bodies.index(i)]
+            tensor = np.diag(self.inertia[i]) + self.mass[i] * (arm @ arm * np.eye(3) - np.outer(arm, arm))
+            moments, axes = np.linalg.eigh(tensor)
+            axes[:, 2] *= np.linalg.det(axes)
+            reach = rotation(self.q[i]) @ arm
+            about = self.ell[i] - np.cross(reach, self.mass[i] * self.v[i])
+            turn = free_turn(moments, tau, axes.T @ rotation(self.q[i]).T @ about)
+            turn[1:] = axes @ turn[1:]
+            self.q[i] = product(self.q[i], turn)
+            self.q[i] /= np.linalg.norm(self.q[i])
+            self.x[i] = pivot - rotation(self.q[i]) @ arm
+            self.v[i] = (reach - rotation(self.q[i]) @ arm) / tau
+            self.ell[i] = about + np.cross(reach, self.mass[i] * self.v[i])
+        self._push(0.5 * tau * self.force().ravel())
+        self._project()
+
+
+def oracle_of(scene: Scene) -> type[ComposedOracle]:
+    """The one whose turns are those of the solver that the engine chooses."""
+    choices = explain(scene, time_step=0.02, method=Method(composition="order4"))
+    reason = next(choice.reason for choice in choices if choice.stage == "solve_block")
+    if "balls of the world" in reason:
+        return PivotOracle
+    return TreeOracle if "joint coordinates" in reason else ComposedOracle

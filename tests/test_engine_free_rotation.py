@@ -1,26 +1,33 @@
-"""T15: a body turning freely keeps momentum to rounding and energy within bounds, and follows Euler's equations."""
+"""T15: a body turns freely as Euler's equations have it, to rounding, whatever it spins and however long the step."""
 
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.special import ellipj, ellipk
 
 from spook_tracker.engine import (
+    WORLD,
     AngularMomentum,
     AngularVelocity,
+    Final,
+    Hinge,
+    JointCoordinate,
     KineticEnergy,
+    Lock,
+    Method,
+    Motor,
     Orientation,
     RigidBody,
     Scene,
-    SimulationFailed,
     Trace,
     simulate,
 )
 from tests.oracle import Array
-from tests.oracle_rigid import rotation
+from tests.oracle_rigid import free_turn, product, rotation
 
 MOMENTS = np.array([0.9144, 1.098, 1.66])  # kg m²
 TILTED = np.array([0.9, 0.2, -0.3, 0.25]) / np.linalg.norm([0.9, 0.2, -0.3, 0.25])
@@ -88,31 +95,33 @@ def test_the_closed_form_solves_eulers_equations() -> None:
         assert np.abs(MOMENTS * slope - np.cross(MOMENTS * w, w)).max() < 1e-7
 
 
-@pytest.mark.parametrize("h", [0.1, 0.01])
+@pytest.mark.parametrize("h", [0.5, 0.1, 0.01])
 @pytest.mark.parametrize("start", [FLIPPING, STEADY, np.array([1.0, -0.7, 2.0])], ids=str)
-def test_momentum_is_kept_to_rounding_and_energy_within_bounds(start: Array, h: float) -> None:
-    """100 s at steps where explicit Euler gains a third of the energy."""
+def test_momentum_and_energy_are_kept_to_rounding(start: Array, h: float) -> None:
+    """100 s at steps where explicit Euler gains a third of the energy, and at such that turn by more than a radian."""
     _, _, spin, energy, q = run(start, h, 100.0)
-    first, last = energy[: len(energy) // 2], energy[len(energy) // 2 :]
 
     assert np.abs(spin - spin[0]).max() < 1e-13 * np.linalg.norm(spin[0]) * max(1.0, 0.1 / h)
     assert np.abs(np.linalg.norm(q, axis=1) - 1.0).max() < 1e-14
-    swing = np.ptp(first) / energy[0]
-    assert swing < 2.0 * float(start @ start) * h**2
-    assert np.ptp(last) / energy[0] < 1.02 * swing + 1e-13
-    assert abs(last.mean() - first.mean()) / energy[0] < 0.1 * swing + 1e-13
+    assert np.ptp(energy) / energy[0] < 1e-13
 
 
+@pytest.mark.parametrize("h", [1.0, 0.1, 0.01])
 @pytest.mark.parametrize("start", [FLIPPING, STEADY], ids=str)
-def test_angular_velocity_converges_to_jacobis_functions_with_order_two(start: Array) -> None:
-    errors = []
-    for h in (0.02, 0.01, 0.005):
-        t, w, *_ = run(start, h, 20.0)
-        errors.append(np.abs(w - Euler(start)(t)).max())
-    orders = np.log2(np.array(errors[:-1]) / errors[1:])
+def test_angular_velocity_is_that_of_jacobis_functions_whatever_the_step(start: Array, h: float) -> None:
+    t, w, *_ = run(start, h, 20.0)
 
-    assert orders == pytest.approx([2.0, 2.0], abs=0.05)
-    assert errors[-1] < 3e-4
+    assert np.abs(w - Euler(start)(t)).max() < 1e-12
+
+
+@pytest.mark.parametrize("h", [1.0, 0.1])
+@pytest.mark.parametrize("start", [FLIPPING, STEADY], ids=str)
+def test_orientation_is_that_of_the_power_series(start: Array, h: float) -> None:
+    """Jacobi's functions say the momentum in body axes; how far the body has turned about it is in the orientation alone."""
+    *_, q = run(start, h, 20.0)
+    turn = product(TILTED, free_turn(MOMENTS, 20.0, MOMENTS * start))
+
+    assert np.abs(q[-1] * np.sign(q[-1] @ turn) - turn).max() < 1e-12
 
 
 def crossings(t: Array, values: Array) -> Array:
@@ -125,19 +134,17 @@ def crossings(t: Array, values: Array) -> Array:
     return np.array(found)
 
 
-def test_the_flip_of_the_middle_axis_has_its_period_with_order_two() -> None:
-    """A body thrown about its middle axis (Dzhanibekov) turns over every half period, to order two in the step."""
+def test_the_flip_of_the_middle_axis_has_its_period() -> None:
+    """A body thrown about its middle axis (Dzhanibekov) turns over every half period."""
     period = Euler(FLIPPING).period
-    errors = []
-    for h in (0.04, 0.02):
-        t, w, *_ = run(FLIPPING, h, 10.0 * period)
-        flips = crossings(t, w[:, 1])
-        errors.append(np.polyfit(np.arange(len(flips)), flips, 1)[0] - 0.5 * period)
-    assert math.log2(abs(errors[0] / errors[1])) == pytest.approx(2.0, abs=0.1)
-    assert abs(errors[1]) < 1e-3 * period
+    t, w, *_ = run(FLIPPING, 0.01, 10.0 * period)
+    flips = crossings(t, w[:, 1])
+
+    assert np.polyfit(np.arange(len(flips)), flips, 1)[0] == pytest.approx(0.5 * period, rel=1e-7)
 
 
-def test_a_symmetric_top_precesses_as_it_must() -> None:
+@pytest.mark.parametrize("h", [0.5, 0.02])
+def test_a_symmetric_top_precesses_as_it_must(h: float) -> None:
     """Body-frame rate (1 − I3/I1) w3 of the transverse spin, and the axis circles the momentum at |L|/I1."""
     body = RigidBody(
         name="top",
@@ -150,65 +157,90 @@ def test_a_symmetric_top_precesses_as_it_must() -> None:
     spin = np.array([0.8, 0.0, 4.5])
     rate, along = np.linalg.norm(spin) / 2.0, spin / np.linalg.norm(spin)
     start = np.array([0.0, 0.0, 1.0])
-    errors = []
-    for h in (0.02, 0.01):
-        result = simulate(Scene(bodies=(body,)), time_step=h, duration=10.0, observe=observe)
-        axis = np.array([rotation(q)[:, 2] for q in result["q"]])
-        angle = (rate * result.sample_times["q"])[:, None]
-        exact = (
-            start * np.cos(angle)
-            + np.cross(along, start) * np.sin(angle)
-            + along * (along @ start) * (1.0 - np.cos(angle))
-        )  # Rodrigues
-        errors.append(np.abs(axis - exact).max())
+    result = simulate(Scene(bodies=(body,)), time_step=h, duration=10.0, observe=observe)
+    axis = np.array([rotation(q)[:, 2] for q in result["q"]])
+    angle = (rate * result.sample_times["q"])[:, None]
+    exact = (
+        start * np.cos(angle)
+        + np.cross(along, start) * np.sin(angle)
+        + along * (along @ start) * (1.0 - np.cos(angle))
+    )  # Rodrigues
 
-    assert math.log2(errors[0] / errors[1]) == pytest.approx(2.0, abs=0.05)
-    assert errors[1] < 1e-3
+    assert np.abs(axis - exact).max() < 1e-12
 
 
-def test_a_sphere_turns_by_the_arc_sine_of_its_step() -> None:
-    """Equal moments leave c w = p: each step turns by asin(h |p|/I0), uniformly and about a fixed axis."""
-    ball = RigidBody(
-        name="ball",
-        mass=1.0,
-        inertia=(1.0, 1.0, 1.0),
-        position=(0.0, 0.0, 0.0),
-        angular_velocity=(0.0, 0.0, 3.0),
-    )
-    h, steps = 0.05, 400
-    observe = {"q": Trace(quantity=Orientation("ball"))}
-    q = simulate(Scene(bodies=(ball,)), time_step=h, steps=steps, observe=observe)["q"]
-    angle = np.unwrap(2.0 * np.arctan2(q[:, 3], q[:, 0]))
-
-    assert np.abs(angle - math.asin(3.0 * h) * np.arange(steps + 1)).max() < 1e-12
-
-
-def test_a_body_too_fast_for_the_step_ends_the_run_by_name() -> None:
-    """A ball turns by asin(h |L|/I) a step: beyond h |L|/I = 1 there is no answer, just below there is."""
-    for spin, fits in ((9.9, True), (10.1, False)):
-        ball = RigidBody(
-            name="ball",
-            mass=1.0,
-            inertia=(1.0, 1.0, 1.0),
-            position=(0.0, 0.0, 0.0),
-            angular_velocity=(0.0, spin, 0.0),
-        )
-        assert simulate(Scene(bodies=(ball,)), time_step=0.1, steps=100).completed == fits
+def steady(inertia: tuple[float, float, float], rate: float, h: float, steps: int, **method: Any) -> Array:
+    """Orientations of a body that spins about its z-axis."""
     body = RigidBody(
-        name="fast",
-        mass=1.0,
-        inertia=(1.0, 1.0, 1.5),
-        position=(0.0, 0.0, 0.0),
-        angular_velocity=(0.0, 30.0, 0.0),
+        name="b", mass=1.0, inertia=inertia, position=(0.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, rate)
     )
-    fine = simulate(Scene(bodies=(body,)), time_step=0.01, steps=10)
-    coarse = simulate(
-        Scene(bodies=(body,)), time_step=0.1, steps=10, observe={"q": Trace(quantity=Orientation("fast"))}
+    observe = {"q": Trace(quantity=Orientation("b"))}
+    return np.asarray(
+        simulate(Scene(bodies=(body,)), time_step=h, steps=steps, observe=observe, **method)["q"]
     )
 
-    assert fine.completed
-    assert coarse.status != "completed"
-    assert coarse.failed_body == "fast" and coarse.failed_step == 1
-    assert "'fast'" in coarse.failure and "time step" in coarse.failure
-    with pytest.raises(SimulationFailed):
-        coarse["q"]
+
+@pytest.mark.parametrize("turn", [1e-3, 0.99, 1.01, 3.0, 40.0, 1e4])  # rad a step
+@pytest.mark.parametrize("inertia", [(1.0, 1.0, 1.0), (1.0, 1.0, 1.6), (1.0, 1.2, 1.6)], ids=str)
+def test_a_steady_spin_turns_by_its_rate_in_every_step(
+    inertia: tuple[float, float, float], turn: float
+) -> None:
+    h, steps = 0.05, 200
+    for method in (Method(), Method(half_step_velocities=True), Method(composition="order4")):
+        q = steady(inertia, turn / h, h, steps, method=method)
+        half = 0.5 * turn * np.arange(steps + 1)
+        exact = np.stack([np.cos(half), 0.0 * half, 0.0 * half, np.sin(half)], axis=-1)
+        off = np.abs(q * np.sign(np.sum(q * exact, axis=1))[:, None] - exact).max()
+        assert off < 1e-14 * steps * max(1.0, turn)
+
+
+@pytest.mark.parametrize("turn", [0.3, 2.0, 30.0])
+def test_a_body_locked_to_a_driven_one_turns_with_it(turn: float) -> None:
+    h, steps = 0.05, 100
+    driven = RigidBody(
+        name="driven", motion="kinematic", position=(0.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, turn / h)
+    )
+    held = RigidBody(
+        name="held",
+        mass=1.0,
+        inertia=(0.3, 0.4, 0.5),
+        position=(0.0, 0.0, 0.0),
+        angular_velocity=(0.0, 0.0, turn / h),
+    )
+    scene = Scene(bodies=(driven, held), constraints=(Lock(name="lock", between=("driven", "held")),))
+    q = simulate(scene, time_step=h, steps=steps, observe={"q": Trace(quantity=Orientation())})["q"]
+
+    assert np.abs(np.abs(np.sum(q[:, 0] * q[:, 1], axis=1)) - 1.0).max() < 1e-12
+
+
+@pytest.mark.parametrize("turn", [0.3, 2.0, 30.0])
+@pytest.mark.parametrize("method", [Method(), Method(composition="order4")], ids=["plain", "order4"])
+def test_a_motor_turns_its_wheel_by_its_speed_times_the_time(turn: float, method: Method) -> None:
+    """Also past half a turn a step, where the angle itself cannot tell which way it went."""
+    h, steps = 0.02, 150
+    wheel = RigidBody(
+        name="wheel",
+        mass=1.0,
+        inertia=(0.3, 0.4, 0.5),
+        position=(0.0, 0.0, 0.0),
+        angular_velocity=(0.0, 0.0, turn / h),
+    )
+    drive = {"motor": Motor(speed=turn / h)} if method == Method() else {}
+    axle = Hinge(name="axle", between=(WORLD, "wheel"), axis=(0.0, 0.0, 1.0), compliance=0.0, **drive)
+    observe = {"angle": Final(quantity=JointCoordinate("axle"))}
+    result = simulate(
+        Scene(bodies=(wheel,), constraints=(axle,)), time_step=h, steps=steps, method=method, observe=observe
+    )
+
+    assert float(result["angle"]) == pytest.approx(turn * steps, rel=1e-11)
+
+
+def test_what_tumbles_faster_than_a_thousand_radians_a_step_keeps_its_energy() -> None:
+    body = RigidBody(
+        name="b", mass=1.0, inertia=tuple(MOMENTS), position=(0.0, 0.0, 0.0), angular_velocity=(3e5, 1e5, 2e5)
+    )
+    observe = {"e": Trace(quantity=KineticEnergy()), "l": Trace(quantity=AngularMomentum())}
+    for h in (1e-4, 0.1):
+        result = simulate(Scene(bodies=(body,)), time_step=h, steps=50, observe=observe)
+        assert np.ptp(result["e"]) < 1e-11 * result["e"][0]
+        assert np.ptp(result["l"], axis=0).max() == 0.0

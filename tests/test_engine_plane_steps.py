@@ -130,7 +130,7 @@ def test_steps_are_those_of_rows_in_space(size: float, method: Method) -> None:
         if plane.completed:
             scale = np.abs(state(space)).max()
             assert np.abs(state(plane) - state(space)).max() < 1e-11 * scale, seed
-    assert kinds.count((True, "completed")) > 20 and kinds.count((True, "diverged")) > 2
+    assert kinds.count((True, "completed")) > 20 and kinds.count((True, "diverged")) > 1
 
 
 def four_bar(compliance: float = 1e-8, **changes: object) -> Scene:
@@ -189,12 +189,13 @@ def test_a_divergence_names_step_body_and_cause_as_in_space() -> None:
     )
 
 
-def test_a_body_that_turns_too_fast_is_named() -> None:
+def test_a_rod_whose_swing_pulls_more_than_a_step_can_follow_is_named() -> None:
+    """At 3 rad a step the rows that stand still in it no longer guide it round its hinge."""
     scene = rods(2)
     spun = replace(scene.bodies[1], angular_velocity=(0.0, 0.0, 300.0))
     plane, space = both(replace(scene, bodies=(scene.bodies[0], spun)), 0.01, 5)
 
-    assert plane.failure == space.failure and "turns too fast" in plane.failure
+    assert plane.failure == space.failure and "tension" in plane.failure
     assert (plane.failed_step, plane.failed_body) == (space.failed_step, space.failed_body)
 
 

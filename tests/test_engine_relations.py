@@ -73,12 +73,9 @@ def test_ratios_hold_over_many_turns_and_turns_are_counted() -> None:
     }
     result = simulate(scene, time_step=1e-3, steps=10_000, observe=observe)
 
-    # A step turns by φ with sin φ = h ω, which is (h ω)³/6 more than h ω: the row meets Σ c (h ω)³/6 in every step
-    # and stands off by θ = 2 times that, for ever: 1e-5 rad of mesh after 32 turns.
-    standing = 2.0 * (2.0 * 0.03**3 - 3.0 * 0.02**3) / 6.0
-    assert float(result["a"]) > 190.0
-    assert 3.0 * float(result["a"]) + 2.0 * float(result["b"]) == pytest.approx(-standing, rel=1e-3)
-    assert float(result["off"]) == pytest.approx(standing, rel=1e-3)
+    assert float(result["a"]) == pytest.approx(200.0, abs=1e-10)
+    assert 3.0 * float(result["a"]) + 2.0 * float(result["b"]) == pytest.approx(0.0, abs=1e-10)
+    assert float(result["off"]) < 1e-10
 
 
 def test_a_rack_and_a_screw_turn_a_push_into_a_turn() -> None:

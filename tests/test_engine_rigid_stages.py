@@ -121,33 +121,11 @@ def test_forcing_a_stage_in_changes_the_work_and_not_the_motion(
     np.testing.assert_allclose(forced["x"], plain["x"], rtol=0.0, atol=1e-12)
 
 
-def test_a_body_that_turns_too_fast_is_named() -> None:
-    result = simulate(
-        Scene(bodies=(body(), body("top", angular_velocity=(1.0, 1.0, 40.0)))), time_step=0.1, steps=10
-    )
-
-    assert (result.status, result.failed_body, result.failed_step) == ("diverged", "top", 1)
-    assert "turns too fast" in result.failure
-
-
-@pytest.mark.parametrize(("spin", "status"), [(0.999, "completed"), (1.001, "diverged")])
-def test_a_ball_turns_up_to_one_radian_of_spin_a_step(spin: float, status: str) -> None:
-    """The turn of a step is h x with x √(1 − h² x²/4) = |L|/I, which is at most 1/h."""
-    ball = RigidBody(
-        name="ball", mass=1.0, shape=Sphere(0.1), position=(0, 0, 0), angular_velocity=(0.0, 0.0, spin / 0.1)
-    )
-    result = simulate(Scene(bodies=(ball,)), time_step=0.1, steps=10)
-
-    assert result.status == status
-    assert ("h |w| reaches 1" in (result.failure or "")) == (status == "diverged")
-
-
-def test_a_loaded_wheel_that_was_given_its_spin_is_told_of_the_spin_and_not_of_its_load() -> None:
-    """At 20 m/s and 1/20 s a wheel turns by 3.3 rad a step; that its axle carries a vehicle as well is no cause."""
+def test_a_loaded_wheel_may_turn_by_more_than_a_radian_a_step() -> None:
+    """At 20 m/s and 1/20 s a wheel turns by 3.3 rad a step; its axle goes through its middle and pulls at nothing."""
     result = simulate(cornering.scene(20.0, steer=0.0), time_step=1 / 20, steps=10)
 
-    assert (result.status, result.failed_step) == ("diverged", 1)
-    assert "turns too fast" in result.failure
+    assert result.completed
     assert "tension" not in result.failure
 
 

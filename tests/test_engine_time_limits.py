@@ -210,7 +210,7 @@ FAILS = 60  # the step that is unfit
 
 
 def falls_and_fails() -> Made:
-    """Balls fall for half a second and land, and their steps become long; then a body turns too fast for any step.
+    """Balls fall for half a second and land, and their steps become long; then a body's spin is no number any more.
 
     Blocks of steps have grown while nothing was met: the one that ends unfit holds some twenty long steps, and is
     replayed one by one to find the step.
@@ -230,9 +230,15 @@ def falls_and_fails() -> Made:
         )
         for k in range(200)
     )
-    inertia = 0.004  # kg m²
-    spun = RigidBody(name="spun", mass=1.0, inertia=(inertia,) * 3, position=(100.0, 0.0, 50.0))
-    torque = inertia / TIME_STEP**2 / (FAILS - 0.5)  # reaches one radian a step then
+    inertia = 1e308  # kg m²: at 1.8 rad/s its angular momentum is none of the numbers there are
+    spun = RigidBody(
+        name="spun",
+        mass=1.0,
+        inertia=(inertia,) * 3,
+        position=(100.0, 0.0, 50.0),
+        angular_velocity=(0.0, 0.0, 1.0),
+    )
+    torque = (sys.float_info.max - inertia) / (TIME_STEP * (FAILS - 0.5))  # N m
     spin = Load(name="spin", body="spun", torque=(0.0, 0.0, torque))
     scene = Scene(bodies=(ground(), *balls, spun), forces=(spin,), gravity=DOWN)
     return scene, Method(solver="iterative", iterations=6000, residual_tolerance=0.0)

@@ -140,7 +140,7 @@ def test_a_crank_runs_as_fast_as_the_rows_of_its_plane_can_be_stepped() -> None:
 def folded(gap: float) -> float:
     """How far off the slider gets in the turns of the study [m], the crank so much shorter than the rod."""
     s = slider_crank
-    turn, crank = math.asin(s.TIME_STEP * s.SPEED), (1.0 - gap) * s.ROD
+    turn, crank = s.TIME_STEP * s.SPEED, (1.0 - gap) * s.ROD
     places = cranked(crank, s.SPEED, round(s.TURNS_RUN * math.tau / turn))
     angles = s.START + turn * np.arange(len(places))
     exact = crank * np.cos(angles) + np.sqrt(s.ROD**2 - (crank * np.sin(angles)) ** 2)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import Final, Method, Particle, Position, Scene, Spring, Velocity, simulate
-from spook_tracker.scalar_tests import double_pendulum, rotating_box, spinning_top, swinging_door
+from spook_tracker.scalar_tests import double_pendulum, spinning_top, swinging_door
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.multibody import four_bars
 
@@ -29,14 +29,11 @@ def fastest(test: str) -> float:
     if test == "swinging_door":  # all of the lift at the lowest position
         door = swinging_door
         return math.sqrt(2.0 * door.MASS * door.ACROSS * door.LEVER / door.INERTIA)
-    if test == "spinning_top":
+    if (
+        test == "spinning_top"
+    ):  # a turn about its own axis is exact: what moves the pivot's rows is the axis, which nutates
         top = spinning_top
-        along = top.SPIN
-        return math.hypot(along, top.PRECESSION * math.sin(top.LEAN))
-    if test == "rotating_box":
-        return float(np.linalg.norm(np.array(rotating_box.INERTIA) * rotating_box.SPIN)) / min(
-            rotating_box.INERTIA
-        )
+        return top.ALONG * top.SPIN / (top.ACROSS + top.MASS * top.ARM**2)
     if test == "four_bars":  # just level: θ̇² = 1 + 2 c g/l
         push, falls = four_bars.PUSH / four_bars.LENGTH, four_bars._falls_over(four_bars.FEW)
         return math.sqrt(push**2 + 2.0 * falls * four_bars.GRAVITY / four_bars.LENGTH)
@@ -46,7 +43,7 @@ def fastest(test: str) -> float:
 
 FITS = [
     (test, ladder, one)
-    for test in ("swinging_door", "spinning_top", "rotating_box", "double_pendulum", "four_bars")
+    for test in ("swinging_door", "spinning_top", "double_pendulum", "four_bars")
     for ladder in CATALOGUE[test].ladders
     for one in ladder.configurations
     if one.method.composition != "none" and one.expected_order is not None

@@ -102,13 +102,13 @@ void rests_without_allocating(const char* what, const RigidScene& scene, int ste
     EXPECT(found == 0);
 }
 
-/// A fall taken back and done again: every array has the size it needs. Four times before, since the search for pairs goes on from
+/// A fall taken back and done again: every array has the size it needs. Eight times before, since the search for pairs goes on from
 /// what it has kept, where the fall has led.
 void falls_again_without_allocating(const char* what, const RigidScene& scene, int steps) {
     RigidSystem system(scene, StageList(choose_stages(scene, false)));
     system.reset(nullptr);
     system.save();
-    for (int fall = 0; fall < 4; ++fall) {
+    for (int fall = 0; fall < 8; ++fall) {
         system.advance(steps);
         system.restore();
     }

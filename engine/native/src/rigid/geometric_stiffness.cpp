@@ -15,7 +15,8 @@ namespace spook {
 
 namespace {
 
-constexpr double TAUT = 0.3;  // of h² F / (m r): a body that is lighter than this for its load is loaded
+constexpr double ASIDE = 1e-6;  // of the energy of its spin: what a body has by going round its joint
+constexpr double TAUT = 0.3;    // of h² F / (m r): a body that is lighter than this for its load is loaded
 
 /// x of A x = b for a symmetric A, the last two unknowns first: the first entry may be smaller by any factor.
 Vec3 solved(const Mat3& a, Vec3 b) noexcept {
@@ -28,6 +29,17 @@ Vec3 solved(const Mat3& a, Vec3 b) noexcept {
     const double own = a(0, 0) - a(0, 1) * share.y - a(0, 2) * share.z;
     const double x = own > 0.0 ? (b.x - a(0, 1) * rest.y - a(0, 2) * rest.z) / own : 0.0;
     return {x, rest.y - x * share.y, rest.z - x * share.z};
+}
+
+/// Whether a joint pulls at one of its bodies, of mass m at an arm l, with a tension T of which T h²/(m l) is above TAUT.
+bool is_taut(const JointBlock& block, const JointSet::State& state, bool second, double mass,
+             double h) noexcept {
+    if (block.axial) return false;
+    double impulse = 0.0;
+    const int linear = std::min(block.size, 3);
+    for (int i = 0; i < linear; ++i) impulse = std::max(impulse, std::abs(state.multiplier[i]));
+    const double arm = norm(second ? state.second_reach : state.first_reach);
+    return arm > 0.0 && h * impulse > TAUT * mass * arm;
 }
 
 }  // namespace
@@ -176,28 +188,49 @@ RigidSystem::IslandFrame RigidSystem::island_frame(const std::vector<int>& membe
 }
 
 /// What made a run leave the finite numbers, as far as the joints show a few steps before: the option that cures it.
-const char* RigidSystem::cause() const noexcept {
-    if (composed_ || early_joints_.size() != joints_.states.size()) return "";
-    for (const JointBlock& block : joints_.blocks()) {
-        if (block.axial) continue;
-        const JointSet::State& state = early_joints_[block.joint];
-        double impulse = 0.0;
-        const int linear = std::min(block.size, 3);
-        for (int i = 0; i < linear; ++i) impulse = std::max(impulse, std::abs(state.multiplier[i]));
-        for (const bool second : {false, true}) {
-            const int body = second ? block.second : block.first;
-            if (body < 0 || !constants_[body].moves()) continue;
-            const double arm = norm(second ? state.second_reach : state.first_reach);
-            if (!(arm > 0.0 && h_ * impulse > TAUT * constants_[body].mass * arm)) continue;
-            return stiff_
-                       ? "ran away: its joints carry more than so light a body can take in a step (T h²/(m l) is "
-                         "above 0.3), and their load changes within one, while string_stiffness knows that of "
-                         "the step before; use composition=\"order4\" without it, or a smaller time step"
-                       : "ran away: its joints carry more tension than so light a body can take in a step "
-                         "(T h²/(m l) is above 0.3); use string_stiffness=True, or a smaller time step";
+/// A body that a joint makes go round by a radian a step, and pulls at with a tension T of which T h²/(m l) is above
+/// TAUT: rows that stand still in the step no longer guide its way. −1 if there is none. An arm along the axis, as of a
+/// wheel beside its hinge, stays where it is, and so does the ground under a tyre.
+int RigidSystem::find_whirling(std::span<const int> bodies) {
+    if (joints_.blocks().empty()) return -1;
+    for (const int i : bodies) {
+        const BodyConstants& body = constants_[i];
+        const BodyState& s = live_.bodies[i];
+        const double least = std::min({body.inertia.x, body.inertia.y, body.inertia.z});
+        if (body.particle || h_ * h_ * dot(s.angular_momentum, s.angular_momentum) < least * least) continue;
+        const Vec3 spin = turned_by(body, s, s.angular_momentum);
+        if (h_ * norm(spin) < 1.0) continue;
+        deliver();
+        for (const JointBlock& block : joints_.blocks()) {
+            if (joints_.constants(block.joint).kind >= JointKind::relation) continue;
+            const JointSet::State& state = joints_.states[block.joint];
+            for (const bool second : {false, true}) {
+                if ((second ? block.second : block.first) != i) continue;
+                const Vec3 around = cross(second ? state.second_reach : state.first_reach, spin);
+                if (body.mass * dot(around, around) > ASIDE * dot(spin, s.angular_momentum) &&
+                    is_taut(block, state, second, body.mass, h_))
+                    return i;
+            }
         }
     }
-    return "";
+    return -1;
+}
+
+/// Why a run ended, if tension did it; `known`: that it did.
+const char* RigidSystem::cause(bool known) const noexcept {
+    if (!known && (composed_ || early_joints_.size() != joints_.states.size())) return "";
+    for (const JointBlock& block : joints_.blocks())
+        for (const bool second : {false, true}) {
+            const int body = second ? block.second : block.first;
+            if (known || body < 0 || !constants_[body].moves()) continue;
+            known = is_taut(block, early_joints_[block.joint], second, constants_[body].mass, h_);
+        }
+    if (!known) return "";
+    return stiff_ ? "ran away: its joints carry more than so light a body can take in a step (T h²/(m l) is "
+                    "above 0.3), and their load changes within one, while string_stiffness knows that of "
+                    "the step before; use composition=\"order4\" without it, or a smaller time step"
+                  : "ran away: its joints carry more tension than so light a body can take in a step "
+                    "(T h²/(m l) is above 0.3); use string_stiffness=True, or a smaller time step";
 }
 
 }  // namespace spook

@@ -9,6 +9,7 @@ namespace spook {
 void RigidSystem::integrate() {
     if (in_plane_ && half_step_ && !at_hand_) take_plane();  // also where its velocities were found in space
     if (at_hand_) return move_in_plane();
+    if (live_.whirling < 0) live_.whirling = find_whirling(constrained_);
     if (!constrained_are_moved_)
         for (int i : constrained_)
             if (!asleep(i)) integrate_body(i);
@@ -24,8 +25,6 @@ void RigidSystem::integrate() {
     }
 }
 
-void RigidSystem::integrate_body(int i) {
-    if (!spook::integrate(constants_[i], h_, live_.bodies[i]) && live_.too_fast < 0) live_.too_fast = i;
-}
+void RigidSystem::integrate_body(int i) { spook::integrate(constants_[i], h_, live_.bodies[i]); }
 
 }  // namespace spook

@@ -91,6 +91,7 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
             blocks_.push_back(block);
             joint.axial = static_cast<int>(axials_.size());
             axials_.push_back(axial);
+            if (joint.tracked) followed_.push_back(static_cast<int>(joints_.size()));
         }
         joints_.push_back(joint);
     }
@@ -296,6 +297,19 @@ double JointSet::coordinate(int index, std::span<const BodyState> bodies) const 
     const Joint& joint = joints_[index];
     const AxialRow row = axial_row(joint.constants, body(joint.first, bodies), body(joint.second, bodies));
     return joint.tracked ? unwrapped(joint, row.coordinate, states[index].angle) : row.coordinate;
+}
+
+void JointSet::follow(std::span<const BodyState> bodies) noexcept {
+    for (const int index : followed_) {
+        const Joint& joint = joints_[index];
+        const BodyState &first = body(joint.first, bodies), &second = body(joint.second, bodies);
+        const Vec3 spin = second.angular_velocity - first.angular_velocity;
+        if (joint.axial >= 0 && time_step_ * time_step_ * dot(spin, spin) < 1.0)
+            continue;  // the next rows do
+        const AxialRow row = axial_row(joint.constants, first, second);
+        double& angle = states[index].angle;
+        angle = unwrapped(joint, row.coordinate, angle + time_step_ * row.rate);
+    }
 }
 
 bool JointSet::set_motor(int joint, double speed, double max_force) {

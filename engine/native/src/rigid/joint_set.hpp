@@ -121,8 +121,7 @@ public:
     double given_back(int block, int& row) const noexcept;
     /// From now on the turns of this hinge are counted.
     void track(int joint) noexcept {
-        if (joints_[joint].axial < 0 &&
-            std::find(followed_.begin(), followed_.end(), joint) == followed_.end())
+        if (std::find(followed_.begin(), followed_.end(), joint) == followed_.end())
             followed_.push_back(joint);
         joints_[joint].tracked = true;
     }
@@ -134,10 +133,8 @@ public:
             states[joint].met = 0;
         }
     }
-    /// Counts the turns of tracked hinges that no drive follows anyway; after every step.
-    void follow(std::span<const BodyState> bodies) noexcept {
-        for (const int joint : followed_) states[joint].angle = coordinate(joint, bodies);
-    }
+    /// Counts the turns of tracked hinges after every step, whose rates tell how many there were.
+    void follow(std::span<const BodyState> bodies) noexcept;
     bool follows() const noexcept { return !followed_.empty(); }
     /// After a solve: a joint whose own rows carried more than its strength holds nothing from the next step on.
     void break_overloaded(int joint, std::int64_t step);

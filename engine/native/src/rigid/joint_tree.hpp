@@ -41,7 +41,7 @@ public:
     bool holds(const LargeArray<BodyState>& bodies);
 
     /// One stage over τ: from poses and kicked momenta to poses at its end and momenta on the way. `increments`, per
-    /// coordinate: in, where to look; out, what each joint moved (m, or the sine of half the angle). False, and
+    /// coordinate: in, where to look; out, what each joint moved (m; rad in a plane, in space the sine of half the angle). False, and
     /// nothing changed, if no solution is near. `rounds` counts evaluations.
     bool stage(double tau, LargeArray<BodyState>& bodies, double* increments, std::int64_t& rounds) noexcept;
 
@@ -59,6 +59,11 @@ private:
         Vec3 inertia;
         int coordinates() const noexcept { return turns + slides; }
     };
+    /// Of a turn θ, by y = sin² θ/2: (θ/2)/sin θ/2, (1 − (θ/2) cot θ/2)/y and their derivatives.
+    struct Log {
+        double ratio = 1.0, bend = 1.0 / 3.0, ratio_slope = 1.0 / 6.0, bend_slope = 2.0 / 15.0;
+    };
+    static Log log_of(double y, double cosine) noexcept;
     struct Course {  // of one node in one stage
         // At its start:
         Mat3 frame, axes;  // of what carries the joint; of the body
@@ -73,7 +78,9 @@ private:
         Mat3 turned;  // the same, less one
         Vec3 shift;   // of the body
         Vec3 end_place, end_reach, end_along[6];
-        Vec3 half;         // vector part of the turn, body axes
+        Vec3 half;                    // vector part of the turn, body axes
+        Vec3 spin, bent, bent_twice;  // I half, half × that, half × that
+        Log log;
         Vec3 momentum;     // angular, world axes
         Vec3 push, twist;  // momenta gained; then those of all that is attached to it
     };

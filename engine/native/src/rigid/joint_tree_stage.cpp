@@ -2,6 +2,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "linear/elementary.hpp"
 #include "rigid/joint_rounds.hpp"
 #include "rigid/joint_tree.hpp"
 #include "rigid/rotation.hpp"
@@ -81,8 +82,23 @@ bool JointTree::look_at(const double* increments) noexcept {
     return true;
 }
 
-/// How the bodies move over the stage, and the momenta that takes: m Δx/τ, and in body axes (2/τ)(c I e + e × I e) for
-/// the turn (c, e), which is the step of rotation.hpp read backwards.
+JointTree::Log JointTree::log_of(double y, double cosine) noexcept {
+    Log log;
+    if (y < 1e-7) {
+        log.ratio += log.ratio_slope * y;
+        log.bend += log.bend_slope * y;
+        return log;
+    }
+    log.ratio = arc_tangent(std::sqrt(y), cosine) / std::sqrt(y);
+    log.bend = (1.0 - log.ratio * cosine) / y;
+    log.ratio_slope = (1.0 / cosine - log.ratio) / (2.0 * y);
+    log.bend_slope = (0.5 * log.ratio / cosine - log.ratio_slope * cosine - log.bend) / y;
+    return log;
+}
+
+/// How the bodies move over the stage, and the momenta that takes: m Δx/τ, and for a turn φ = θ n in body axes that of the
+/// discrete Lagrangian φ·I φ/2τ, (1/τ)(I φ + ½ φ × I φ + κ φ × (φ × I φ)), κ θ² = 1 − (θ/2) cot θ/2: a steady spin's turn,
+/// and symplectic as that of rotation.hpp is, which does not say its momentum from the turn.
 void JointTree::move(double tau) noexcept {
     const double over = 2.0 / tau;
     for (std::size_t k = 0; k < nodes_.size(); ++k) {
@@ -101,8 +117,12 @@ void JointTree::move(double tau) noexcept {
         m.turned = rotation_less_one(m.turn);
         m.shift -= m.turned * m.reach;
         m.half = transposed_times(m.axes, vector_of(m.turn));
-        const Vec3 spin = times(node.inertia, m.half);
-        m.momentum = m.axes * (over * (m.turn.w * spin + cross(m.half, spin)));
+        m.log = log_of(dot(m.half, m.half), m.turn.w);
+        m.spin = times(node.inertia, m.half);
+        m.bent = cross(m.half, m.spin);
+        m.bent_twice = cross(m.half, m.bent);
+        m.momentum =
+            m.axes * ((over * m.log.ratio) * (m.spin + m.log.ratio * m.bent + m.log.bend * m.bent_twice));
     }
 }
 
@@ -193,11 +213,13 @@ void JointTree::fill_masses() noexcept {
                 pushes_[b] = nodes_[b].mass * cross(axis, m.end_place - centre);
                 const Vec3 d = transposed_times(m.axes, axis), inertia = nodes_[b].inertia;
                 const Vec3 turn = 0.5 * (m.turn.w * d + cross(d, m.half));
-                const double cosine = -0.5 * dot(d, m.half);
-                const Vec3 spin = times(inertia, m.half), more = times(inertia, turn);
-                twists_[b] =
-                    m.axes *
-                    (2.0 * (cosine * spin + m.turn.w * more + cross(turn, spin) + cross(m.half, more)));
+                const double dy = 2.0 * dot(m.half, turn), ratio = m.log.ratio;
+                const Vec3 more = times(inertia, turn), bent = cross(turn, m.spin) + cross(m.half, more),
+                           twice = cross(turn, m.bent) + cross(m.half, bent);
+                twists_[b] = m.axes * ((2.0 * dy * m.log.ratio_slope) *
+                                           (m.spin + 2.0 * ratio * m.bent + m.log.bend * m.bent_twice) +
+                                       (2.0 * ratio) * (more + ratio * bent + m.log.bend * twice +
+                                                        (dy * m.log.bend_slope) * m.bent_twice));
             }
             const auto put = [&](int b, Vec3 push, Vec3 twist) {
                 const Course& m = courses_[b];
@@ -301,7 +323,10 @@ void JointTree::fill_loops(bool derivatives) noexcept {
 bool JointTree::stage(double tau, LargeArray<BodyState>& bodies, double* increments,
                       std::int64_t& rounds) noexcept {
     if (!plane_.empty()) return plane_.stage(tau, bodies, increments, rounds);
-    if (!pivots_.empty()) return pivots_.stage(tau, bodies, increments, rounds);
+    if (!pivots_.empty()) {
+        pivots_.stage(tau, bodies, rounds);
+        return true;
+    }
     take(bodies);
     if (!look_at(increments)) return false;
     for (const Closing& loop : loops_) {

@@ -44,15 +44,14 @@ void PivotBodies::add(int body, const BodyConstants& constants, Vec3 arm) {
     for (int i = 0; i < 3; ++i)
         for (int j = 0; j < 3; ++j)
             tensor(i, j) += constants.mass * ((i == j ? dot(r, r) : 0.0) - r[i] * r[j]);
-    pivot.inertia = principal(tensor, pivot.axes);
+    pivot.rotor = FreeRotor(principal(tensor, pivot.axes));
     pivots_.push_back(pivot);
     turns_.emplace_back();
 }
 
-bool PivotBodies::stage(double tau, LargeArray<BodyState>& bodies, double* increments,
-                        std::int64_t& rounds) noexcept {
+void PivotBodies::stage(double tau, LargeArray<BodyState>& bodies, std::int64_t& rounds) noexcept {
     ++rounds;
-    const double half = 0.5 * tau, over = 1.0 / tau;
+    const double over = 1.0 / tau;
     for (std::size_t k = 0; k < pivots_.size(); ++k) {
         const Pivot& pivot = pivots_[k];
         const BodyState& s = bodies[pivot.body];
@@ -61,12 +60,9 @@ bool PivotBodies::stage(double tau, LargeArray<BodyState>& bodies, double* incre
         for (int i = 0; i < 9; ++i) axes.m[i] += pivot.axes.m[i];
         turn.reach = pivot.arm + s.turn_less_one * pivot.arm;
         turn.momentum = s.angular_momentum - cross(turn.reach, pivot.mass * s.velocity);
-        const double* guess = increments + 3 * k;
-        Vec3 rate = (1.0 / half) * transposed_times(axes, Vec3{guess[0], guess[1], guess[2]});
-        if (!rotation_rate(pivot.inertia, tau, transposed_times(axes, turn.momentum), rate, !is_zero(rate)))
-            return false;
-        const Vec3 e = half * (axes * rate);
-        turn.moved = {std::sqrt(1.0 - dot(e, e)), e.x, e.y, e.z};
+        const Quat moved = pivot.rotor.turn(tau, transposed_times(axes, turn.momentum));
+        const Vec3 e = axes * Vec3{moved.x, moved.y, moved.z};
+        turn.moved = {moved.w, e.x, e.y, e.z};
     }
     for (std::size_t k = 0; k < pivots_.size(); ++k) {
         const Pivot& pivot = pivots_[k];
@@ -77,10 +73,7 @@ bool PivotBodies::stage(double tau, LargeArray<BodyState>& bodies, double* incre
         s.displacement = -(s.turn_less_one * pivot.arm);
         s.velocity = -over * (rotation_less_one(turn.moved) * turn.reach);
         s.angular_momentum = turn.momentum + cross(turn.reach, pivot.mass * s.velocity);
-        double* own = increments + 3 * k;
-        own[0] = turn.moved.x, own[1] = turn.moved.y, own[2] = turn.moved.z;
     }
-    return true;
 }
 
 }  // namespace spook

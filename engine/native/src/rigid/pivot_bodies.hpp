@@ -1,8 +1,7 @@
 // The stages of joint_tree.hpp for bodies that each hang on one ball joint of the world.
 //
-// Such a body only turns about its pivot. The momentum that turns it so in a stage is linear in its second moments of
-// mass, and a point of mass m at r has m r × R r/τ: what the whole gains about the pivot is the variational turn of
-// rotation.hpp with the inertia about the pivot. So a stage is that of a free body, and what it has about the pivot it keeps.
+// Such a body only turns about its pivot, as a free one with the inertia about the pivot does: a stage is the turn of
+// rotation.hpp, and what it has about the pivot it keeps.
 #pragma once
 
 #include <cstdint>
@@ -20,16 +19,16 @@ public:
     /// `arm`: from the centre of the body to its joint, at the start.
     void add(int body, const BodyConstants& constants, Vec3 arm);
 
-    /// As JointTree::stage(); a turn counts as one round.
-    bool stage(double tau, LargeArray<BodyState>& bodies, double* increments, std::int64_t& rounds) noexcept;
+    /// As JointTree::stage(), from no guess; a turn counts as one round.
+    void stage(double tau, LargeArray<BodyState>& bodies, std::int64_t& rounds) noexcept;
 
 private:
     struct Pivot {
         int body = -1;
         double mass = 0.0;
         Vec3 arm;
-        Vec3 inertia;  // about the pivot, principal
-        Mat3 axes;     // those of it, at the start, in the world
+        FreeRotor rotor;  // about the pivot
+        Mat3 axes;        // those of it, at the start, in the world
     };
     struct Turn {
         Quat moved;

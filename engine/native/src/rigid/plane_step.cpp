@@ -5,6 +5,8 @@
 #include <numeric>
 #include <utility>
 
+#include "linear/elementary.hpp"
+
 namespace spook {
 
 namespace {
@@ -295,8 +297,7 @@ void PlaneStep::correct() noexcept {
         for (Node& node : nodes_) {
             node.ahead = node.at;
             const double spin = node.spin + node.inertia * node.next_rate;
-            if (!moved(node.velocity + node.next_velocity, node.over_inertia * spin, node.ahead))
-                return;  // the step itself will say so
+            advance(node.velocity + node.next_velocity, node.over_inertia * spin, node.ahead);
         }
         for (const Joint& joint : joints_) {
             const Node &a = nodes_[joint.first], &b = nodes_[joint.second];
@@ -359,22 +360,21 @@ void PlaneStep::take_velocities() noexcept {
     if (options_.corrections > 0) std::copy(violation_.begin(), violation_.end(), last_violation_.begin());
 }
 
-/// A pose a step on. J sin θ/h of a turn θ is the angular momentum: see rotation.hpp. False if it turns too fast.
-bool PlaneStep::moved(Vec2 velocity, double rate, Pose& pose) const noexcept {
+/// A pose a step on.
+void PlaneStep::advance(Vec2 velocity, double rate, Pose& pose) const noexcept {
     pose.displacement += options_.time_step * velocity;
-    const double sine = options_.time_step * rate, z = sine * sine;
-    if (!(z <= 1.0)) return false;
-    const double y = 0.5 * z / (1.0 + std::sqrt(1.0 - z)), cosine = std::sqrt(1.0 - y);
-    pose.turn = unit(HalfTurn{cosine, 0.5 * sine / cosine} * pose.turn);
+    const SineCosine half = sine_cosine(0.5 * options_.time_step * rate);
+    pose.turn = unit(HalfTurn{half.cosine, half.sine} * pose.turn);
     pose.turned = less_one(pose.turn);
-    return true;
 }
 
 int PlaneStep::move() noexcept {
-    int too_fast = -1;
-    for (Node& node : nodes_)
-        if (!moved(node.velocity, node.rate, node.at) && too_fast < 0) too_fast = node.body;
-    return too_fast;
+    int fast = -1;
+    for (Node& node : nodes_) {
+        advance(node.velocity, node.rate, node.at);
+        if (options_.time_step * std::fabs(node.rate) >= 1.0 && fast < 0) fast = node.body;
+    }
+    return fast;
 }
 
 void PlaneStep::read_violations(std::span<const double> all) noexcept {

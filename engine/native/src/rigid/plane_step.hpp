@@ -62,7 +62,7 @@ public:
     }
     Vec3 velocity_before(int k) const noexcept { return plane_.lifted(nodes_[k].next_velocity); }
     Vec3 spin_before(int k) const noexcept { return upright(nodes_[k].next_spin); }
-    /// Poses a step on. The first body that turns too fast, −1.
+    /// Poses a step on. The first body that turns by a radian or more, −1.
     int move() noexcept;
 
     /// The impulses of the last step, and where they act.
@@ -123,7 +123,7 @@ private:
     double changed(int row, const Node& a, const Node& b) const noexcept;
     void bend_back() noexcept;
     void correct() noexcept;
-    bool moved(Vec2 velocity, double rate, Pose& pose) const noexcept;
+    void advance(Vec2 velocity, double rate, Pose& pose) const noexcept;
 
     Plane3 plane_;
     Options options_;

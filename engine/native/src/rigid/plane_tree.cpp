@@ -4,9 +4,21 @@
 #include <cmath>
 #include <utility>
 
+#include "linear/elementary.hpp"
 #include "rigid/joint_rounds.hpp"
 
 namespace spook {
+
+namespace {
+
+constexpr double FARTHEST = 0.3;  // cosine of half the turn of a joint in a stage
+
+HalfTurn half_turn(double angle) noexcept {
+    const SineCosine half = sine_cosine(0.5 * angle);
+    return {half.cosine, half.sine};
+}
+
+}  // namespace
 
 void PlaneTree::take(Plane3 plane, std::vector<Node> nodes, std::vector<Closing> closings, int reach,
                      double scale) {
@@ -95,35 +107,38 @@ template <int NORMAL> void PlaneTree::read(const LargeArray<BodyState>& bodies) 
 bool PlaneTree::look_at(const double* increments) noexcept {
     for (std::size_t k = 0; k < nodes_.size(); ++k) {
         Course& m = courses_[k];
+        m.angle = 0.0;
         m.moved = {};
         m.slid = 0.0;
         if (nodes_[k].slides) {
             m.slid = increments[k];
             continue;
         }
-        const double sine = increments[k], squared = 1.0 - sine * sine;
-        if (!(squared > 0.1)) return false;
-        m.moved = {std::sqrt(squared), sine};
+        m.angle = increments[k];
+        m.moved = half_turn(m.angle);
+        if (!(m.moved.cosine > FARTHEST)) return false;
     }
     return true;
 }
 
-/// How the bodies move over the stage, and the spin that takes: J sin θ/τ for a turn θ.
+/// How the bodies move over the stage, and the spin that takes: J θ/τ for a turn θ.
 void PlaneTree::move(double tau) noexcept {
     const double over = 1.0 / tau;
     for (std::size_t k = 0; k < nodes_.size(); ++k) {
         const Node& node = nodes_[k];
         Course& m = courses_[k];
         m.turn = m.moved;
+        m.whole_angle = m.angle;
         m.shift = m.slid * m.along;
         if (node.parent >= 0) {
             const Course& p = courses_[node.parent];
             m.turn = p.turn * m.turn;
+            m.whole_angle += p.whole_angle;
             m.shift += p.shift + p.turned * (m.lever + m.shift);
         }
         m.turned = less_one(m.turn);
         m.shift -= m.turned * m.reach;
-        m.spins = over * m.turned.sine * node.inertia;
+        m.spins = over * m.whole_angle * node.inertia;
     }
 }
 
@@ -176,7 +191,7 @@ void PlaneTree::fill_masses() noexcept {
                 twists_[b] = 0.0;
             } else {
                 pushes_[b] = nodes_[b].mass * across(m.end_place - own.end_centre);
-                twists_[b] = nodes_[b].inertia * (1.0 + m.turned.fall);
+                twists_[b] = nodes_[b].inertia;
             }
         }
         for (int b = node.end - 1; b > k; --b) {
@@ -275,7 +290,7 @@ void PlaneTree::write(double tau, LargeArray<BodyState>& bodies, double* increme
         s.velocity = flat.lifted(over * m.shift);
         s.angular_momentum = {};
         s.angular_momentum[NORMAL] = m.spins;
-        increments[k] = nodes_[k].slides ? m.slid : m.moved.sine;
+        increments[k] = nodes_[k].slides ? m.slid : m.angle;
     }
 }
 
@@ -313,17 +328,16 @@ bool PlaneTree::stage(double tau, LargeArray<BodyState>& bodies, double* increme
                 m.slid += step;
                 continue;
             }
-            const double e = 0.5 * step, sine = (HalfTurn{std::sqrt(1.0 - e * e), e} * m.moved).sine;
-            // The cosine from the sine: to scale both would turn every stage a little the same way.
-            m.moved = {std::sqrt(1.0 - sine * sine), sine};
-            moved = std::max(moved, sine * sine);
+            m.angle += step;
+            m.moved = half_turn(m.angle);
+            moved = std::max(moved, m.moved.sine * m.moved.sine);
         }
         for (const Closing& loop : closings_)
             for (int i = 0; i < 2; ++i) multiplier_[loop.at + i] += right_[loop.places[i]];
         if (round.settled(size, moved, !closings_.empty())) break;
     }
     for (const Course& course : courses_)
-        if (!(course.moved.cosine > 0.3)) return false;
+        if (!(course.moved.cosine > FARTHEST)) return false;
     move(tau);
     ++rounds;
     place();

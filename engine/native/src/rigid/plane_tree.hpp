@@ -1,6 +1,6 @@
 // The stages of joint_tree.hpp for mechanisms that move in a plane: a number for an angle, two for a place.
 //
-// Where all hinges turn about one axis of the world and slides lie across it, turns commute, a body's spin is J sin θ/τ
+// Where all hinges turn about one axis of the world and slides lie across it, turns commute, a body's spin is J θ/τ
 // for a turn θ over the stage, and nothing out of the plane is left in the equations. The map is the one of
 // joint_tree_stage.cpp to rounding; a mechanism in another plane takes that, and so shows it.
 #pragma once
@@ -63,9 +63,11 @@ private:
         Vec2 velocity;
         double spin = 0.0, slide = 0.0;
         // At its end, as far as found:
-        HalfTurn moved;  // the turn of the joint
+        double angle = 0.0;  // the turn of the joint
+        HalfTurn moved;
         double slid = 0.0;
-        HalfTurn turn;  // of the body over the stage
+        double whole_angle = 0.0;  // the turn of the body over the stage
+        HalfTurn turn;
         TurnLessOne turned;
         Vec2 shift;
         double spins = 0.0;

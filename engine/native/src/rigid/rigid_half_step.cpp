@@ -72,8 +72,10 @@ void RigidSystem::start_half_step() {
             }
         }
     }
-    if (method_.corrections > 0 && solver_ == RigidSolver::block && move_all(-h_))
+    if (method_.corrections > 0 && solver_ == RigidSolver::block) {
+        move_all(-h_);
         violations_at(trial_, live_.last_violation.data());
+    }
     matrix_.clear_counters();
 }
 
@@ -99,13 +101,12 @@ void RigidSystem::start_half_step_touching() {
     }
 }
 
-/// trial_: where every body is after h with its present velocities. False when one turns too fast.
-bool RigidSystem::move_all(double h) {
+/// trial_: where every body is after h with its present velocities.
+void RigidSystem::move_all(double h) {
     for (int i = 0; i < bodies(); ++i) {
         trial_[i] = live_.bodies[i];
-        if (!move(constants_[i], h, trial_[i])) return false;
+        move(constants_[i], h, trial_[i]);
     }
-    return true;
 }
 
 /// Violations per row at other poses; zero for the rows of a free coordinate, which have no curvature to speak of.
@@ -169,7 +170,7 @@ void RigidSystem::correct_curvature() {
                 s.angular_momentum = s.inertia * Vec3{x[0], x[1], x[2]};
                 x += 3;
             }
-            if (!move(constants_[i], h_, s)) return;  // the step itself will say so
+            move(constants_[i], h_, s);
         }
         for (int i : driven_) {
             trial_[i] = live_.bodies[i];

@@ -27,7 +27,6 @@ void RigidSystem::prepare_hold() {
     change_.assign(rows, 0.0);
     last_plain_ = last_step_ = change_;
     mixing_.assign(2 * rows * MIXED, 0.0);
-    rate_.assign(constrained_.size(), {});
     axes_.assign(constrained_.size(), {});
     extent_.clear();
     for (int k = 0; k < static_cast<int>(blocks.size()); ++k)
@@ -79,12 +78,11 @@ bool RigidSystem::factor_dense() {
     return dense_rows_.factor(method_.floor);
 }
 
-/// Violations where the momenta lead in τ; the largest, in sizes of its joint; infinite when a body turns too fast.
+/// Violations where the momenta lead in τ; the largest, in sizes of its joint.
 double RigidSystem::violations_ahead(double tau) {
     for (std::size_t k = 0; k < constrained_.size(); ++k)
-        if (!lead(constants_[constrained_[k]], axes_[k], tau, live_.bodies[constrained_[k]], rate_[k],
-                  trial_[constrained_[k]]))
-            return std::numeric_limits<double>::infinity();
+        lead(constants_[constrained_[k]], axes_[k], tau, live_.bodies[constrained_[k]],
+             trial_[constrained_[k]]);
     violations_at(trial_, violation_.data());
     double worst = 0.0;
     for (std::size_t row = 0; row < extent_.size(); ++row) {
@@ -134,7 +132,6 @@ void RigidSystem::mix(int iteration, int& kept) {
 bool RigidSystem::iterate(double tau, bool dense) {
     const std::size_t rows = static_cast<std::size_t>(rows_);
     std::fill(change_.begin(), change_.end(), 0.0);
-    std::fill(rate_.begin(), rate_.end(), Vec3{});
     double before = std::numeric_limits<double>::infinity();
     int kept = 0;
     bool plain = false;

@@ -56,7 +56,10 @@ bool RigidSystem::plane_velocities() {
 
 void RigidSystem::move_in_plane() {
     const int body = plane_.move();
-    if (body >= 0 && live_.too_fast < 0) live_.too_fast = body;
+    if (body >= 0 && live_.whirling < 0) {
+        deliver();
+        live_.whirling = find_whirling({&body, 1});
+    }
     if (clock_) clock_->mark(Stage::integrate_positions);
 }
 

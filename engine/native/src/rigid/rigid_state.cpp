@@ -1,17 +1,7 @@
 #include "rigid/rigid_state.hpp"
 
-#include "linear/elementary.hpp"
-
 namespace spook {
 namespace {
-
-/// The turn of a constant angular velocity over h.
-Quat turn_of(double h, Vec3 angular_velocity) noexcept {
-    const double angle = 0.5 * h * norm(angular_velocity);
-    const SineCosine half = sine_cosine(angle);
-    const Vec3 e = (angle != 0.0 ? 0.5 * h * half.sine / angle : 0.0) * angular_velocity;
-    return {half.cosine, e.x, e.y, e.z};
-}
 
 bool isotropic(Vec3 inertia) noexcept { return inertia.x == inertia.y && inertia.y == inertia.z; }
 
@@ -42,6 +32,7 @@ BodyConstants constants_of(const RigidBodySpec& spec) noexcept {
             spec.particle,
             spec.mass,
             spec.inertia,
+            spec.particle ? FreeRotor{} : FreeRotor(spec.inertia),
             start,
             spec.position,
             spec.orientation,
@@ -83,52 +74,46 @@ void refresh(const BodyConstants& body, BodyState& state) noexcept {
 
 namespace {
 
-bool advance_pose(const BodyConstants& body, double h, BodyState& state) noexcept {
+/// A turn in principal axes, which `axes` carries to the world, after `from`.
+Quat turned_on(const Mat3& axes, Quat turn, Quat from) noexcept {
+    const Vec3 e = axes * Vec3{turn.x, turn.y, turn.z};
+    return unit(Quat{turn.w, e.x, e.y, e.z} * from);
+}
+
+void advance_pose(const BodyConstants& body, double h, BodyState& state) noexcept {
     state.displacement += h * state.velocity;
-    if (body.particle) return true;
+    if (body.particle) return;
     if (body.motion == Motion::kinematic) {
         state.turn = unit(turn_of(h, state.angular_velocity) * state.turn);
+    } else if (isotropic(body.inertia)) {
+        state.turn = unit(body.rotor.turn(h, state.angular_momentum) * state.turn);
     } else {
-        Vec3 w;
-        if (isotropic(body.inertia)) {
-            if (!rotation_rate(body.inertia, h, state.angular_momentum, w)) return false;
-        } else {
-            const Mat3 r = inertia_axes(body, state);
-            if (!rotation_rate(body.inertia, h, transposed_times(r, state.angular_momentum), w)) return false;
-            w = r * w;
-        }
-        const Vec3 e = 0.5 * h * w;
-        state.turn = unit(Quat{std::sqrt(1.0 - dot(e, e)), e.x, e.y, e.z} * state.turn);
+        const Mat3 r = inertia_axes(body, state);
+        state.turn =
+            turned_on(r, body.rotor.turn(h, transposed_times(r, state.angular_momentum)), state.turn);
     }
-    return true;
 }
 
 }  // namespace
 
-bool move(const BodyConstants& body, double h, BodyState& state) noexcept {
-    if (body.motion == Motion::fixed) return true;
-    if (!advance_pose(body, h, state)) return false;
+void move(const BodyConstants& body, double h, BodyState& state) noexcept {
+    if (body.motion == Motion::fixed) return;
+    advance_pose(body, h, state);
     if (!body.particle) state.turn_less_one = rotation_less_one(state.turn);
-    return true;
 }
 
-bool lead(const BodyConstants& body, const Mat3& axes, double h, const BodyState& from, Vec3& rate,
+void lead(const BodyConstants& body, const Mat3& axes, double h, const BodyState& from,
           BodyState& to) noexcept {
     to.displacement = from.displacement + h * from.velocity;
-    if (body.particle) return true;
-    const Vec3 p = transposed_times(axes, from.angular_momentum);
-    if (!rotation_rate(body.inertia, h, p, rate, !is_zero(rate))) return false;
-    const Vec3 e = 0.5 * h * (axes * rate);
-    to.turn = unit(Quat{std::sqrt(1.0 - dot(e, e)), e.x, e.y, e.z} * from.turn);
+    if (body.particle) return;
+    to.turn = turned_on(axes, body.rotor.turn(h, transposed_times(axes, from.angular_momentum)), from.turn);
     to.turn_less_one = rotation_less_one(to.turn);
-    return true;
 }
 
-bool integrate(const BodyConstants& body, double h, BodyState& state) noexcept {
-    if (body.motion == Motion::fixed) return true;
-    if (!advance_pose(body, h, state)) return false;
+void integrate(const BodyConstants& body, double h, BodyState& state) noexcept {
+    if (body.motion == Motion::fixed) return;
+    advance_pose(body, h, state);
     if (!body.particle) refresh(body, state);
-    return true;
 }
 
 void displace(const BodyConstants& body, double h, Vec3 velocity, Vec3 angular_velocity,

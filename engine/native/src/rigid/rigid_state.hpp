@@ -15,6 +15,7 @@ struct BodyConstants {
     bool particle = false;
     double mass = 0.0;
     Vec3 inertia;  // principal
+    FreeRotor rotor;
     Mat3 start_rotation;
     Vec3 start;            // position at the start
     Quat start_turn;       // orientation at the start
@@ -53,16 +54,14 @@ BodyState start_of(const RigidBodySpec& spec, const BodyConstants& body) noexcep
 void refresh(const BodyConstants& body, BodyState& state) noexcept;
 
 /// Where integrate() takes a body, without the rest of what is derived from it: displacement, turn, turn_less_one.
-bool move(const BodyConstants& body, double h, BodyState& state) noexcept;
+void move(const BodyConstants& body, double h, BodyState& state) noexcept;
 
-/// The same for a dynamic body whose inertia_axes() are at hand. `rate`, along them: in, where to look for the turn (zero: no
-/// idea); out, the turn found.
-bool lead(const BodyConstants& body, const Mat3& axes, double h, const BodyState& from, Vec3& rate,
+/// The same for a dynamic body whose inertia_axes() are at hand.
+void lead(const BodyConstants& body, const Mat3& axes, double h, const BodyState& from,
           BodyState& to) noexcept;
 
-/// Moves a body on by h with its velocities (kinematic) or its momenta (dynamic, after a solve). False when it
-/// turns too fast for the time step.
-bool integrate(const BodyConstants& body, double h, BodyState& state) noexcept;
+/// Moves a body on by h with its velocities (kinematic) or its momenta (dynamic, after a solve).
+void integrate(const BodyConstants& body, double h, BodyState& state) noexcept;
 
 /// Moves a body by h times velocities that leave no trace in its momenta.
 void displace(const BodyConstants& body, double h, Vec3 velocity, Vec3 angular_velocity,

@@ -227,13 +227,7 @@ void RigidSystem::advance(std::int64_t steps) {
 }
 
 Health RigidSystem::health() const {
-    if (live_.too_fast >= 0) {
-        // Then no joint did it: with h |I⁻¹ L| above 1 (of a sphere) no turn has that angular momentum.
-        const bool given = h_ * norm(start_[live_.too_fast].angular_velocity) >= 1.0;
-        const char* tension = given ? "" : cause();
-        return {Status::diverged, live_.too_fast,
-                *tension ? tension : "turns too fast for the time step (h |w| reaches 1); try a smaller one"};
-    }
+    if (live_.whirling >= 0) return {Status::diverged, live_.whirling, cause(true)};
     if (live_.lost >= 0)
         return {
             Status::diverged, live_.lost,

@@ -134,7 +134,8 @@ public:
     };
 
 private:
-    const char* cause() const noexcept;
+    int find_whirling(std::span<const int> bodies);
+    const char* cause(bool known = false) const noexcept;
     // rigid_loads.cpp: what follows the time, and fluids
     void take_loads(const RigidScene& scene);
     void follow_time();
@@ -185,7 +186,7 @@ private:
     void start_half_step_touching();
     void read_half_step();
     void find_bias(double* bias) const;
-    bool move_all(double h);
+    void move_all(double h);
     void violations_at(const LargeArray<BodyState>& at, double* out) const;
     double row_speed(int block, int row, bool solved) const;
     void bend_rows_back();
@@ -418,7 +419,6 @@ private:
     bool in_tree_ = false;
     std::size_t unknowns_ = 0;  // of a stage: rows, or joint coordinates
     std::vector<double> change_, last_plain_, last_step_, mixing_, extent_;
-    std::vector<Vec3> rate_;  // per constrained body: turn over the stage, along them
     std::vector<Mat3> axes_;  // per constrained body, those of its inertia where the stage starts
     bool dense_ = false;
     DenseRows dense_rows_;

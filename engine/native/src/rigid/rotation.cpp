@@ -1,73 +1,153 @@
+// Euler's equations for three moments, j = 1/I, p' = p × j p, by what the discrete ones of Moser and Veselov (Comm. Math.
+// Phys. 139 (1991) 217) do exactly. These turn the body by the unit quaternion along (1, k j (p + p₊)/2), which takes p
+// along its true path, only at another pace, and differs from the true turn by one about the momentum. Pace and difference
+// depend on the motion's invariants and h alone (Hairer and Vilmart, J. Phys. A 39 (2006) 13225, expand them in h), so they
+// are found here where they are simplest: for the stretch of time about the moment at which p crosses the plane across the
+// middle axis.
+//
+// With a = j₂ − j₃, b = j₁ − j₃ and P₁², P₃² the squares of p there, s(t) = sn(√A t)/√A with s'² = (1 − A s²)(1 − B s²),
+// A = a b P₃², B = b (b − a) P₁². Jacobi's addition theorem then moves p by rational functions of itself, and no phase is
+// looked for. Which of A and B is larger, so about which axis p circles, makes no difference.
 #include "rigid/rotation.hpp"
 
 #include <algorithm>
 #include <cmath>
 
+#include "linear/elementary.hpp"
+
 namespace spook {
 namespace {
 
+constexpr double PART = 0x1p-4;  // rad: up to here series and quadrature are exact to rounding
+constexpr double STRETCH = 4.0;  // rad: what its start's invariants serve for; rounding leaves them slowly
+constexpr double FAR = 1000.0;   // rad
+
 Vec3 times(Vec3 a, Vec3 b) noexcept { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 
-/// All moments equal: |p|/I = |w| c is a quadratic for |w|².
-bool sphere_rate(double inertia, double h, Vec3 p, Vec3& w) noexcept {
-    const Vec3 s = (1.0 / inertia) * p;
-    const double z = h * h * dot(s, s);  // 4 y (1 − y) with y = h²|w|²/4
-    if (!(z <= 1.0)) return false;
-    const double y = 0.5 * z / (1.0 + std::sqrt(1.0 - z));
-    w = (1.0 / std::sqrt(1.0 - y)) * s;
-    return true;
+/// v with the axis `first` as x, and back.
+Vec3 ordered(int first, Vec3 v) noexcept {
+    return first == 0 ? v : first == 1 ? Vec3{v.y, v.z, v.x} : Vec3{v.z, v.x, v.y};
+}
+Quat restored(int first, Quat q) noexcept {
+    return first == 0 ? q : first == 1 ? Quat{q.w, q.z, q.x, q.y} : Quat{q.w, q.y, q.z, q.x};
 }
 
-constexpr double LARGE = 0x1p200;  // of moments: their cubes stay far from the ends of the numbers
+/// s(t) for A t², B t² up to PART²/4: the series of sn, to the ninth power.
+double pace(double a, double b, double t) noexcept {
+    const double p = (a + b) * t * t, q = a * t * (b * t) * t * t, pp = p * p;
+    return t * (1.0 - p * (1.0 / 6) + (pp + 12 * q) * (1.0 / 120) - p * (pp + 132 * q) * (1.0 / 5040) +
+                (pp * pp + 1224 * pp * q + 3024 * q * q) * (1.0 / 362880));
+}
 
 }  // namespace
 
-bool rotation_rate(Vec3 inertia, double h, Vec3 p, Vec3& w, bool near) noexcept {
-    if (!(inertia.x < LARGE && inertia.x > 1.0 / LARGE)) {
-        int exponent = 0;
-        std::frexp(std::fmax(inertia.x, std::fmax(inertia.y, inertia.z)), &exponent);
-        const double scale =
-            std::ldexp(1.0, -std::clamp(exponent, -1000, 1000));  // exact: no bit of w differs
-        if (scale * inertia.x < LARGE && scale * inertia.x > 1.0 / LARGE)
-            return rotation_rate(scale * inertia, h, scale * p, w, near);
+Quat turn_of(double h, Vec3 angular_velocity) noexcept {
+    const double angle = 0.5 * h * norm(angular_velocity);
+    const SineCosine half = sine_cosine(angle);
+    const Vec3 e = (angle != 0.0 ? 0.5 * h * half.sine / angle : 0.0) * angular_velocity;
+    return {half.cosine, e.x, e.y, e.z};
+}
+
+FreeRotor::FreeRotor(Vec3 moments) noexcept {
+    const double largest = std::fmax(moments.x, std::fmax(moments.y, moments.z));
+    int exponent = 0;
+    std::frexp(largest, &exponent);
+    unit_ = std::ldexp(1.0, std::clamp(exponent, -1000, 1000));
+    const Vec3 over{unit_ / moments.x, unit_ / moments.y, unit_ / moments.z};
+    const bool xy = moments.x == moments.y, yz = moments.y == moments.z, zx = moments.z == moments.x;
+    if (xy && yz) {
+        over_ = over;
+        return;
     }
-    if (inertia.x == inertia.y && inertia.y == inertia.z) return sphere_rate(inertia.x, h, p, w);
-    const Vec3 over{1.0 / inertia.x, 1.0 / inertia.y, 1.0 / inertia.z};
-    if (!near) w = times(over, p);
-    const double target = 4e-16 * 4e-16 * dot(p, p), half = 0.5 * h;
-    double last = -1.0;
-    for (int round = 0; round < 40; ++round) {
-        const double squared = 1.0 - 0.25 * h * h * dot(w, w);
-        if (!(squared > 0.0)) {
-            if (round > 0 || !std::isfinite(squared)) return false;
-            w = (1.0 / (h * norm(w))) * w;  // a start inside the domain
-            continue;
-        }
-        const double c = std::sqrt(squared);
-        const Vec3 momentum = times(inertia, w);
-        const Vec3 f = c * momentum + half * cross(w, momentum) - p;
-        const double size = dot(f, f);
-        if (size <= target || (size >= last && last >= 0.0 && last <= 1e-28 * dot(p, p))) return true;
-        last = size;
-        if (h * h * dot(w, w) < 1e-12) {  // the Jacobian is I to 1e-6, and a second round is below rounding
-            w -= times(over, f);
-            continue;
-        }
-        const double k = -0.25 * h * h / c;
-        const Vec3 m = momentum;
-        const Mat3 j = {{c * inertia.x + k * m.x * w.x, k * m.x * w.y + half * (m.z - w.z * inertia.y),
-                         k * m.x * w.z + half * (w.y * inertia.z - m.y),
-                         k * m.y * w.x + half * (w.z * inertia.x - m.z), c * inertia.y + k * m.y * w.y,
-                         k * m.y * w.z + half * (m.x - w.x * inertia.z),
-                         k * m.z * w.x + half * (m.y - w.y * inertia.x),
-                         k * m.z * w.y + half * (w.x * inertia.y - m.x), c * inertia.z + k * m.z * w.z}};
-        const Vec3 a{j.m[0], j.m[3], j.m[6]}, b{j.m[1], j.m[4], j.m[7]}, d{j.m[2], j.m[5], j.m[8]};
-        const Vec3 bd = cross(b, d);
-        const double det = dot(a, bd);
-        if (!(std::abs(det) > 0.0)) return false;
-        w -= (1.0 / det) * Vec3{dot(f, bd), dot(a, cross(f, d)), dot(a, cross(b, f))};
+    kind_ = xy || yz || zx ? Kind::symmetric : Kind::triaxial;
+    const auto between = [&](int middle) {
+        const double low = moments[(middle + 2) % 3], high = moments[(middle + 1) % 3];
+        return (low < moments[middle]) == (moments[middle] < high);
+    };
+    if (kind_ == Kind::symmetric) first_ = xy ? 0 : yz ? 1 : 2;
+    else first_ = between(1) ? 0 : between(2) ? 1 : 2;
+    over_ = ordered(first_, over);
+    wide_ = over_.x - over_.z;
+    narrow_ = over_.y - over_.z;
+}
+
+Quat FreeRotor::turn(double h, Vec3 momentum) const noexcept {
+    const Vec3 p = ordered(first_, (1.0 / unit_) * momentum);
+    switch (kind_) {
+        case Kind::sphere: return turn_of(h, over_.x * p);
+        case Kind::symmetric:
+            return restored(first_, turn_of(h, over_.x * p) * turn_of(h, {0.0, 0.0, -wide_ * p.z}));
+        default: return restored(first_, triaxial_turn(h, p));
     }
-    return false;
+}
+
+/// About the momentum: what a steady spin is, and a tumbling body's on average.
+Quat FreeRotor::mean_turn(double h, Vec3 p) const noexcept {
+    const double squared = dot(p, p);
+    return turn_of(h, (dot(p, times(over_, p)) / squared) * p);
+}
+
+Quat FreeRotor::triaxial_turn(double h, Vec3 p) const noexcept {
+    const double squared = dot(p, p), energy = dot(p, times(over_, p));  // twice that
+    if (squared == 0.0) return {};
+    // The fastest spin on the path: where it lies in the plane of the outer axes.
+    const double angle = std::fabs(h) * std::sqrt(energy * (over_.x + over_.z) - squared * over_.x * over_.z);
+    if (angle <= STRETCH) return short_turn(h, angle, p);
+    if (!(angle <= FAR)) return mean_turn(h, p);
+    const double count = std::ceil(angle * (1.0 / STRETCH));
+    Quat q;
+    for (int k = static_cast<int>(count); k > 0; --k)
+        q = unit(q * short_turn(h / count, angle / count, transposed_times(rotation(q), p)));
+    return q;
+}
+
+Quat FreeRotor::short_turn(double h, double angle, Vec3 p) const noexcept {
+    constexpr double squares[] = {
+        0.06943184420297371 * 0.06943184420297371, 0.33000947820757187 * 0.33000947820757187,
+        0.6699905217924281 * 0.6699905217924281, 0.9305681557970262 * 0.9305681557970262};
+    constexpr double weights[] = {0.17392742256872692, 0.32607257743127307, 0.32607257743127307,
+                                  0.17392742256872692};  // Gauss and Legendre's on 0 … 1
+    const Vec3 j = over_;
+    const double a = narrow_, b = wide_, share = a / b;
+    const double p1 = p.x * p.x + share * p.y * p.y, p3 = p.z * p.z + (1.0 - share) * p.y * p.y;  // P²
+    const double pace_a = a * b * p3, pace_b = b * (b - a) * p1;
+    const double e1 = j.x * p1, e3 = j.z * p3, w1 = j.x * e1, w3 = j.z * e3, energy = e1 + e3;
+    const int parts = std::max(1, static_cast<int>(std::ceil(angle * (1.0 / PART))));
+    const double t = h / parts;
+
+    const double s = pace(pace_a, pace_b, 0.5 * t), ss = s * s, as = pace_a * ss, bs = pace_b * ss;
+    const double c2 = 1.0 - as, d2 = 1.0 - bs, cd = std::sqrt(c2 * d2);
+    // Moser and Veselov's turn over t about that moment is along (c d, s j p), p between the two ends.
+    const double own = s * cd / (c2 * d2 + ss * (w1 * c2 + w3 * d2));
+    // What the true turn is ahead of it, about the momentum: ∫ (2E − its own rate), by s instead of the time.
+    double behind = 0.0;
+    for (int k = 0; k < 4; ++k) {
+        const double y = ss * squares[k], c = 1.0 / (1.0 - pace_a * y), d = 1.0 / (1.0 - pace_b * y);
+        const double along = e1 * d + e3 * c, across = w1 * d + w3 * c;
+        const double along_slope = e1 * d * d + e3 * c * c, across_slope = w1 * d * d + w3 * c * c;
+        behind += weights[k] *
+                  (energy - (along_slope - y * along * across_slope / (1.0 + y * across)) / std::sqrt(c * d));
+    }
+    const double ahead = parts * (energy * (t - 2.0 * s) + 2.0 * s * behind) / dot(p, p);
+
+    // sn, cn and dn of the whole of t.
+    const double over = 1.0 / (1.0 - as * bs), sn = 2.0 * s * cd * over, cn = (c2 - as * d2) * over,
+                 dn = (d2 - bs * c2) * over;
+    Quat q;
+    Vec3 at = p;
+    for (int k = 0; k < parts; ++k) {
+        const double scale = 1.0 / (1.0 - a * (b - a) * sn * sn * at.y * at.y);
+        const Vec3 next =
+            scale * Vec3{cn * at.x - a * sn * dn * at.y * at.z, cn * dn * at.y + b * sn * at.x * at.z,
+                         dn * at.z - (b - a) * sn * cn * at.x * at.y};
+        const Vec3 sine = own * times(j, at + next);
+        const double cosine = std::sqrt(1.0 - dot(sine, sine)), half = std::sqrt(0.5 * (1.0 + cosine));
+        const Vec3 e = (0.5 / half) * sine;
+        const Quat part{half, e.x, e.y, e.z};
+        q = k == 0 ? part : q * part;
+        at = next;
+    }
+    return turn_of(ahead, p) * q;
 }
 
 }  // namespace spook

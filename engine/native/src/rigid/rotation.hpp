@@ -1,16 +1,39 @@
-// Rotation of a free body over one step: the variational quaternion step, which keeps angular momentum exactly
-// and energy bounded (order 2).
+// The turn of a free body over a step: that of Euler's equations, to rounding, whatever it spins.
 #pragma once
 
 #include "linear/vec.hpp"
 
 namespace spook {
 
-/// Finds the body-frame rate w of c I w + (h/2) w × I w = p with c = √(1 − h²|w|²/4), by Newton from I⁻¹ p;
-/// h w/2 and c are the vector and scalar part of the unit quaternion of the step. `inertia` holds the principal
-/// moments, p is the angular momentum in body axes. False when there is no such w with h|w| < 2: the body turns
-/// too fast for the time step. With `near`, w holds a guess to start from.
-bool rotation_rate(Vec3 inertia, double time_step, Vec3 p, Vec3& w, bool near = false) noexcept;
+/// A body that turns freely about its centre of mass, or about a pivot.
+class FreeRotor {
+public:
+    FreeRotor() = default;
+    /// Principal moments, positive [kg m²].
+    explicit FreeRotor(Vec3 moments) noexcept;
+
+    /// The turn over a time h, which may be negative; `p`: its angular momentum in principal axes, where it begins. So is the
+    /// turn. Momentum and energy are kept to rounding; a steady spin w turns by h w, however large that is. Where a body
+    /// tumbles by more than a thousand radians in h, by its mean turn.
+    Quat turn(double h, Vec3 p) const noexcept;
+
+private:
+    enum class Kind { sphere, symmetric, triaxial };
+
+    Quat mean_turn(double h, Vec3 p) const noexcept;
+    Quat triaxial_turn(double h, Vec3 p) const noexcept;
+    Quat short_turn(double h, double angle, Vec3 p) const noexcept;
+
+    Kind kind_ = Kind::sphere;
+    int first_ =
+        0;  // the axis taken as x: a symmetric body's is its z, a triaxial one has its middle moment about y
+    double unit_ = 1.0;                 // of momenta and moments: a power of two
+    Vec3 over_{1, 1, 1};                // 1/moment, in that order and unit
+    double wide_ = 0.0, narrow_ = 0.0;  // over_: x − z, y − z
+};
+
+/// The turn of a constant angular velocity over h.
+Quat turn_of(double h, Vec3 angular_velocity) noexcept;
 
 /// R − 1 of a unit quaternion (w, e): 2 w [e] + 2 [e]², with the relative accuracy of e however small it is.
 inline Mat3 rotation_less_one(Quat q) noexcept {

@@ -28,12 +28,12 @@ struct Unsettled {
 /// Changes from step to step; copying it back goes back.
 struct RigidState {
     LargeArray<BodyState> bodies;
-    int too_fast = -1;       // the first body that turned too fast
     int not_solved = -1;     // a body of a system that could not be factored
     int contradicted = -1;   // a body held by rows that cannot hold together
     std::int64_t step = 0;   // steps of h begun
     std::int64_t moved = 0;  // steps of h after which positions are known
     Unsettled unsettled;
+    int whirling = -1;     // a body that tension has made turn by a radian a step
     bool by_rows = false;  // PGS over joints alone has failed: few are solved directly
     Sleep sleep;
     // Velocities at mid-step:

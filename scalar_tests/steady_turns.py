@@ -1,0 +1,198 @@
+"""Does what spins steadily turn by its rate times the time: on a motor, in the air, and rolling?"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from spook_tracker.engine import (
+    PLAIN,
+    WORLD,
+    Final,
+    Hinge,
+    JointCoordinate,
+    Material,
+    Method,
+    Motor,
+    Orientation,
+    Plane,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+)
+from spook_tracker.scalar_tests.case import (
+    Configuration,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    ScalarTest,
+    Simulate,
+)
+from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.sweep import line, told
+
+RATE = 20.0  # rad/s
+FAST = 600.0  # rad/s: ten radians in a step
+TIME_STEP = 1.0 / 60.0  # s
+DURATION = 3.0  # s
+RADIUS, SPEED = 0.1, 1.0  # m, m/s of the ball that rolls
+MOMENTS = (0.1, 0.15, 0.2)  # kg m²
+STEPS = (60, 120, 240, 480)  # a second
+Z = (0.0, 0.0, 1.0)
+
+
+def driven(rate: float = RATE) -> Scene:
+    """A wheel whose motor holds a rate [rad/s] from the start."""
+    wheel = RigidBody(
+        name="wheel",
+        mass=1.0,
+        inertia=MOMENTS,
+        position=(0.0, 0.0, 0.0),
+        angular_velocity=(0.0, 0.0, rate),
+    )
+    axle = Hinge(name="axle", between=(WORLD, "wheel"), axis=Z, motor=Motor(speed=rate))
+    return Scene(bodies=(wheel,), constraints=(axle,))
+
+
+def free(rate: float = RATE) -> Scene:
+    """A body of three moments that spins about its axis of largest inertia, touched by nothing."""
+    body = RigidBody(
+        name="body", mass=1.0, inertia=MOMENTS, position=(0.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, rate)
+    )
+    return Scene(bodies=(body,))
+
+
+def rolling() -> Scene:
+    """A ball that rolls on a rough floor from the start."""
+    rough = Material(friction=0.5)
+    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
+    ball = RigidBody(
+        name="ball",
+        mass=1.0,
+        shape=Sphere(RADIUS),
+        position=(0.0, 0.0, RADIUS),
+        velocity=(SPEED, 0.0, 0.0),
+        angular_velocity=(0.0, SPEED / RADIUS, 0.0),
+        material=rough,
+    )
+    return Scene(bodies=(floor, ball), gravity=(0.0, 0.0, -9.81))
+
+
+def motor_error(simulate: Simulate, time_step: float = TIME_STEP, method: Method = PLAIN) -> float:
+    """Angle of the axle after DURATION less rate times time [rad]."""
+    observe = {"angle": Final(quantity=JointCoordinate("axle"))}
+    result = simulate(driven(), time_step=time_step, duration=DURATION, method=method, observe=observe)
+    return float(result["angle"]) - RATE * DURATION
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The driven wheel with nothing observed."""
+    return simulate(driven(), time_step=time_step, duration=DURATION, method=method)
+
+
+def turned(orientation: np.ndarray, axis: int) -> np.ndarray:
+    """Angles [rad] about an axis of the world, from orientations a step apart; less than half a turn between."""
+    return np.unwrap(2.0 * np.arctan2(orientation[:, 1 + axis], orientation[:, 0]))
+
+
+def free_error(simulate: Simulate, rate: float) -> float:
+    """Angle in DURATION less rate times time, whole turns aside [rad]."""
+    observe = {"q": Final(quantity=Orientation("body"))}
+    q = simulate(free(rate), time_step=TIME_STEP, duration=DURATION, observe=observe)["q"]
+    half = 0.5 * rate * DURATION
+    return float(
+        2.0
+        * np.arctan2(
+            q[3] * np.cos(half) - q[0] * np.sin(half), abs(q[0] * np.cos(half) + q[3] * np.sin(half))
+        )
+    )
+
+
+def measure(simulate: Simulate) -> dict[str, float]:
+    """All four."""
+    observe = {"q": Trace(quantity=Orientation("ball")), "x": Final(quantity=Position("ball"))}
+    rolled = simulate(rolling(), time_step=TIME_STEP, duration=DURATION, observe=observe)
+    return {
+        "motor_error": motor_error(simulate),
+        "free_error": free_error(simulate, RATE),
+        "fast_error": free_error(simulate, FAST),
+        "rolling_error": float(turned(rolled["q"], 1)[-1]) * RADIUS - float(rolled["x"][0]),
+    }
+
+
+def draw(simulate: Simulate) -> Drawing:
+    """Angle of the ball against the way it rolled."""
+    observe = {"q": Trace(quantity=Orientation("ball")), "x": Trace(quantity=Position("ball"))}
+    result = simulate(rolling(), time_step=TIME_STEP, duration=DURATION, observe=observe)
+    way, angle = result["x"][::6, 0], turned(result["q"], 1)[::6]
+    off = float(np.abs(angle * RADIUS - way).max())
+    return Drawing(
+        curves=(line("ball", way, angle, "points"), line("way over radius", way, way / RADIUS, "reference")),
+        x_label="way [m]",
+        y_label="angle [rad]",
+        note=f"Angle times radius is at most {told(off)} m from the way.",
+    )
+
+
+EXACT = "a steady spin turns by h ω a step: rounding of the angle, and of its sum, remains"
+
+TEST = ScalarTest(
+    title="Steady turns",
+    question="Does what spins steadily turn by its rate times the time?",
+    why="A step that turns by tan or asin of h ω has the right rate and the wrong angle: motors overrun, gears slip a tooth, "
+    "and a ball turns more often than its way allows.",
+    model="A wheel whose motor holds 20 rad/s, a free body of three moments at 20 and at 600 rad/s, and a ball that rolls, each for "
+    "3 s.",
+    parameters=(
+        ("time step", "1/60 s"),
+        ("rates", "20 rad/s; 600 rad/s, ten radians a step"),
+        ("moments", "0.1, 0.15, 0.2 kg m²"),
+        ("ball", "radius 0.1 m, 1 m/s"),
+    ),
+    theory=(
+        "φ = ω t about a principal axis, whatever the step.",
+        "A ball that rolls turns by its way over its radius.",
+    ),
+    reference="Closed form.",
+    conclusion="Green: angles are those of the rates. Red: the turn of a step is not h ω.",
+    source="ours",
+    measurements=(
+        ask(
+            measure,
+            (
+                error("motor_error", "angle of the motor's axle after 3 s less ω t", "rad", 1e-10, EXACT),
+                error("free_error", "angle of the free body after 3 s less ω t", "rad", 1e-10, EXACT),
+                error("fast_error", "the same at ten radians a step, whole turns aside", "rad", 1e-9, EXACT),
+                error(
+                    "rolling_error",
+                    "angle of the ball times its radius after 3 s less its way",
+                    "m",
+                    1e-8,
+                    "what rolls without slipping has v = ω r in every step, to the solver's tolerance",
+                ),
+            ),
+            "a motor, a free body and a ball",
+            TIME_STEP,
+        ),
+    ),
+    example=lambda: Example(scene=rolling(), time_step=TIME_STEP, duration=DURATION),
+    figures=(Figure(name="rolling", title="Angle against way", draw=draw),),
+    ladders=(
+        Ladder(
+            name="motor",
+            description="angle of the motor's axle after 3 s against ω t",
+            unit="rad",
+            time_steps=tuple(1.0 / n for n in STEPS),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=None),  # no step errs
+            ),
+            error=motor_error,
+            run=ladder_run,
+            target_error=1e-3,
+            target_seconds=0.01,
+        ),
+    ),
+)
