@@ -70,6 +70,8 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     for (std::vector<char>* flags :
          {&projection_.grounded, &projection_.externally_driven, &arrays_.moved_far})
         flags->reserve(bodies);
+    for (std::vector<double>* depths : {&projection_.overlap, &projection_.overlap_before})
+        depths->reserve(bodies);
     arrays_.sums.reserve(bodies);
     std::fill(toi_fraction_.begin(), toi_fraction_.end(), 0.0);
     std::fill(event_time_.begin(), event_time_.end(), -1.0);

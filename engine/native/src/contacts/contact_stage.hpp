@@ -147,7 +147,8 @@ public:
         std::vector<char> grounded;  // per island: something that does not move by itself took part
         std::vector<char>
             externally_driven;  // per island: what moves it, or a first overlap, may do work on it
-        double deepest = 0.0;   // overlap that nothing explains, m
+        std::vector<double> overlap, overlap_before;  // per island: deepest where the step ends, and began, m
+        double deepest = 0.0;                         // overlap that nothing explains, m
     };
     const PositionProjection& projection() const noexcept { return projection_; }
     /// Whether displacements come by PGS: cheap, and as exact as the next step will need.

@@ -16,10 +16,7 @@ constexpr double contact_compliance_share =
 constexpr double joint_compliance_share = 1e-6;  // and a joint, of its row's own inertia
 constexpr double joint_share = 1e-3;             // and of what the contacts do
 constexpr double min_joint_compliance =
-    1e-12;  // of its row's own inertia: repeated joints share a load by it
-constexpr std::size_t max_neighbours =
-    32;                      // bodies of a ring: where more part at once, the next step will tell
-constexpr int max_hops = 4;  // of neighbours that the projection sees
+    1e-12;                                // of its row's own inertia: repeated joints share a load by it
 constexpr double over_relaxation = 1.25;  // of PGS that separates balls, not boxes
 constexpr double search_factor = 4.0;     // of the deepest overlap: gaps that the projection may close
 constexpr double min_separation_to_propagate =
@@ -132,9 +129,10 @@ bool ContactStage::moves_far(const PenetrationRecord& record) const noexcept {
     return !projects_by_pgs() || swings(record.contact.first) || swings(record.contact.second);
 }
 
-/// What is to be looked at again: every body, or by PGS the islands of projection() in which a point has parted far.
+/// What is to be looked at again: every body, or by PGS the islands of projection() in which a point has parted far, or a body
+/// that is no ball was displaced: turned about one corner it may come down on others that had no point.
 void ContactStage::mark_far_islands() {
-    if (!moved_far_ || !projects_by_pgs()) return;
+    if (!projects_by_pgs()) return;
     moved_far_ = false;
     const auto island = [this](int b) {
         return solver_index_[b] < 0 ? -1 : projection_.islands.of_body[solver_index_[b]];
@@ -146,88 +144,20 @@ void ContactStage::mark_far_islands() {
         for (const int b : {record.contact.first, record.contact.second})
             if (island(b) >= 0) projected[island(b)] = 1;
     }
+    for (std::size_t b = 0; b < solver_index_.size(); ++b) {
+        const int k = island(static_cast<int>(b));
+        if (k < 0 || ball_[b] != 0 || projected[k] != 0) continue;
+        const Vec6& d = projection_.velocity[solver_index_[b]];
+        const double way =
+            options_.time_step * (norm(linear(d)) + radius(static_cast<int>(b)) * norm(angular(d)));
+        if (way > min_separation_to_propagate_pgs * radius(static_cast<int>(b)))
+            moved_far_ = true, projected[k] = 1;
+    }
     reconsidered_.resize(solver_index_.size());
     for (std::size_t b = 0; b < reconsidered_.size(); ++b) {
         const int k = island(static_cast<int>(b));
         reconsidered_[b] = k >= 0 && projected[k] != 0;
     }
-}
-
-/// Pairs without points within `max_hops` neighbours of a displaced body that its displacement may push into each other: one neighbour
-/// after the other.
-void ContactStage::find_neighbours(const std::vector<Pose>& poses, double margin) {
-    neighbours_.clear();
-    initial_overlaps_.clear();
-    std::vector<char>& reached = arrays_.reached;  // in which round, from one on
-    reached.assign(solver_index_.size(), 0);
-    char round = 1;
-    const auto reach = [&](int b) {
-        if (reached[b] || solver_index_[b] < 0) return;
-        reached[b] = round;
-        grown_.push_back(b);
-        search_[b] = std::max(search_[b], margin + way(b, poses));
-    };
-    grown_.clear();
-    for (const PenetrationRecord& record : penetrations_)
-        if (moves_far(record)) reach(record.contact.first), reach(record.contact.second);
-    moved_far_ = !projects_by_pgs() || !grown_.empty();
-    for (int hop = 0; hop < max_hops && !grown_.empty() && grown_.size() <= max_neighbours; ++hop) {
-        std::sort(grown_.begin(), grown_.end());
-        if (!detection_.near_again(grown_, search_, near_)) near_ = detection_.near(poses_, search_);
-        const auto inside = [&](int b) { return reached[b] != 0 && reached[b] < round; };
-        ++round;
-        grown_.clear();
-        for (const CachedContact& cached : state_.cache) {
-            const int a = cached.contact.first, b = cached.contact.second;
-            if (inside(a)) reach(b);
-            if (inside(b)) reach(a);
-        }
-        for (const IndexPair& pair : near_) {
-            const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
-            if (!inside(a) && !inside(b)) continue;
-            const std::uint64_t key = pair_of(pair);
-            const auto cached = std::lower_bound(
-                state_.cache.begin(), state_.cache.end(), key,
-                [](const CachedContact& t, std::uint64_t k) { return t.contact.key >> feature_bits < k; });
-            if (cached != state_.cache.end() && cached->contact.key >> feature_bits == key) continue;
-            scratch_.clear();
-            detection_.collide_pair(pair, poses[a], poses[b], margin, scratch_);
-            if (scratch_.empty()) continue;
-            neighbours_.push_back(pair);
-            if (std::any_of(scratch_.begin(), scratch_.end(),
-                            [this](const Contact& c) { return is_deep(c); }))
-                initial_overlaps_.push_back(pair);
-            reach(a);
-            reach(b);
-        }
-    }
-    for (std::vector<IndexPair>* pairs : {&neighbours_, &initial_overlaps_}) {
-        std::sort(pairs->begin(), pairs->end());
-        pairs->erase(std::unique(pairs->begin(), pairs->end()), pairs->end());
-    }
-}
-
-/// The same pairs' points. What overlapped without points before anything was parted is left alone as an internal edge; what overlaps
-/// since has been pushed.
-double ContactStage::find_neighbour_overlaps(const std::vector<Pose>& poses, double margin) {
-    double deepest = 0.0;
-    unsigned seen = 0;
-    for (const IndexPair& pair : neighbours_) {
-        const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
-        if (!is_reconsidered(a, b)) continue;
-        if (++seen % pairs_a_look == 0) Watch::look();
-        scratch_.clear();
-        detection_.collide_pair(pair, poses[a], poses[b], margin, scratch_);
-        const bool was_overlapping =
-            std::binary_search(initial_overlaps_.begin(), initial_overlaps_.end(), pair);
-        for (const Contact& contact : scratch_) {
-            if (was_overlapping && is_deep(contact)) continue;
-            const double excess = -contact.point.gap - slack(contact);
-            deepest = std::max(deepest, excess);
-            if (margin > 0.0) add_penetration(contact, poses, excess);
-        }
-    }
-    return deepest;
 }
 
 /// Keeps points that earlier displacements of this step have parted and the manifolds have lost since, as those of two
@@ -376,17 +306,25 @@ void ContactStage::note_projected(const MixedSystem& projection) {
             projection_.grounded[projection_.islands.of_body[body]] = 1;
     }
     projection_.externally_driven.assign(projection_.islands.count, 0);
+    projection_.overlap.assign(projection_.islands.count, 0.0);
+    projection_.overlap_before.assign(projection_.islands.count, 0.0);
     const auto island = [this](const Contact& contact) {
         return projection_.islands
             .of_body[std::max(solver_index_[contact.first], solver_index_[contact.second])];
     };
-    for (const CachedContact& cached : state_.cache)
-        if (is_externally_driven(cached.contact) && island(cached.contact) >= 0)
-            projection_.externally_driven[island(cached.contact)] = 1;
-    for (const PenetrationRecord& record : penetrations_)
-        if (record.depth > 0.0 && state_.initial_penetration.contains(record.contact.key >> feature_bits) &&
-            island(record.contact) >= 0)
-            projection_.externally_driven[island(record.contact)] = 1;
+    for (const CachedContact& cached : state_.cache) {
+        const int k = island(cached.contact);
+        if (k < 0) continue;
+        if (is_externally_driven(cached.contact)) projection_.externally_driven[k] = 1;
+        projection_.overlap_before[k] = std::max(projection_.overlap_before[k], -cached.contact.point.gap);
+    }
+    for (const PenetrationRecord& record : penetrations_) {
+        const int k = island(record.contact);
+        if (!(record.depth > 0.0) || k < 0) continue;
+        if (state_.initial_penetration.contains(record.contact.key >> feature_bits))
+            projection_.externally_driven[k] = 1;
+        projection_.overlap[k] = std::max(projection_.overlap[k], record.depth);
+    }
 }
 
 bool ContactStage::project_positions(const MixedSystem& system, std::size_t joints,

@@ -50,7 +50,7 @@ void RigidSystem::note_start_of_contacts() {
     scratch_.start_of_contacts.resize(constants_.size());
     for (int i : constrained_) {
         const BodyState& s = live_.bodies[i];
-        scratch_.start_of_contacts[i] = {s.displacement, twice_energy(constants_[i], s)};
+        scratch_.start_of_contacts[i] = {s.displacement, s.turn, twice_energy(constants_[i], s)};
     }
 }
 

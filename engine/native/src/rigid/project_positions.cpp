@@ -12,7 +12,9 @@
 //   lifting    Bodies lifted against gravity gain Σ −f d. Contacts have taken energy in the same step, by stopping
 //              bodies, by friction, or by letting them sink: it pays first. The rest is paid by the kinetic energy, all
 //              velocities shortened alike, which no row over resting bodies feels. What both cannot pay is not lifted.
-// Where this cannot be, half the way is tried, and a quarter, an eighth: overlaps may stay, energy may not rise.
+// Where this cannot be, half the way is tried, and a quarter, an eighth: overlaps may stay, energy may not rise. But where
+// what cannot be paid is more than the step began with, iterations that ended early have moved what should rest: then the
+// island goes back to where the step began, which the energy it had then pays for, and the next step iterates on.
 //
 // reads: places and velocities where the step ends, the contact cache, scratch_.start_of_contacts. writes: places, orientations and,
 // where energy or momenta ask for it, velocities of bodies; the penetration that the scene began with, as far as it is left.
@@ -192,6 +194,8 @@ void RigidSystem::project_bodies() {
         scratch_.dissipated[island] =
             dissipated_energy(scratch_.island_members[island], scratch_.island_blocks[island]);
         const double share = affordable_share(island);
+        const double left = (1.0 - share) * projection_->overlap[island];
+        if (left > projection_->overlap_before[island] && take_back(island)) continue;
         for (int halving = 0; halving < most_halvings; ++halving) {
             if (project_island(island, std::ldexp(share, -halving))) break;
             for (const int k : scratch_.island_members[island])
@@ -208,7 +212,28 @@ bool RigidSystem::project_island(int island, double share) {
         displace(constants_[constrained_[k]], share * h_, {d[0], d[1], d[2]}, {d[3], d[4], d[5]},
                  live_.bodies[constrained_[k]]);
     }
-    if (!hold_joints(members, scratch_.island_blocks[island])) return false;
+    return hold_joints(members, scratch_.island_blocks[island]) && keep_energy(island);
+}
+
+/// Back to where the step began; false if that, too, cannot be.
+bool RigidSystem::take_back(int island) {
+    const std::vector<int>& members = scratch_.island_members[island];
+    for (const int k : members) {
+        const int i = constrained_[k];
+        BodyState& s = live_.bodies[i];
+        s.displacement = scratch_.start_of_contacts[i].displacement;
+        s.turn = scratch_.start_of_contacts[i].turn;
+        if (!constants_[i].particle) refresh(constants_[i], s);
+    }
+    if (keep_energy(island)) return true;
+    for (const int k : members) live_.bodies[constrained_[k]] = scratch_.before_projection[constrained_[k]];
+    return false;
+}
+
+/// Momenta and energy of an island whose places have changed; false if they cannot be kept.
+bool RigidSystem::keep_energy(int island) {
+    const ContactStage::PositionProjection& projection = *projection_;
+    const std::vector<int>& members = scratch_.island_members[island];
     double limit = 0.0, now = 0.0;
     for (const int k : members)
         limit += twice_energy(constants_[constrained_[k]], scratch_.before_projection[constrained_[k]]);

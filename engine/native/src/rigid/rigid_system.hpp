@@ -289,6 +289,8 @@ private:
     void project_bodies();
     double affordable_share(int island) const;
     bool project_island(int island, double share);
+    bool take_back(int island);
+    bool keep_energy(int island);
     bool hold_joints(const std::vector<int>& members, const std::vector<int>& own_blocks);
     void keep_spin_energy(int body);
     bool keep_momenta(const std::vector<int>& members, double limit);

@@ -19,6 +19,7 @@ struct StepScratch {
     std::vector<Vec6> velocities, free_velocities, next;  // at the start; with forces; with joints as well
     struct Begun {
         Vec3 displacement;
+        Quat turn;
         double energy = 0.0;  // twice the kinetic one
     };
     std::vector<Begun> start_of_contacts;  // of a step with contacts
@@ -49,7 +50,7 @@ struct StepScratch {
         Vec6 none;
         none.fill(nan);
         for (auto* each : {&velocities, &free_velocities, &next}) each->assign(each->size(), none);
-        for (Begun& each : start_of_contacts) each = {{nan, nan, nan}, nan};
+        for (Begun& each : start_of_contacts) each = {{nan, nan, nan}, {nan, nan, nan, nan}, nan};
         dissipated.assign(dissipated.size(), nan);
         overstep.assign(overstep.size(), nan);
 #endif
