@@ -111,11 +111,12 @@ def test_what_overlaps_where_a_step_ends_parts_however_it_is_turned(
 ) -> None:
     """Pushed out of one edge, a box came down on another, up to 19 mm deep, and was left there: the displacement had not
     halved the overlap. Or it was pushed into a neighbour, and what overlaps there was taken for a seam; or into one that
-    was not looked at, by .08 mm."""
+    was not looked at, by .08 mm. What is displaced by less than 1e-5 of a radius, 4e-6 m, pushes no other: the gate's 1e-7 m
+    is asked, and most end at 1e-9."""
     deepest, unexplained = overlaps(seed, friction, solver)
 
     assert deepest < LEFT_BY_SWEEPS * falling_pile.RADIUS
-    assert unexplained < 1e-9 or solver == "hybrid"
+    assert unexplained < 1e-7 or solver == "hybrid"
 
 
 @pytest.mark.parametrize("friction", falling_pile.FRICTIONS)

@@ -186,14 +186,6 @@ def test_a_loop_stops_where_the_damping_of_rows_that_repeat_others_takes_its_mot
     assert off(1.0, 1e-9, exact) < 1e-3  # the path itself, by fifty steps
 
 
-def test_the_fastest_turn_of_a_step_is_where_its_equation_loses_its_root() -> None:
-    """x √(1 − x²/4) = h |ω| has a root while h |ω| ≤ 1: its left side is largest, 1, at x = √2."""
-    low, high = band("rotating_box", "highest-spin")
-    largest = max(x * math.sqrt(1.0 - 0.25 * x * x) for x in np.linspace(0.0, 2.0, 200_001))
-
-    assert low < largest <= high * (1.0 + 1e-15)
-
-
 def test_the_slowest_upright_top_sleeps_by_its_linear_equations() -> None:
     """A z̈ − i C s ż − m g l z = 0 of the tilt z about the tip: it grows where the roots leave the imaginary axis."""
     low, high = band("spinning_top", "slowest-spin")
