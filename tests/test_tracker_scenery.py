@@ -185,3 +185,16 @@ def test_a_wire_is_drawn_along_its_whole_way() -> None:
     places = [point for _, point in wire.through]
 
     assert [link.ends for link in drawing(scene).links] == list(pairwise(places))
+
+
+def test_a_body_without_a_surface_leaves_room_for_those_beside_it() -> None:
+    """Its box says how it turns, in the proportions of its moments; two half a metre apart stay apart."""
+    wheels = [
+        RigidBody(name=f"{x}", mass=1.0, inertia=(0.4, 0.4, 0.6), position=(x, 0.0, 0.0)) for x in (0.0, 0.5)
+    ]
+    (alone,), (one, other) = drawing(Scene(bodies=wheels[:1])).solids, drawing(Scene(bodies=wheels)).solids
+
+    assert max(alone.size) > 0.5 > 0.4 > max(one.size) == max(other.size)
+    assert [edge / max(one.size) for edge in one.size] == pytest.approx(
+        [edge / max(alone.size) for edge in alone.size]
+    )

@@ -4,7 +4,7 @@
 // Needs scene-poses.js and scene-marks.js.
 "use strict";
 
-const MOST_ARROWS = 400;
+const MOST_ARROWS = 400, MOST_TRAILS = 3;
 const DOUBLE_SIDE = 2, WIDEST_CONE = 3;  // three.js' name for both sides of a surface; mu from which a cone is drawn no wider
 const SLIDES = 0.999;  // share of the friction bound from which a point is shown as sliding
 const TURN = Math.PI / 18, NEARER = 1.15;  // of one press of a key: rad; ratio of distances
@@ -121,7 +121,7 @@ class SceneView {
       const solids = packed(items);
       this.solids.push({ mesh: this.mesh(geometry(), items.length), solids, poses: this.poses, colour: fixed ? "--ink-3" : "--c0" });
       if (this.ghost && !fixed) {
-        const mesh = this.mesh(geometry(), items.length, { transparent: true, opacity: 0.36, depthWrite: false, polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 4 });
+        const mesh = this.mesh(geometry(), items.length, { transparent: true, opacity: 0.55, depthWrite: false, polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 4 });
         this.solids.push({ mesh, solids, poses: this.ghost, colour: "--c1", ghost: true });
       }
     }
@@ -137,6 +137,8 @@ class SceneView {
       this.arrows = { shaft: this.mesh(rod.clone(), MOST_ARROWS), tip: this.mesh(tip, MOST_ARROWS), largest: this.usualForce() };
     } else { this.arrows = null; }
     this.cones = this.movie.cones ? this.buildCones(rod) : null;
+    this.pins();
+    if (this.movie.bodies <= MOST_TRAILS) { this.trails(); }
     for (const centre of this.movie.attractors) {
       const star = new THREE.Mesh(new THREE.SphereGeometry(2 * this.dot, 24, 16), new THREE.MeshLambertMaterial());
       star.position.set(...centre);
@@ -144,6 +146,42 @@ class SceneView {
       this.world.add(star);
     }
     this.violationScale = (this.movie.violation || []).reduce((a, v) => Math.max(a, Math.abs(v) || 0), 0);
+  }
+
+  // Where rods and springs are held by the world.
+  pins() {
+    const places = new Map();
+    for (const link of this.movie.links) {
+      if (link.kind === "joint") { continue; }
+      link.bodies.forEach((body, end) => { if (body === WORLD_BODY) { places.set(String(link.anchors[end]), link.anchors[end]); } });
+    }
+    for (const place of places.values()) {
+      const pin = new THREE.Mesh(new THREE.SphereGeometry(0.7 * this.dot, 16, 12), new THREE.MeshLambertMaterial());
+      pin.position.set(...place);
+      pin.userData.colour = "--ink-3";
+      this.world.add(pin);
+    }
+  }
+
+  // The paths of a few bodies, while their places are drawn on them.
+  trails() {
+    const { position, count, bodies } = this.movie, stride = Math.max(1, Math.floor(count / 600)), places = [];
+    for (let body = 0; body < bodies; body += 1) {
+      let before = null;
+      for (let sample = 0; sample < count; sample += stride) {
+        const i = 3 * (sample * bodies + body), now = [position[i], position[i + 1], position[i + 2]];
+        if (now.every((v) => Math.abs(v) < 1e6)) {
+          if (before) { places.push(...before, ...now); }
+          before = now;
+        } else { before = null; }
+      }
+    }
+    const geometry = new THREE.BufferGeometry();
+    geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(places), 3));
+    const trail = new THREE.LineSegments(geometry, new THREE.LineBasicMaterial({ transparent: true, opacity: 0.55 }));
+    trail.userData.colour = "--ink-3";
+    trail.frustumCulled = false;
+    this.world.add(trail);
   }
 
   // One cone and one arrow for each contact point: the apex at the point, as wide as friction lets a force lean.

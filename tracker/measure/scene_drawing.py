@@ -10,6 +10,8 @@ import math
 from collections.abc import Sequence
 from itertools import pairwise
 
+from msgspec.structs import replace
+
 from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
 from spook_tracker.engine.couplings import Wire
 from spook_tracker.engine.forces import CentralGravity, Spring
@@ -20,13 +22,14 @@ from spook_tracker.tracker.document.quaternions import UPRIGHT, Quaternion, Vect
 from spook_tracker.tracker.document.run_document import DrawnLink, DrawnSolid, SceneDrawing
 
 MOST_SOLIDS = 300
+CLOSE = 0.7  # of the way to the nearest body, a box without a surface is long at most
 
 
 def drawing(scene: Scene) -> SceneDrawing:
     """The scene at its start; a very large one is drawn in part."""
     solids: list[DrawnSolid] = []
     for body in scene.bodies[:MOST_SOLIDS]:
-        solids += solids_of(body)
+        solids += solids_of(body, scene.bodies)
     places = {body.name: body.position for body in scene.bodies}
     turns = {body.name: getattr(body, "orientation", UPRIGHT) for body in scene.bodies}
     links: list[DrawnLink] = []
@@ -51,12 +54,12 @@ def drawing(scene: Scene) -> SceneDrawing:
     )
 
 
-def solids_of(body: Particle | RigidBody) -> list[DrawnSolid]:
-    """What is seen of one body: several solids of a compound, one of any other."""
+def solids_of(body: Particle | RigidBody, beside: Sequence[Particle | RigidBody] = ()) -> list[DrawnSolid]:
+    """What is seen of one body among those beside it: several solids of a compound, one of any other."""
     if isinstance(body, Particle):
         return [DrawnSolid(kind="particle", position=body.position, velocity=body.velocity)]
     if body.shape is None:
-        return [_of_inertia(body)]
+        return [_shrunk(_of_inertia(body), body, beside)]
     return _solids(body.shape, body.position, body.orientation, body)
 
 
@@ -100,6 +103,15 @@ def _of_inertia(body: RigidBody) -> DrawnSolid:
         size=tuple(math.sqrt(max(0.0, 6.0 * edge / body.mass)) for edge in edges),
         velocity=body.velocity,
     )
+
+
+def _shrunk(solid: DrawnSolid, body: RigidBody, beside: Sequence[Particle | RigidBody]) -> DrawnSolid:
+    """No larger than lets the others be seen: this box says how its body turns, not how far it reaches."""
+    if solid.kind != "box":
+        return solid
+    apart = [d for other in beside if (d := math.dist(body.position, other.position)) > 0.0]
+    share = CLOSE * min(apart, default=math.inf) / (max(solid.size) or 1.0)
+    return solid if share >= 1.0 else replace(solid, size=tuple(share * edge for edge in solid.size))
 
 
 def _end(end: object, anchor: Vector, places: dict[str, Vector], turns: dict[str, Quaternion]) -> Vector:

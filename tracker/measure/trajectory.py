@@ -76,7 +76,7 @@ def _recorded(name: str, example: Example, simulate: Simulate) -> Trajectory | N
             break
         seen = {key: values[::2] for key, values in seen.items()}
         every *= 2
-    solids = [solids_of(body) for body in bodies]
+    solids = [solids_of(body, bodies) for body in bodies]
     links = _links(scene)
     return Trajectory(
         test=name,
