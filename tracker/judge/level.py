@@ -11,9 +11,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-from spook_tracker.tracker.document.middle import median
+from spook_tracker.tracker.document.middle import median, median_of_sorted
 from spook_tracker.tracker.judge.normal_nights import exceeded
-from spook_tracker.tracker.judge.segments import NORMAL, Boundary, Standing, spread_of
+from spook_tracker.tracker.judge.segments import NORMAL, Boundary, Standing
 from spook_tracker.tracker.judge.shifts import BASE, CLIP, FEWEST_BASE, remembered, standard_error
 from spook_tracker.tracker.judge.slower import LEAST, worse_by
 
@@ -75,6 +75,7 @@ class PresentLevel:
     until: int = 0  # nights seen
     start: int = 0  # the first night there is, or the last that was accepted
     _told: tuple[int, tuple[float, float, float]] | None = None
+    _outer: float | None = None  # the second largest of what its own nights reached, while it is known
 
     def _costs(self, places: Sequence[int]) -> list[float]:
         """Values of which larger is worse, and a change as many per cent: a rate gives the time of one."""
@@ -88,12 +89,13 @@ class PresentLevel:
             return self._told[1]
         own = [self.values[i] for i in self.now.places[-WINDOW:]]
         level = median(own)
-        off = [value / level - 1.0 for value in own] if level else [0.0]
+        off = [abs(value / level - 1.0) for value in own] if level else [0.0]
         if len(own) < ENOUGH:
-            off += self.remembers[len(own) - WINDOW :]
-        noise = spread_of([1.0 + x for x in off], 1.0)
-        self._told = len(self.now.places), (level, noise, self._threshold(level, noise, len(own), len(off)))
-        return self._told[1]
+            off += map(abs, self.remembers[len(own) - WINDOW :])
+        noise = NORMAL * median(off)
+        told = level, noise, self._threshold(level, noise, len(own), len(off))
+        self._told = len(self.now.places), told
+        return told
 
     def _threshold(self, level: float, noise: float, own: int, count: int) -> float:
         """The relative change that stands clear: of the noise, of what nights reached, of what is tolerated."""
@@ -105,7 +107,11 @@ class PresentLevel:
             clear = max(LEAST, min(clear, CLEAR * noise))
         reached = self._reached()
         if len(reached) >= 2:
-            clear = max(clear, REACH * (1.0 + UNSEEN / len(reached)) * second_largest(reached))
+            outer = self._outer if reached is self.reached else None
+            if outer is None:
+                outer = second_largest(reached)
+            self._outer = outer if reached is self.reached else None
+            clear = max(clear, REACH * (1.0 + UNSEEN / len(reached)) * outer)
         return max(clear, tolerated)
 
     def _reached(self) -> list[float]:
@@ -147,8 +153,11 @@ class PresentLevel:
         """Nights that hold."""
         if len(self.now.places) >= FEWEST:
             level = self._level()[0]
-            more = [self._worse_by(level, self.values[i]) for i in places]
-            self.reached = [*self.reached, *more][-REACHED:]
+            self.reached += [self._worse_by(level, self.values[i]) for i in places]
+            if self._outer is not None:
+                moved = [*self.reached[-len(places) :], *self.reached[:-REACHED]]
+                self._outer = self._outer if max(moved) < self._outer else None
+            del self.reached[:-REACHED]
         self.now.places += places
         self._told = None
 
@@ -157,9 +166,9 @@ class PresentLevel:
         import numpy as np
 
         base = np.array(self._costs(self.now.places[-BASE:]))
-        middle = float(np.median(base))
-        far = CLIP * NORMAL * float(np.median(np.abs(base - middle)))
-        return np.clip(base, middle - far, middle + far) if far > 0.0 else base
+        middle = median_of_sorted(np.sort(base))
+        far = CLIP * NORMAL * median_of_sorted(np.sort(np.abs(base - middle)))
+        return np.minimum(np.maximum(base, middle - far), middle + far) if far > 0.0 else base
 
     def _wanders(self) -> float:
         """How far the means of two spans of nights may lie apart, a trend of these nights taken out."""

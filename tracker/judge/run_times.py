@@ -11,6 +11,7 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import islice
 from typing import TYPE_CHECKING, NamedTuple
 
 from msgspec.structs import replace
@@ -109,6 +110,7 @@ class _Walk(PresentLevel):
     reference: Reference | None = None  # while red or flaky
     over: list[Segment] = field(default_factory=list)
     anchor: list[int] = field(default_factory=list)  # the nights at the last release
+    anchored: float = math.nan  # the middle of these
     crept: float = 0.0  # the largest drift since it is red; zero while it is not
     first: tuple[int, int] | None = None  # of the red: last good and first bad night
     broken: bool = False  # no finite value last night
@@ -160,7 +162,7 @@ class _Walk(PresentLevel):
         """A history that begins here."""
         self.now, self.anchor, self.start = Growing([place]), [place], place
         self.off, self.reference, self.first, self.crept = [], None, None, 0.0
-        self.remembers, self.reached, self._told = [], [], None
+        self.remembers, self.reached, self._told, self._outer = [], [], None, None
 
     def _no_value(self, place: int, accepted: bool) -> Noisy:
         level = self._level()[0]
@@ -203,11 +205,11 @@ class _Walk(PresentLevel):
         level = self._level()[0]
         if level <= 0.0 or len(self.now.places) < FEWEST_BASE + min(SPANS) - len(self.off):
             return None
-        nights = [*self.now.places[-BASE - max(SPANS) :], *self.off]
-        near = [self._worse_by(level, self.values[i]) for i in nights[-min(SPANS) :]]
-        mean = sum(near) / len(near)
+        last = [*self.now.places[-min(SPANS) :], *self.off][-min(SPANS) :]
+        mean = self._worse_by(level, sum([self.values[i] for i in last]) / len(last))
         if mean < LEAST:
             return None  # most nights: nothing to count
+        nights = [*self.now.places[-BASE - max(SPANS) :], *self.off]
         age = self.ages[nights[-1]] - self.ages[self.start]
         found = shift(self._costs(nights), mean < self._level()[1], age)
         if found is None or found.change <= self._tolerated(level):
@@ -219,11 +221,12 @@ class _Walk(PresentLevel):
         if not self.over or self.now.standing == "red" or len(self.now.places) >= BASE:
             return None
         first = max(self.start, self.until - BASE - max(SPANS))
-        nights = [i for i in range(first, self.until) if self._number(i)]
-        level, last = self._level()[0], nights[-min(SPANS) :]
-        if len(nights) < FEWEST_BASE + min(SPANS) or sum(
-            self._worse_by(level, self.values[i]) for i in last
-        ) < 0.5 * LEAST * len(last):
+        backwards = (i for i in range(self.until - 1, first - 1, -1) if self._number(i))
+        level, last = self._level()[0], list(islice(backwards, min(SPANS)))
+        if sum([self._worse_by(level, self.values[i]) for i in last]) < 0.5 * LEAST * len(last):
+            return None
+        nights = [*backwards][::-1] + last[::-1]
+        if len(nights) < FEWEST_BASE + min(SPANS):
             return None
         found = shift(self._costs(nights), True, self.ages[nights[-1]] - self.ages[self.start])
         if found is None or not found.apart or found.change <= self._tolerated(level):
@@ -259,8 +262,9 @@ class _Walk(PresentLevel):
         old, noise, threshold = self._level()
         near = nights[-WINDOW - count :]
         where = boundary(near, self._costs(near), count)
-        after = [i for i in nights if i >= where.best]
-        before = [i for i in nights if i < where.best]
+        first = where.best
+        after = [i for i in nights if i >= first]
+        before = [i for i in nights if i < first]
         usual = [self.values[i] for i in before[-WINDOW:]]
         old = median(usual)
         noise = spread_of(usual, old) if len(usual) >= FEWEST_BASE else noise
@@ -272,6 +276,7 @@ class _Walk(PresentLevel):
         )
         off = [self._worse_by(old, self.values[i]) for i in before[-WINDOW:]]
         self.remembers, self.reached = [*self.remembers, *off][-WINDOW:], []
+        self._outer = None
         self.now = Growing(after, "usual", before[-WINDOW:], where)
         self.off, self._told, self.crept = [], None, 0.0
         change = self._worse_by(held.level, level)
@@ -307,15 +312,18 @@ class _Walk(PresentLevel):
     def _settle(self) -> None:
         """The boundary of a young segment again, with one more night behind it; nights change sides with it."""
         old = self.now.where
-        if old is None or len(self.now.places) > SETTLED or self.now.places[0] != old.best:
+        if old is None or len(old.places) == 1 or len(self.now.places) > SETTLED:
+            return  # or it is sure already
+        if self.now.places[0] != old.best:
             return
         nights = [*self.now.before, *self.now.places]
         where = boundary(nights, self._costs(nights), len(self.now.places))
-        if where.best not in old.places:
+        best = where.best
+        if best not in old.places:
             return
-        before = [i for i in nights if i < where.best]
+        before = [i for i in nights if i < best]
         if self.first is not None and self.first[1] == old.best:
-            self.first = before[-1], where.best
+            self.first = before[-1], best
         self.now.where, self.now.before, self.now.places = where, before, nights[len(before) :]
         self._told = None
 
@@ -448,7 +456,7 @@ class _Walk(PresentLevel):
         self.now.places, self._told = nights[cut:], None
         level = self._level()[0]
         self.reached = [self._worse_by(level, self.values[i]) for i in self.now.places[-REACHED:]]
-        self._told = None
+        self._told = self._outer = None
 
     # Drift.
 
@@ -457,13 +465,14 @@ class _Walk(PresentLevel):
             self.anchor, self.crept = [place], 0.0
         elif len(self.anchor) < CREEP and place not in self.anchor:
             self.anchor = [*self.anchor, place]
+            self.anchored = median(self.values[i] for i in self.anchor)
 
     def _ends(self) -> tuple[float, float] | None:
         """The middle of the nights at the last release, and of the last ones."""
         last = self.now.places[-CREEP:]
         if len(self.anchor) < CREEP or len(last) < CREEP:
             return None
-        return median(self.values[i] for i in self.anchor), median(self.values[i] for i in last)
+        return self.anchored, median([self.values[i] for i in last])
 
     def _crept(self) -> tuple[float, float] | None:
         """Drift against the last release, where both ends have nights enough: red until half of it is gone."""

@@ -11,9 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from functools import lru_cache
+from typing import TYPE_CHECKING, Literal
 
-from spook_tracker.tracker.document.middle import median
+from spook_tracker.tracker.document.middle import median, median_of_sorted
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.judge.normal_nights import Values
 
 Standing = Literal["usual", "red", "accepted", "recovered", "flaky"]
 
@@ -63,28 +67,25 @@ def boundary(places: Sequence[int], costs: Sequence[float], after: int) -> Bound
     count = len(costs)
     values = np.array(costs)
     split = min(max(1, count - after), count - 1)
-    low, high = float(np.median(values[:split])), float(np.median(values[split:]))
+    low, high = median_of_sorted(np.sort(values[:split])), median_of_sorted(np.sort(values[split:]))
     off = np.concatenate([values[:split] - low, values[split:] - high])
-    noise = NORMAL * float(np.median(np.abs(off)))
+    noise = NORMAL * median_of_sorted(np.sort(np.abs(off)))
     noise = max(noise, 1e-6 * max(abs(low), abs(high)))
-    values = np.clip(values, min(low, high) - FAR * noise, max(low, high) + FAR * noise)
+    values = np.minimum(np.maximum(values, min(low, high) - FAR * noise), max(low, high) + FAR * noise)
     before = np.arange(1, count)
-    sums, squares = np.cumsum(values)[:-1], float(values @ values)
-    rest = float(np.sum(values)) - sums
+    sums, squares = np.cumsum(values), float(values @ values)
+    sums, rest = sums[:-1], sums[-1] - sums[:-1]
     left = squares - sums**2 / before - rest**2 / (count - before)
     left = np.maximum(left, count * (0.1 * noise) ** 2)
     best = int(np.argmin(left))
-    memory = _memory(
-        np.concatenate(
-            [values[: best + 1] - values[: best + 1].mean(), values[best + 1 :] - values[best + 1 :].mean()]
-        )
-    )
+    means = sums[best] / (best + 1), rest[best] / (count - best - 1)
+    memory = _memory(values - np.where(np.arange(count) <= best, *means))
     freedom = max(1.0, (count - 2) * (1.0 - memory) / (1.0 + memory))
     log = -0.5 * freedom * np.log(left / left[best]) - 0.5 * np.log(before * (count - before))
-    weight = np.exp(log - np.max(log))
-    weight /= np.sum(weight)
+    weight = np.exp(log - log.max())
+    weight /= weight.sum()
     order = np.argsort(-weight)
-    needed = order[: int(np.searchsorted(np.cumsum(weight[order]), SURE)) + 1]
+    needed = order[: int(np.cumsum(weight[order]).searchsorted(SURE)) + 1]
     first, last = int(needed.min()), int(needed.max())
     return Boundary(
         tuple(places[i + 1] for i in range(first, last + 1)), tuple(map(float, weight[first : last + 1]))
@@ -112,9 +113,18 @@ def inner_split(costs: Sequence[float], remembered: float, fewest: int = 8) -> i
     if count < 2 * fewest:
         return None
     values = np.array(costs)
-    _, which, counts = np.unique(values, return_inverse=True, return_counts=True)
-    ranks = (np.cumsum(counts) - 0.5 * (counts - 1.0))[which]  # equal values share theirs
-    n = np.arange(fewest, count - fewest + 1)
-    sums = np.cumsum(ranks)[n - 1]
-    off = np.abs(sums - 0.5 * n * (count + 1)) / np.sqrt(n * (count - n) * (count + 1) / 12.0)
-    return int(n[np.argmax(off)]) if float(np.max(off)) > 4.5 / math.sqrt(remembered) else None
+    ordered = np.sort(values)  # equal values share their rank
+    ranks = 0.5 * (1.0 + ordered.searchsorted(values) + ordered.searchsorted(values, side="right"))
+    expected, spread = _by_chance(count, fewest)
+    off = np.abs(np.cumsum(ranks)[fewest - 1 : count - fewest] - expected) / spread
+    place = int(np.argmax(off))
+    return place + fewest if float(off[place]) > 4.5 / math.sqrt(remembered) else None
+
+
+@lru_cache(maxsize=128)
+def _by_chance(count: int, fewest: int) -> tuple[Values, Values]:
+    """Mean and standard deviation of the sum of the first so many ranks of `count`, `fewest` or more on each side."""
+    import numpy as np
+
+    n = np.arange(fewest, count - fewest + 1, dtype=float)
+    return 0.5 * n * (count + 1), np.sqrt(n * (count - n) * (count + 1) / 12.0)

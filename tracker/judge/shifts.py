@@ -120,9 +120,15 @@ def clusters(base: Values) -> tuple[float, float] | None:
         return None
     split = fewest + int(np.argmax(np.diff(ordered[fewest - 1 : len(ordered) - fewest + 1])))
     low, high = ordered[:split], ordered[split:]
-    inside = math.sqrt((float(np.var(low)) * len(low) + float(np.var(high)) * len(high)) / len(ordered))
+    inside = math.sqrt((_scatter(low) + _scatter(high)) / len(ordered))
     middles = median_of_sorted(low), median_of_sorted(high)
     return middles if middles[1] - middles[0] > APART * inside else None
+
+
+def _scatter(values: Values) -> float:
+    """The sum of squares about the mean; NumPy's variance takes three times as long for as few."""
+    off = values - values.sum() / len(values)
+    return float(off @ off)
 
 
 def _tried(base: Values, last: Values, rare: float) -> Shift | None:
