@@ -12,7 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from msgspec.structs import replace
 
@@ -28,27 +28,11 @@ from spook_tracker.tracker.judge.level import (
     PresentLevel,
     Reference,
 )
-from spook_tracker.tracker.judge.segments import (
-    Segment,
-    boundary,
-    inner_split,
-    spread_of,
-)
-from spook_tracker.tracker.judge.shifts import (
-    BASE,
-    FEWEST_BASE,
-    RARE,
-    SPANS,
-    Shift,
-    remembered,
-    shift,
-)
+from spook_tracker.tracker.judge.segments import Segment, boundary, inner_split, spread_of
+from spook_tracker.tracker.judge.shifts import BASE, FEWEST_BASE, RARE, SPANS, Shift, remembered, shift
 from spook_tracker.tracker.judge.slower import LEAST, Usual, change_in_words, slower
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import State
-
-if TYPE_CHECKING:
-    pass
 
 MENDED = 0.25  # of its size: a red level that is left of it is none
 SETTLED = 30  # nights of a segment after which its boundary is known
