@@ -98,3 +98,19 @@ def test_only_what_has_results_and_no_schema_is_short() -> None:
     assert not is_short(b'{"engine": "ours"}')
     assert not is_short(b"[1, 2]")
     assert not is_short(b"{" * 100_000)
+
+
+@pytest.mark.parametrize("gone", ["a", "c"])
+def test_a_run_time_that_stops_while_its_siblings_go_on_is_missing_and_red(tmp_path: Path, gone: str) -> None:
+    database = f"sqlite:///{tmp_path}/t.db"
+    for night in range(4):
+        names = [name for name in "abc" if night < 3 or name != gone]
+        results = [{"test": name, "metric": "run_time", "unit": "s", "value": 1.0, "noisy": True} for name in names]  # fmt: skip
+        file = tmp_path / f"{night}.json"
+        file.write_text(json.dumps({"engine": "e", "version": f"1.{night}", "started": f"2020-01-0{night + 1}T00:00:00+00:00", "machine": "m", "results": results}))  # fmt: skip
+        assert call("import", str(file), "--db", database).exit_code == 0
+
+    told = call("judge", "latest", "--db", database)
+    assert told.exit_code == 1, told.output
+    assert f"{gone}/default/run_time" in told.output
+    assert "its siblings were measured and it was not" in told.output

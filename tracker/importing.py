@@ -23,8 +23,7 @@ class Read:
     """What files held that are no run documents of ours."""
 
     files: frozenset[Path]  # those that were read here
-    short: tuple[RunDocument, ...]
-    others: tuple[tuple[RunDocument, Listed], ...]  # with what the tool says of its benchmarks
+    runs: tuple[tuple[RunDocument, Listed], ...]  # with what their tool says of its benchmarks
     unknown: tuple[str, ...]  # columns of numbers in no known unit
 
 
@@ -34,8 +33,7 @@ def read(
     """Runs in short form and of other tools, as whole documents; other files are left. DocumentError."""
     told = meanings(columns)
     seen: set[Path] = set()
-    short: list[RunDocument] = []
-    others: list[tuple[RunDocument, Listed]] = []
+    runs: list[tuple[RunDocument, Listed]] = []
     tables: dict[Path, bytes] = {}
     for file in files:
         if not file.is_file() or file.stat().st_size > MAX_BYTES:
@@ -46,18 +44,16 @@ def read(
         around = beside(file, engine, machine, branch)
         if is_table(file, content):
             tables[file] = content
-        elif (runs := of_other_tools(content, str(file), around)) is not None:
+        elif (told_runs := of_other_tools(content, str(file), around)) is not None:
             listed = Listed(around.benchmarks, grids=b'"result_columns"' in content)
-            others += [(run, listed) for run in runs]
+            runs += [(run, listed) for run in told_runs]
         elif is_short(content):  # only then: asv's files have results, too
-            short.append(whole(content, str(file)))
+            runs.append((whole(content, str(file)), Listed()))
         else:
             continue
         seen.add(file)
     found = of_tables(tables, told, beside(next(iter(tables), Path()), engine, machine, branch))
-    return Read(
-        frozenset(seen), tuple(short), (*others, *((run, Listed()) for run in found.runs)), found.unknown
-    )
+    return Read(frozenset(seen), (*runs, *((run, Listed()) for run in found.runs)), found.unknown)
 
 
 def record(session: Any, found: Read) -> tuple[int, int]:
@@ -73,5 +69,5 @@ def record(session: Any, found: Read) -> tuple[int, int]:
         last = max(earlier, key=lambda other: other.started, default=None)
         return stored.document(last.id) if last else None
 
-    new = record_all(session, (*found.short, *with_missing(found.others, before)))
+    new = record_all(session, with_missing(found.runs, before))
     return sum(new), len(new) - sum(new)
