@@ -1,11 +1,15 @@
 """No two sentences of a website contradict each other: sign against conclusion, worst against table, lead against lead."""
 
+import json
+import random
 import re
 from html import unescape
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.website.publish import publish
 from tests.synthetic_history import history
 
@@ -91,3 +95,27 @@ def test_the_report_says_first_what_the_first_page_says_broke(site):
     signs = [plain(title).rsplit(" ", 1)[-1] for title in first]
     red = [sign in ("FAIL", "WATCH") for sign in signs]
     assert red == sorted(red, reverse=True)
+
+
+def test_what_is_told_first_tonight_is_new_for_the_judge_and_on_the_page(tmp_path: Path) -> None:
+    """A run time is told by a second slow night: it began last night, and is news of tonight in every output."""
+    draw, entries = random.Random(4), []
+    for night in range(32):
+        seconds = (1e-3 if night < 30 else 1.2e-3) * (1.0 + 0.003 * draw.gauss(0.0, 1.0))
+        commit = {"id": f"{night:04}" + "c" * 36, "timestamp": "2025-01-01T00:00:00Z"}
+        benches = [{"name": "step", "value": seconds, "unit": "s"}]
+        entries.append(
+            {"commit": commit, "date": 1735689600000 + night * 86400000, "tool": "go", "benches": benches}
+        )
+    said = {"lastUpdate": 0, "repoUrl": "https://example.org/r", "entries": {"gravel": entries}}
+    (tmp_path / "data.js").write_text("window.BENCHMARK_DATA = " + json.dumps(said))
+    kept = ("--db", f"sqlite:///{tmp_path}/x.db")
+    for words in (["import", str(tmp_path / "data.js")], ["publish", "--out", str(tmp_path / "public")]):
+        assert CliRunner().invoke(main, [*words, *kept]).exit_code == 0
+
+    judged = CliRunner().invoke(main, ["judge", "latest", *kept]).output
+    page = (tmp_path / "public" / "index.html").read_text(encoding="utf-8")
+
+    assert judged.startswith("✗ 1 worse than the history, 1 new tonight")
+    assert "One commit made one series worse tonight." in page
+    assert "Nothing became worse tonight" not in page

@@ -41,6 +41,7 @@ class Hit:
     bad: Any  # the first bad run; None where only a comparison knows
     standing: Standing
     end: Any = None  # the run where it came back or was accepted; None while it lasts
+    told: Any = None  # the run whose verdict said it first: of a run time perhaps some nights later
 
     @property
     def margin(self) -> float:
@@ -170,9 +171,9 @@ def _hits_in(told: Told, nights: Sequence[Judged], over: Judged | None) -> list[
     for judged in nights:
         if judged.red:
             if judged.news or open_from == len(found):
-                found.append(_hit(told.key, told.definition, judged))
+                found.append(replace(_hit(told.key, told.definition, judged), told=judged.night.run))
             elif judged.worse_at is not last:  # one more night tells better where it began
-                found[-1] = _hit(told.key, told.definition, judged)
+                found[-1] = replace(_hit(told.key, told.definition, judged), told=found[-1].told)
             last = judged.worse_at
         elif judged.state == "suspected":
             continue

@@ -50,7 +50,7 @@ class ToldCause:
     state: Class  # FAIL or WATCH while red, else what became of it
     said: str
     standing: str
-    new: bool  # began tonight
+    fresh: Sequence[Hit]  # what of it is told for the first time tonight
     night: Night
     good: Night | None
     subject: str
@@ -63,6 +63,11 @@ class ToldCause:
     compare: str
     ended: list[Night]  # runs where it came back or was accepted, first and last
     hits: Sequence[Hit]
+
+    @property
+    def new(self) -> bool:
+        """Whether anything of it is told for the first time tonight, as `tracker judge` counts it."""
+        return bool(self.fresh)
 
 
 def causes_of(book: Book) -> list[Cause]:
@@ -86,6 +91,7 @@ def _map_hits(test: TestHistory) -> list[Hit]:
             good=told.good,
             bad=told.bad,
             standing="detected",
+            told=told.bad,
         )
         for told in test.told_maps
         if told.verdict.red
@@ -123,13 +129,13 @@ def told(cause: Cause, book: Book) -> ToldCause:
         state=state,
         said=SAID[cause.standing],
         standing=cause.standing,
-        new=night.index == book.tonight.index,
+        fresh=[hit for hit in red if hit.told is not None and hit.told.id == book.tonight.id],
         night=night,
         good=good,
         subject=clean(night.engine.subject) or f"Version {version(night.engine)}",
         author=clean(night.engine.author),
         blame=blame(night, good),
-        damage=_damage(shown),
+        damage=damage_of(shown),
         tests=tests,
         worst=hit_row(shown[0], book),
         replay=_replay(by_test, known, good, book),
@@ -144,7 +150,7 @@ def anchor(cause: Cause) -> str:
     return f"c-{hashlib.sha256(cause.bad.id.encode('utf-8', 'replace')).hexdigest()[:10]}"
 
 
-def _damage(hits: Sequence[Hit]) -> list[tuple[str, int]]:
+def damage_of(hits: Sequence[Hit]) -> list[tuple[str, int]]:
     gone = sum(hit.definition is None and hit.stands == "fail" for hit in hits)
     maps = sum(hit.definition is None for hit in hits) - gone
     lost = sum(hit.stands == "fail" and not math.isfinite(hit.value) for hit in hits) - gone
@@ -207,7 +213,7 @@ def line(cause: Cause) -> str:
     """A cause in one line of plain text, for the feed: the commit, what it hit, how badly."""
     count, tests = len(cause.hits), len(cause.tests)
     series = "1 series" if count == 1 else f"{count} series"
-    damage = ", ".join(f"{number} {words}" for words, number in _damage(cause.hits))
+    damage = ", ".join(f"{number} {words}" for words, number in damage_of(cause.hits))
     engine = cause.bad.engine
     commit = short_hash(engine) or version(engine)
     subject = f" “{clean(engine.subject)}”" if engine.subject else ""

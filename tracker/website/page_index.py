@@ -15,7 +15,7 @@ from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.standing import Count, count_points, expected, worst
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, Class
-from spook_tracker.tracker.website.causes import ToldCause, lasting, told
+from spook_tracker.tracker.website.causes import ToldCause, damage_of, lasting, told
 from spook_tracker.tracker.website.nights import Book, TestHistory, Trend
 from spook_tracker.tracker.website.page_rows import Page, Row, address, row
 
@@ -193,8 +193,8 @@ def _worsened(new: Sequence[ToldCause]) -> str:
     made = "One commit" if len(new) == 1 else f"{len(new)} commits"
     counts = Counter[str]()
     for cause in new:
-        counts.update(dict(cause.damage))
-        counts["series"] += len(cause.hits)
+        counts.update(dict(damage_of(cause.fresh)))
+        counts["series"] += len(cause.fresh)
     for words, did in (("limit broken", "broke {} limit"), ("value lost", "lost {} value")):
         if number := counts[words.replace(" ", "s ")] + counts[words]:
             return (
