@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
+import random
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
 from typing import Any
@@ -16,10 +17,11 @@ from msgspec.structs import replace
 
 from spook_tracker.tracker.cli.report_compare import compare_markdown, finding_lines
 from spook_tracker.tracker.cli.report_junit import junit_of_comparison, junit_of_night
-from spook_tracker.tracker.cli.report_trend import trend_lines
+from spook_tracker.tracker.cli.report_trend import summary, trend_lines
 from spook_tracker.tracker.document.run_document import RunDocument, Timing
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.tonight import tonight
+from spook_tracker.tracker.library import trend
 from spook_tracker.tracker.website.publish import publish
 from tests.synthetic_history import MACHINE, DocumentHistory, document, sample, series
 
@@ -191,15 +193,43 @@ class Recorded(DocumentHistory):
 def test_every_output_says_the_same_of_a_series(
     given_history: tuple[list[RunDocument], list[Accepted]],
 ) -> None:
+    say_the_same(*given_history)
+
+
+def timed_history(seed: int, nights: int) -> tuple[list[RunDocument], list[Accepted]]:
+    """Run times on three machines, each with a level and noise of its own; steps come to all of them or to one."""
+    draws = random.Random(seed)
+    level = {"m": 1.0, "n": 1.7, "o": 0.4}
+    runs: list[RunDocument] = []
+    for number in range(nights):
+        if draws.random() < 0.15:
+            step = draws.choice([0.7, 1.05, 1.3, 1.6])
+            struck = draws.choice([list(level), [draws.choice("mno")]])
+            level |= {machine: level[machine] * step for machine in struck}
+        machine = draws.choice("mmmmnno")
+        value = 1e-3 * level[machine] * draws.gauss(1.0, 0.005) * draws.choice([1.0] * 19 + [1.5])
+        pairs = seconds(value) + (rungs(value) if draws.random() < 0.8 else [])
+        version = draws.choice(["", "", "", "1.0.0"])
+        runs.append(night(number, pairs, version, machine=replace(MACHINE, fingerprint=machine)))
+    accepted = [Accepted(series="t/*", low=1.2e-3, high=5.0, who="Ada", why="known")]
+    return runs, accepted if draws.random() < 0.3 else []
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
+@given(st.integers(0, 10**6), st.integers(8, 24))
+def test_every_output_says_the_same_of_run_times_on_several_machines(seed: int, nights: int) -> None:
+    say_the_same(*timed_history(seed, nights))
+
+
+def say_the_same(runs: list[RunDocument], accepted: list[Accepted]) -> None:
+    """Night, JUnit, page, feed, badge, trend, comparison."""
     from spook_tracker.tracker.judge.standing import worst
-    from spook_tracker.tracker.library import trend
     from spook_tracker.tracker.website.causes import causes_of
     from spook_tracker.tracker.website.events import all_events
     from spook_tracker.tracker.website.feed import atom
     from spook_tracker.tracker.website.nights import book
     from spook_tracker.tracker.website.page_index import health
 
-    runs, accepted = given_history
     note(
         "\n".join(
             f"{r.id} {r.engine.version} {[(s.series, s.value, s.outcome) for s in r.samples]}" for r in runs
@@ -233,7 +263,13 @@ def test_every_output_says_the_same_of_a_series(
     _counts_alike(runs, told, stands, name)
 
     causes = causes_of(told)
-    lasting = [(hit.series, cause) for cause in causes for hit in cause.hits if hit.end is None]
+    here = runs[-1].machine.fingerprint  # what is red on another machine lasts there
+    lasting = [
+        (hit.series, cause)
+        for cause in causes
+        for hit in cause.hits
+        if hit.end is None and (not on_a_clock(hit) or hit.bad.machine.fingerprint == here)
+    ]
     assert {key for key, _ in lasting if key in word} == set(name)
     entries = [e for e in ElementTree.fromstring(atom(told, causes)) if e.tag.endswith("entry")]
     texts = [" ".join(e.text or "" for e in entry.iter()) for entry in entries]
@@ -243,13 +279,25 @@ def test_every_output_says_the_same_of_a_series(
         assert any(worst in text and event.definition.test in text for text in texts)
 
     for test in {key.partition("/")[0] for key in word}:
-        for series_told in trend(records, test, None, accepted):
+        trends_told = trend(records, test, None, accepted)
+        assert summary(trends_told).startswith("\x1b[32m✓") == (
+            not any(found.nights[-1].red for found in trends_told)
+        )
+        for series_told in trends_told:
+            machines = {j.night.run.machine.fingerprint for j in series_told.nights}
+            noisy = series_told.definition.kind == "time"
+            drawn = sum("(values: " in line or ", values: " in line for line in trend_lines(series_told))
+            assert drawn == (len(machines) if noisy else 1)
             if series_told.key in word and series_told.nights[-1].night.run.id == runs[-1].id:
                 assert series_told.nights[-1].verdict.word == word[series_told.key]
-                assert ("✗ red" in trend_lines(series_told, 1)[-1]) == (series_told.key in name)
+                assert ("✗ red" in "".join(trend_lines(series_told, 1))) == (series_told.key in name)
 
     if len(runs) > 1:
         _compares_alike(records, runs, accepted, told, {f.series: f for f in findings})
+
+
+def on_a_clock(hit: Any) -> bool:
+    return hit.definition is not None and hit.definition.kind == "time"
 
 
 def without_lost(found: Any) -> Any:
@@ -399,3 +447,26 @@ def _compares_alike(
             assert change.word == judged.verdict.word, change.series
         elif change.kind in ("time", "run_time"):
             assert change.red == finding.red, change.series
+
+
+def test_trend_tells_machines_and_changed_trees_apart_and_what_is_red_elsewhere() -> None:
+    runs = []
+    for number in range(20):
+        machine = "mn"[number % 2]
+        slow = 1.4 if machine == "m" and number >= 14 else 1.0
+        empty = night(
+            number, seconds(1e-3 * noise(number) * slow), machine=replace(MACHINE, fingerprint=machine)
+        )
+        runs.append(replace(empty, engine=replace(empty.engine, dirty=number == 19)))
+
+    (told,) = trend(Recorded(runs), "t", "time")  # type: ignore[arg-type]
+    first, *beside = unstyle(summary([told])).splitlines()
+    rows = [unstyle(line) for line in trend_lines(told)]
+
+    assert first == "✓ 1 series, none of them red tonight"
+    (elsewhere,) = beside
+    assert elsewhere.startswith("! red when another machine was last asked: t/plain/time, slower, ")
+    assert elsewhere.endswith(" (m)")
+    assert sum("values: 10" in row for row in rows) == 2
+    assert [" changed " in row for row in rows if row.startswith("20")] == [False] * 9 + [True]
+    assert any("✗ red" in row and " m " in row for row in rows)

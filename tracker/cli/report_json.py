@@ -46,6 +46,8 @@ def _night(judged: Judged) -> dict[str, Any]:
         "started": run.started,
         "version": run.engine.version,
         "commit": run.engine.git_hash,
+        "dirty": run.engine.dirty,
+        "machine": run.machine.fingerprint,
         "value": judged.night.sample.value,
         "outcome": judged.night.sample.outcome,
         "word": judged.verdict.word,

@@ -8,7 +8,7 @@ import click
 
 from spook_tracker.tracker.cli.console import NARROW, Column, clean, sparkline, table, width
 from spook_tracker.tracker.cli.report_table import ROLES, limit, number
-from spook_tracker.tracker.document.run_document import SeriesDefinition
+from spook_tracker.tracker.document.run_document import Run, SeriesDefinition
 from spook_tracker.tracker.document.wording import day
 from spook_tracker.tracker.judge.events import name_of
 from spook_tracker.tracker.judge.maps import ToldMap
@@ -40,11 +40,43 @@ def summary(trends: Sequence[Told], maps: Sequence[ToldMap] = ()) -> str:
         (CLASS_RANK[told.stands], True, told.key, told.verdict.name) for told in maps if told.verdict.red
     ]
     every = len(trends) + len(maps)
+    elsewhere = [line for told in trends for line in _red_elsewhere(told)]
+    beside = "".join(f"\n! red when another machine was last asked: {line}" for line in elsewhere)
     if not named:
-        return click.style(f"✓ {every} series, none of them red tonight", fg="green")
+        return click.style(f"✓ {every} series, none of them red tonight", fg="green") + beside
     _, _, key, name = min(named, key=lambda one: one[:2])
     words = f"✗ {len(named)} of {every} series red; the worst: {clean(key)}, {name}"
-    return click.style(words, fg="red", bold=True)
+    return click.style(words, fg="red", bold=True) + beside
+
+
+def _red_elsewhere(told: Told) -> Iterator[str]:
+    """Machines other than tonight's whose newest night of this series is red: no run of tonight asked them."""
+    for places in _clocks(told)[:-1]:
+        last = told.nights[places[-1]]
+        if last.red:
+            yield clean(
+                f"{told.key}, {name_of(last)}, {day(last.night.run.started)} on {machine_of(last.night.run)}"
+            )
+
+
+def _clocks(told: Told) -> list[list[int]]:
+    """The nights of each machine, by their places, tonight's last; of values without noise all nights together."""
+    if not is_noisy(told.definition):
+        return [list(range(len(told.nights)))]
+    clocks: dict[str, list[int]] = {}
+    for place, judged in enumerate(told.nights):
+        clocks.setdefault(judged.night.run.machine.fingerprint, []).append(place)
+    return sorted(clocks.values(), key=lambda places: places[-1])
+
+
+def machine_of(run: Run) -> str:
+    """A machine as a reader knows it, and its mark."""
+    return f"{run.machine.processor} ({mark_of(run)})"
+
+
+def mark_of(run: Run) -> str:
+    """What tells a machine from others in a table: the start of its fingerprint."""
+    return run.machine.fingerprint[:8]
 
 
 def gates_first(trends: Sequence[Told]) -> list[Told]:
@@ -66,18 +98,22 @@ def map_lines(maps: Sequence[ToldMap]) -> list[str]:
 def trend_lines(told: Told, last: int = 10) -> list[str]:
     """The series as lines, oldest value at the left, newest at the bottom."""
     definition, judged = told.definition, told.nights
-    values = [j.night.value for j in judged]
     unit = "" if definition.unit in ("", "1") else f" {definition.unit}"
-    lines = [
-        click.style(clean(told.key), bold=True),
-        f"{sparkline(values, width() - 2)}  (values: {len(values)}, limit: {clean(limit(definition))})",
-    ]
+    clocks = _clocks(told)
+    several = len(clocks) > 1
+    lines = [click.style(clean(told.key), bold=True)]
+    for places in clocks:
+        values = [judged[i].night.value for i in places]
+        where = f"{machine_of(judged[places[-1]].night.run)}, " if several else ""
+        count = f"values: {len(values)}, limit: {limit(definition)}"
+        lines.append(f"{sparkline(values, width() - 2)}  ({clean(where + count)})")
     lines += [f"  {clean(line)}" for line in changes(definition, judged)]
     rows = [
         (
             day(j.night.run.started),
             j.night.run.engine.version,
-            commit_of(j.night.run),
+            commit_of(j.night.run) + (" changed" if j.night.run.engine.dirty else ""),
+            *([mark_of(j.night.run)] if several else []),
             number(j.night.value, 12) + unit,
             STATES[j.state] or spaced(j.verdict.word),
             j.verdict.sentence,
@@ -88,6 +124,7 @@ def trend_lines(told: Told, last: int = 10) -> list[str]:
         Column("night"),
         Column("version", flexible=True),
         Column("commit"),
+        *([Column("machine")] if several else []),
         Column("value", "right"),
         Column("verdict"),
         Column("how", flexible=True),
@@ -108,9 +145,11 @@ def changes(definition: SeriesDefinition, judged: Sequence[Judged]) -> list[str]
             f"{j.verdict.sentence}"
             for j in told
         ]
+    lanes = lanes_of([j.night for j in judged], on_one_clock)
+    machines = {judged[places[0]].night.run.machine.fingerprint for places in lanes}
     return [
-        line
-        for places in lanes_of([j.night for j in judged], on_one_clock)
+        line + (f" on {mark_of(judged[places[0]].night.run)}" if len(machines) > 1 else "")
+        for places in lanes
         for line in _boundaries(judged, places)
     ]
 

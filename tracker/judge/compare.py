@@ -129,15 +129,15 @@ def compare_in(
     alone = {key for key, (d, _) in later.samples.items() if d.kind == "time" and not is_read_off(d)}
     told: dict[str, Told] = {}
     if rungs and len(line) > 1:
-        told |= judge_all(run_time_histories(records, line, rungs))
+        told |= judge_all(run_time_histories(records, line, rungs), accepted)
     if alone and len(line) > 1:
-        told |= judge_all(histories(records, line, alone))
+        told |= judge_all(histories(records, line, alone), accepted)
     later = replace(later, whole=asked_whole(new), asked=asked_for(new, later.samples))
     document = compare(earlier, later, accepted, known(told, old.id, new.id))
     reds = {change.series for change in document.changes if change.red} - told.keys()
     times = dict(told)
     if reds:
-        told |= judge_all(histories(records, line, reds))
+        told |= judge_all(histories(records, line, reds), accepted)
         document = compare(earlier, later, accepted, known(told, old.id, new.id))
     standing = {key: judged for key, judged in judged_in(times, (new.id,))[new.id].items() if judged.red}
     return _beside_history(document, standing, against_history)
