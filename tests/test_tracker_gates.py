@@ -124,6 +124,52 @@ def test_a_tale_without_end_is_not_listened_to_for_ever(monkeypatch: pytest.Monk
     assert "stopped answering before it was done" in done.stderr
 
 
+HANGS = {
+    "waits": "import time; time.sleep(3600)",
+    "works": "while True: pass",
+    "starts what holds its streams and waits": "import os, time\nos.fork()\ntime.sleep(3600)",
+    "cannot be asked to end": "import signal, time\nsignal.pthread_sigmask(signal.SIG_BLOCK, range(1, 64))\n"
+    "time.sleep(3600)",
+}
+
+
+@pytest.mark.parametrize(
+    ("act", "where"),
+    [*((act, "an engine") for act in HANGS), ("waits", "a catalogue"), ("waits", "build_info")],
+)
+def test_what_hangs_while_it_is_imported_is_ended_at_the_time_limit(
+    act: str, where: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("spook_tracker.tracker.measure.workers.START_LIMIT", 1.0)
+
+    done = gate(("run", "--time-limit", "2"), **WHERE[where](HANGS[act]))
+
+    assert (done.exit_code, runs()) == (2, 0), done.output
+    assert "their_engine and the catalogue their_catalogue were not imported within 3 s" in done.stderr
+
+
+HURTS = {
+    "prints without being asked": ("print('x' * 1000000)", 0, ""),
+    "leaves what it forked": ("import os, time\nif os.fork() == 0: time.sleep(3600)", 0, ""),
+    "takes all memory": (
+        "import resource\nresource.setrlimit(resource.RLIMIT_AS, (1 << 31, 1 << 31))\nbytearray(1 << 40)", 2, "MemoryError",
+    ),
+    "lacks an instruction of this processor": (
+        "import os, signal; os.kill(os.getpid(), signal.SIGILL)", 2, "was ended by signal 4 (SIGILL)",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("what", HURTS)
+def test_what_an_engine_does_while_it_is_imported_is_an_outcome(what: str) -> None:
+    act, code, said = HURTS[what]
+
+    done = gate(("run",), engine=act + "\n" + TOY, catalogue=QUESTIONS)
+
+    assert (done.exit_code, runs()) == (code, 1 - code // 2), done.output
+    assert said in done.stderr
+
+
 JUDGES = {
     "the judge": "import spook_tracker.tracker.judge.standing as s\ns.is_red = lambda *a: False\n"
     "import spook_tracker.tracker.cli.report_table as r\nr.is_red = lambda *a: False\nr.red = lambda *a: []\n"

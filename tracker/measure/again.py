@@ -14,7 +14,7 @@ from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.tracker.document.run_document import Again, RunDocument, Sample, SeriesDefinition
 from spook_tracker.tracker.measure.ladder import ErrorPoint, ErrorPoints
 from spook_tracker.tracker.measure.questions import Questions
-from spook_tracker.tracker.measure.run import Errors, Request, Watch, select, timings
+from spook_tracker.tracker.measure.run import Errors, Progress, Request, Watch, select, timings
 
 
 def timed_again(
@@ -22,6 +22,8 @@ def timed_again(
 ) -> RunDocument:
     """The document with the ladders of these tests timed once more; only rungs that were timed before."""
     tests = select(source.tests(), sorted(set(names)))
+    source.simulate()
+    watch(Progress(0, len(tests), "", False))
     series, _ = timings(source, request, tests, _errors(tests, document), watch)
     more = {definition.key: sample.timing for definition, sample in series if sample.timing is not None}
     samples = []

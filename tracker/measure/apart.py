@@ -23,6 +23,7 @@ from typing import Any
 import msgspec
 
 import spook_tracker.tracker.measure.left_behind as left_behind
+import spook_tracker.tracker.measure.workers as crew
 from spook_tracker.scalar_tests.case import Metric
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.json_form import decode, encode
@@ -117,14 +118,22 @@ def _asked(
 ) -> RunDocument:
     """Have another process do it."""
     interrupted = False
-    with _started((what, source, request, more)) as process:
+    patience = crew.START_LIMIT + request.time_limit  # s: as a worker has to its first answer
+    with _started((what, source, request, more)) as process, _Ending(process, patience) as importing:
         assert process.stdout is not None
         lines = _Lines(process.stdout.fileno())
         news: News | None = None
         while not isinstance(news, Done | Refused):
             try:
                 news = _next(lines)
-                if news is None:
+                importing.cancel()  # the first news is that all is imported
+                if news is None and importing.over:
+                    news = Refused(
+                        f"nothing was measured: the engine {source.engine} and the catalogue {source.catalogue} were "
+                        f"not imported within {patience:g} s, so the process that imports them was ended; "
+                        "more time for it is --time-limit"
+                    )
+                elif news is None:
                     how = left_behind.how_ended(process, PATIENCE)
                     news = Refused(
                         f"nothing was measured: the process that imports the engine {source.engine} and the "
@@ -137,7 +146,7 @@ def _asked(
                     raise
                 interrupted = True
                 process.send_signal(signal.SIGINT)
-                _end_in(PATIENCE, process)
+                _Ending(process, PATIENCE).start()
     if isinstance(news, Refused):
         if news.interrupted or interrupted:
             raise KeyboardInterrupt
@@ -178,10 +187,25 @@ class _Lines:
         return line
 
 
-def _end_in(seconds: float, process: subprocess.Popen[bytes]) -> None:
-    timer = threading.Timer(seconds, lambda: left_behind.end(process))
-    timer.daemon = True
-    timer.start()
+class _Ending(threading.Timer):
+    """Ends a process and its session after so many seconds, unless it is cancelled; whoever waits takes it away."""
+
+    def __init__(self, process: subprocess.Popen[bytes], seconds: float) -> None:
+        super().__init__(min(seconds, threading.TIMEOUT_MAX), self._end)
+        self.process, self.over, self.daemon = process, False, True
+
+    def _end(self) -> None:
+        self.over = True
+        self.process.kill()
+        if os.name == "posix":
+            left_behind.end_session(self.process.pid)
+
+    def __enter__(self) -> _Ending:
+        self.start()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.cancel()
 
 
 @contextmanager

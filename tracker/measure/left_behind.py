@@ -75,7 +75,7 @@ def how_ended(process: subprocess.Popen[Any], seconds: float) -> str:
             return (
                 f"ended with exit code {code}"
                 if ended.si_code == os.CLD_EXITED
-                else f"was ended by signal {code}"
+                else f"was ended by signal {code} ({signal.Signals(code).name})"
             )
         time.sleep(0.005)
     return "stopped answering"

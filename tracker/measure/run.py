@@ -142,6 +142,9 @@ def run(source: Questions, request: Request, watch: Watch = lambda progress: Non
     source.simulate()  # an engine without it is refused before anything is measured
     version = engine_version(source.module())
     tasks = list(_tasks(tests, request))
+    watch(
+        Progress(0, _total(tasks, tests, request), "", False)
+    )  # all is imported: whoever waited for that knows
     parts: dict[int, tuple[Any, ...]] = {}
     workers: Counter[Machine] = Counter()
     timed: Timed = ([], {})
