@@ -132,3 +132,19 @@ def test_a_level_only_half_mended_stays_red() -> None:
 
     assert {night.state for night in told[41:]} == {"detected"}
     assert told[-1].levels == pytest.approx((1.0, 1.1), rel=0.005)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("exponent", [1020, -1060])
+@pytest.mark.parametrize("larger", [False, True])
+def test_values_at_the_ends_of_the_doubles_are_judged_as_any_others(exponent: int, larger: bool) -> None:
+    step = 0.8 if larger else 1.25
+    values = [*noise(1, 0.005, 40), *step * noise(2, 0.005, 20), 1.0, *step * noise(3, 0.005, 9)]
+    coarse = [float(np.round(256 * value) / 256) for value in values]  # so that few bits hold them
+    far = [float(np.ldexp(value, exponent)) for value in coarse]
+    near, told = told_of(coarse, larger_is_better=larger), told_of(far, larger_is_better=larger)
+
+    assert [night.state for night in told] == [night.state for night in near]
+    assert [night.verdict.sentence for night in told] == [night.verdict.sentence for night in near]
+    assert told[-1].levels == tuple(float(np.ldexp(level, exponent)) for level in near[-1].levels)  # type: ignore[union-attr]
+    assert told[-1].state == "detected"

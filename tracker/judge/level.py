@@ -31,6 +31,7 @@ REACH = 1.25  # times the second largest deviation of nights that hold
 UNSEEN = 25  # nights: of fewer, as much again may be reached by those to come
 REACHED = 200  # nights of which that is remembered
 SECOND = 2.5  # standard deviations that the second largest of two hundred nights reaches
+ROOM = 400  # powers of two about one: squares of so large values, summed, are doubles
 CREEP = 5  # nights in each median that is compared for drift
 RANGES = 2.0  # times what nights of a segment range over: none that remember each other go so far
 
@@ -202,3 +203,19 @@ def second_largest(values: Sequence[float]) -> float:
     """Of two values at least."""
     place = values.index(max(values))
     return max(max(values[:place], default=-math.inf), max(values[place + 1 :], default=-math.inf))
+
+
+def exponent_of(values: Sequence[float]) -> int:
+    """The power of two by which values are divided so that their squares are doubles, too; zero of nearly all."""
+    sizes = [size for value in values if math.isfinite(value) and (size := abs(value))]
+    if not sizes or (min(sizes) > 2.0**-ROOM and max(sizes) < 2.0**ROOM):
+        return 0
+    return math.frexp(sorted(sizes)[len(sizes) // 2])[1]
+
+
+def times_two_to(exponent: int, value: float) -> float:
+    """Exact, and infinite beyond the doubles."""
+    try:
+        return math.ldexp(value, exponent)
+    except OverflowError:
+        return math.copysign(math.inf, value)

@@ -9,8 +9,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import islice
 from typing import NamedTuple
 
@@ -27,6 +28,8 @@ from spook_tracker.tracker.judge.level import (
     Growing,
     PresentLevel,
     Reference,
+    exponent_of,
+    times_two_to,
 )
 from spook_tracker.tracker.judge.segments import Segment, boundary, inner_split, spread_of
 from spook_tracker.tracker.judge.shifts import BASE, FEWEST_BASE, RARE, SPANS, Shift, remembered, shift
@@ -56,6 +59,10 @@ class Noisy(NamedTuple):
     levels: tuple[float, float] | None = None  # what the percentage is of: before, now
     usual: Usual | None = None  # after this night: the level that is held to, and what stands clear of it
 
+    def scaled(self, back: Callable[[float], float]) -> Noisy:
+        usual = self.usual and (back(self.usual[0]), self.usual[1])
+        return self._replace(levels=self.levels and (back(self.levels[0]), back(self.levels[1])), usual=usual)
+
 
 def judge_noisy(values: Sequence[float], **options: object) -> list[Noisy]:
     """A verdict for each value of one machine, oldest first: `judged_and_segments` without the segments."""
@@ -77,6 +84,11 @@ def judged_and_segments(
     `tolerance` and `absolute`: the change, relative and in the unit of the values, up to which the series' definition
     tells none, whatever its noise. `ages`: how many nights each value lies after the first, where some are left out.
     """
+    if exponent := exponent_of(values):
+        near, back = [times_two_to(-exponent, value) for value in values], partial(times_two_to, exponent)
+        nights, segments = judged_and_segments(near, larger_is_better=larger_is_better, releases=releases, accepted=accepted, tolerance=tolerance, absolute=times_two_to(-exponent, absolute), ages=ages)  # fmt: skip
+        segments = [dataclasses.replace(segment, level=back(segment.level)) for segment in segments]
+        return [night.scaled(back) for night in nights], segments
     walk = _Walk(values, larger_is_better, tolerance, absolute, ages=ages or range(len(values)))
     told = []
     for place in range(len(values)):
@@ -196,9 +208,7 @@ class _Walk(PresentLevel):
         nights = [*self.now.places[-BASE - max(SPANS) :], *self.off]
         age = self.ages[nights[-1]] - self.ages[self.start]
         found = shift(self._costs(nights), mean < self._level()[1], age)
-        if found is None or found.change <= self._tolerated(level):
-            return None
-        return found.span, found
+        return (found.span, found) if found is not None and found.change > self._tolerated(level) else None
 
     def _above_both(self) -> tuple[int, Shift | None] | None:
         """Several nights above both of two clusters that nights are drawn from at random, whatever segments they made."""
@@ -213,9 +223,8 @@ class _Walk(PresentLevel):
         if len(nights) < FEWEST_BASE + min(SPANS):
             return None
         found = shift(self._costs(nights), True, self.ages[nights[-1]] - self.ages[self.start])
-        if found is None or not found.apart or found.change <= self._tolerated(level):
-            return None
-        return found.span, found
+        told = found is not None and found.apart and found.change > self._tolerated(level)
+        return (found.span, found) if found is not None and told else None
 
     def _came_back(self) -> tuple[int, None] | None:
         """Whether the last nights of a red segment are more probably of the level before it (Page's cumulative sum)."""
@@ -395,8 +404,7 @@ class _Walk(PresentLevel):
             return None
         good = self.reference.last
         self.reference, self.first, self.now.standing = None, None, "recovered"
-        words = f"{change_in_words(change)}, inside the noise"
-        verdict = Verdict(word="same", sentence=words)
+        verdict = Verdict(word="same", sentence=f"{change_in_words(change)}, inside the noise")
         return Noisy(verdict=verdict, state="recovered", against=good, levels=(held, level))
 
     def _flaky_night(self, level: float) -> Noisy:
