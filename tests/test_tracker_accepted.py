@@ -7,11 +7,12 @@ from dataclasses import replace
 from datetime import date
 from pathlib import Path
 
+import msgspec
 import pytest
 
 from spook_tracker.tracker.judge.accepted import Accepted, AcceptedError, acceptance, read_accepted, unused
 from spook_tracker.tracker.judge.compare import compare
-from spook_tracker.tracker.judge.series_history import judge_history
+from spook_tracker.tracker.judge.series_history import judge_history, night_of
 from tests.test_tracker_analyse import SERIES, history
 
 ENTRY = """
@@ -130,3 +131,27 @@ def test_a_comparison_knows_what_is_expected() -> None:
     found = compare(_side("a", 0.01), _side("b", 3.0), [EXPECTED])
 
     assert (found.changes[0].word, found.exit_code) == ("expected", 0)
+
+
+def test_what_is_expected_to_fail_and_becomes_a_hundred_times_worse_is_said() -> None:
+    told = judge_history("t/c/m", SERIES, history(0.01, 3.0, 3.0, 300.0), (EXPECTED,))
+
+    assert [night.verdict.word for night in told] == ["new", "expected", "expected", "expected"]
+    assert "; since" not in told[2].verdict.sentence
+    assert "; since" in told[3].verdict.sentence and "by 2.0 decades" in told[3].verdict.sentence
+
+
+def test_a_run_time_accepted_until_a_day_is_red_after_it_and_news_once() -> None:
+    times = msgspec.structs.replace(SERIES, kind="time", better="smaller", limit=None)
+    nights = history(*[1.0] * 12, *[1.5] * 12)
+    until = night_of(nights[19].run)
+    for day, red in ((until, 4), (None, 0)):
+        level = Accepted(series="t/*", low=1.4, high=1.6, who="Ada", why="for now", until=day)
+        told = judge_history("t/c/m", times, nights, (level,))
+
+        assert [night.red for night in told[13:]] == [False] * (11 - red) + [True] * red
+        assert sum(night.news for night in told) == (red > 0)
+        if red:
+            assert told[20].news
+            assert told[-1].worse_at is nights[12]
+            assert told[-1].levels == (1.0, 1.5)

@@ -15,7 +15,7 @@ import re
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
-from functools import cached_property, lru_cache
+from functools import cached_property, lru_cache, partial
 from operator import attrgetter
 
 import msgspec
@@ -28,6 +28,7 @@ from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.calibration import engines_own, taken_again, unquiet
 from spook_tracker.tracker.judge.explaining import calm_nights
 from spook_tracker.tracker.judge.lane import looked_at_again
+from spook_tracker.tracker.judge.lent import walk_with
 from spook_tracker.tracker.judge.run_times import judged_and_segments
 from spook_tracker.tracker.judge.segments import Segment
 from spook_tracker.tracker.judge.slower import Usual, by_outcome, only_followed
@@ -236,6 +237,7 @@ def _judge_values(
     calm: Class | None = None  # what the night before stood for, if it can be repeated without a look
     gone: set[float] = set()  # bad values that had been mended
     lent: tuple[Point, Accepted] | None = None  # the level before one that is accepted until a day
+    failing: Point | None = None  # the last night that was expected to fail
     looked = 0  # from here on nights were repeated without a look whether they are releases
     for place, night in enumerate(history):
         if lent is not None and lent[1].over(night_of(night.run)):
@@ -276,6 +278,9 @@ def _judge_values(
         taken = acceptance(accepted, key, night.value, night_of(night.run), gone_for_good) if bad else None
         if taken is not None and taken.expected:  # the level from before stays
             words = f"expected to fail; {verdict.sentence}"
+            if failing is not None and (grown := _against(definition, failing, night)).red:
+                words += f"; since {commit_of(failing.run)}: {grown.sentence}"
+            failing = night
             known = replace(verdict, word="expected", sentence=words, name="")
             ended: State = "accepted" if red is not None else "green"
             red, calm = None, None
@@ -435,15 +440,16 @@ def _judge_times(
             else None
             for night, value in zip(lane, values, strict=True)
         ]
-        verdicts, segments = judged_and_segments(
+        walk = partial(
+            judged_and_segments,
             values,
             larger_is_better=definition.better == "larger",
             releases=[is_release(night.run) for night in lane],
-            accepted=[level is not None for level in taken],
             tolerance=definition.relative_tolerance,
             absolute=definition.tolerance,
             ages=[i for i in looked_at if every[i] not in loud],
         )
+        verdicts, segments = walk_with(walk, taken, [night_of(night.run) for night in lane])
         level_of = {i: segment for segment in segments for i in range(segment.first, segment.last + 1)}
         for i, noisy in enumerate(verdicts):
             noisy = noisy._replace(verdict=by_outcome(noisy.verdict, lane[i].sample))
