@@ -195,14 +195,16 @@ def rod_angle(times: tuple[float, ...]) -> np.ndarray:
 def test_corrections_keep_their_order_on_what_accelerates(
     by_path: bool, corrections: int, half: bool
 ) -> None:
-    """Order 1, and 2 with half steps, as on what stands still; rigid rows then hold to rounding, as linearised ones do
-    to h² of the acceleration. The path's own speed before a step and in it differ by h times that."""
+    """Order 1, and 2 with half steps, as on what stands still. Linearised rows hold to h² of the acceleration, and each
+    correction takes two orders. The path's own speed before a step and in it differ by h times that."""
     method = Method(corrections=corrections, half_step_velocities=half)
     coarse, fine = (shaken(h, method, by_path) for h in (1 / 60, 1 / 240))
     linear = shaken(1 / 60, Method(half_step_velocities=half), by_path)
 
     assert math.log2(coarse[0] / fine[0]) / 2.0 == pytest.approx(2.0 if half else 1.0, abs=0.1)
-    assert fine[1] < 1e-10 and linear[1] > 1e-4
+    assert linear[1] > 1e-4
+    assert coarse[1] < linear[1] * 1e-3**corrections
+    assert fine[1] < max(1e-14, coarse[1] / 4.0 ** (1.9 + 1.9 * corrections))
 
 
 @pytest.mark.parametrize(
