@@ -243,12 +243,10 @@ def _failure(
         said = (
             f"body {body!r} {reason}"
             if reason
-            else f"rows of body {body!r} are off by up to {residual:.3g} m/s"
-        )
-        return (
-            f"unsettled since step {step}: {said}; "
+            else f"rows of body {body!r} are off by up to {residual:.3g} m/s; "
             "use more iterations, smaller time steps or the direct solver"
         )
+        return f"unsettled since step {step}: {said}"
     if reason:
         return f"in step {step} body {body!r} {reason}"
     if status == "diverged":

@@ -197,7 +197,11 @@ void RigidSystem::reset(StageClock* clock) {
     undelivered_ = false;
     mixed_ = MixedSystem{};
     mixed_values_ = solver_ != RigidSolver::block;
-    if (composed_) start_composition();
+    if (composed_) {
+        start_composition();
+        live_.most_kinetic = kinetic_energy();
+        live_.energy_begun = live_.most_kinetic + potential_energy();
+    }
     if (stiff_) find_tensions();
     const bool may_touch = contacts_ && contacts_->possible();  // or the stage is only forced in
     if (half_step_ || method_.corrections > 0) {
@@ -382,7 +386,10 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
         if (report.status == Status::completed) {
             report.status = Status::unsettled;
             report.failed_body = left.body;
-            if (left.sunk) report.reason = "has sunk into another by a fiftieth of the smaller one's radius";
+            if (left.sunk)
+                report.reason =
+                    "has sunk into another by a fiftieth of the smaller one's radius; use more iterations, "
+                    "smaller time steps or the direct solver";
             report.failed_step = (left.step + method_.substeps - 1) / method_.substeps;
         }
     }

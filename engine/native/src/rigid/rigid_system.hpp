@@ -89,6 +89,7 @@ public:
     using Unsettled = spook::Unsettled;
     const Unsettled& unsettled() const noexcept { return live_.unsettled; }
     std::vector<double> final_state();
+    void judge_energy(RunReport& report) const;
 
     // What can be observed:
     int bodies() const noexcept { return static_cast<int>(constants_.size()); }

@@ -41,10 +41,11 @@ struct RigidState {
     LargeArray<BodyMomenta> before;      // those of the step before
     std::vector<double> last_violation;  // per row, where the step before began
     // Compositions:
-    double pending = 0.0;  // s: half a stage still to be kicked
-    int locked = -1;       // a body of redundant rows that contradict each other by now
-    int lost = -1;         // a body of rows that no motion satisfies
-    struct Watched {       // of the redundant rows of a loop, see rigid_locking.cpp
+    double pending = 0.0;                           // s: half a stage still to be kicked
+    double energy_begun = 0.0, most_kinetic = 0.0;  // J
+    int locked = -1;  // a body of redundant rows that contradict each other by now
+    int lost = -1;    // a body of rows that no motion satisfies
+    struct Watched {  // of the redundant rows of a loop, see rigid_locking.cpp
         double work = 0.0, motion = 0.0, last = 0.0;  // J: taken so far; the largest, and the last
         double held = 0.0, load = 0.0;                // √(2 J): what they held back, and what the loads gave
         double given = 0.0;                           // 2 J: what the loads gave at the last look

@@ -56,6 +56,7 @@ public:
         run_loop(system_, recorder_, steps, time_limit, report);
         system_.count(report, report.steps);
         report.final_state = system_.final_state();
+        if constexpr (requires { system_.judge_energy(report); }) system_.judge_energy(report);
         report.state_hash = state_hash(report.final_state);
         for (std::size_t k = 0; k < STAGES; ++k) {
             const Stage stage = static_cast<Stage>(k);
