@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -228,7 +229,10 @@ TEST = ScalarTest(
     ladders=ladders(
         "the slider at six times",
         {
-            "low": ((1 / 30, 1 / 60, 1 / 120, 1 / 240), (FIRST_ORDER,)),
+            "low": (
+                (1 / 30, 1 / 60, 1 / 120, 1 / 240),
+                (replace(FIRST_ORDER, order_range=(1 / 240, 1 / 60)),),
+            ),
             "high": (
                 (1 / 480, 1 / 1000, 1 / 2000, 1 / 4000, 1 / 8000),
                 (

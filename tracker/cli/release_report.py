@@ -22,7 +22,7 @@ from spook_tracker.tracker.judge.release_notes import (
 from spook_tracker.tracker.judge.release_order import (
     NOT_DRAWN,
     Scene,
-    Told,
+    ToldLine,
     direct_first,
     left_out,
     scenes,
@@ -198,7 +198,7 @@ def _change_table(step: Step) -> list[str]:
     return lines
 
 
-def _brought(one: Told) -> str:
+def _brought(one: ToldLine) -> str:
     """What a collapse changed besides, by name alone."""
     names = ", ".join(dict.fromkeys(change.metric for change in one.brought))
     return f", and with it {names}" if names else ""

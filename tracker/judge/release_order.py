@@ -27,7 +27,7 @@ class Scene:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Told:
+class ToldLine:
     """One line: a change, or a collapse with what it brought along."""
 
     change: Change
@@ -72,15 +72,15 @@ def direct_first(changes: Iterable[Change], drawn: Mapping[str, Scene]) -> list[
     return sorted(changes, key=directness)
 
 
-def told_of(found: Sequence[Change], scene: Scene = NOT_DRAWN) -> tuple[list[Told], list[Change]]:
+def told_of(found: Sequence[Change], scene: Scene = NOT_DRAWN) -> tuple[list[ToldLine], list[Change]]:
     """The lines for one test's changes, and what they leave out: other settings of what they tell."""
-    lines: list[Told] = []
+    lines: list[ToldLine] = []
     rest = list(found)
     for change in found:
         word = _collapse(change, scene)
         if word and change in rest:
             brought = [one for one in rest if one.configuration == change.configuration and one is not change]
-            lines.append(Told(change=change, word=word, brought=tuple(brought)))
+            lines.append(ToldLine(change=change, word=word, brought=tuple(brought)))
             rest = [one for one in rest if one.configuration != change.configuration]
     few = scene.bodies <= 1
     kinds = {(line.change.metric, line.change.word) for line in lines}
@@ -88,7 +88,7 @@ def told_of(found: Sequence[Change], scene: Scene = NOT_DRAWN) -> tuple[list[Tol
     for place, change in enumerate(rest):
         kind = change.metric, change.word
         if few or place < SHOWN or kind not in kinds:
-            lines.append(Told(change=change, word=change.word))
+            lines.append(ToldLine(change=change, word=change.word))
             kinds.add(kind)
         else:
             out.append(change)
