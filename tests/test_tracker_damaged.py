@@ -177,3 +177,13 @@ def test_on_a_full_disk_nothing_half_is_left(command: tuple[str, ...], size: int
         assert len(History(session).runs()) >= 4
     opened.dispose()
     assert tracker(*command).exit_code == 0
+
+
+def test_a_word_where_a_moment_belongs_is_called_damage_by_whoever_reads_it() -> None:
+    with sqlite3.connect("tracker.db") as connection:
+        connection.execute("UPDATE run SET started = 'yesterday'")
+
+    done = tracker("judge", "latest")
+
+    assert done.exit_code == 2
+    assert "is damaged" in done.stderr and "restore it from a copy" in done.stderr
