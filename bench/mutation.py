@@ -71,7 +71,7 @@ MUTANTS = (
     mutant("one-freedom-more", "normal_nights", "1.0 / count)), count - 1)", "1.0 / count)), 4 * count)"),
     mutant("old-series-spend-as-young", "shifts", "RARE * min(1.0, LEARNING / max(age, 1.0))", "RARE"),
     mutant("normal-nights-need-a-permutation", "shifts", "if (by_chance := chance(base, last, rare)) < rare else None", "if (by_chance := 1.0) < rare else None"),
-    mutant("a-visit-hides-a-step", "run_times", "if found is None or not found.apart or", "if True or"),
+    mutant("a-visit-hides-a-step", "run_times", "told = found is not None and found.apart and", "told = False and"),
     mutant("one-night-mends", "run_times", "BACK, WEIGHT = 9.0, 6.0", "BACK, WEIGHT = 9.0, 99.0"),
     mutant("blame-is-never-looked-at-again", "run_times", "SETTLED = 30", "SETTLED = 0"),
     mutant("all-nights-are-of-one-age", "run_times", "age = self.ages[nights[-1]] - self.ages[self.start]", "age = 0"),
