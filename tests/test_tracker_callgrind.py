@@ -71,5 +71,5 @@ def test_without_valgrind_it_says_what_to_install(monkeypatch: pytest.MonkeyPatc
 
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="no valgrind here")
 def test_a_test_that_is_not_there_is_said() -> None:
-    with pytest.raises(TrackerError, match="nobody cannot be counted: KeyError: 'nobody'"):
-        callgrind.count_instructions("spook", "standard", "nobody", 10)
+    with pytest.raises(TrackerError, match="no_such_test cannot be counted: KeyError: 'no_such_test'"):
+        callgrind.count_instructions("spook", "standard", "no_such_test", 10)

@@ -22,7 +22,7 @@ def simulate(scene, **more):
     return {answer}
 """
 ANSWERS = {
-    "a status that nobody knows": "dataclasses.replace(result, status='splendid', failure='so it says')",
+    "a status that is none": "dataclasses.replace(result, status='splendid', failure='so it says')",
     "a count of 400 digits": "dataclasses.replace(result, counters={'steps': 10**400})",
     "a count of 20 digits": "dataclasses.replace(result, counters={'steps': 10**19})",
     "a hash that is no text": "dataclasses.replace(result, state_hash=7)",

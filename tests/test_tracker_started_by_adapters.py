@@ -1,4 +1,4 @@
-"""What an adapter starts ends with the worker it runs in, and holds open nothing that somebody reads."""
+"""What an adapter starts ends with the worker it runs in, and holds no stream open that is still read."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def test_a_command_ends_with_all_that_an_engine_has_started(how: str, tmp_path: 
     then, options, code = ENDS[how]
     process = start(tmp_path, mark, then, *options)
 
-    told, _ = process.communicate(timeout=60)  # returns once nobody holds the output open
+    told, _ = process.communicate(timeout=60)  # returns once no process holds the output open
 
     assert (tmp_path / "started").exists(), told
     assert process.returncode == code, told

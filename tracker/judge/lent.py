@@ -1,4 +1,4 @@
-"""Run times that somebody accepted until a day: after it they are held to the level from before again."""
+"""Run times accepted until a day: after it they are held to the level from before again."""
 
 from __future__ import annotations
 

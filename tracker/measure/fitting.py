@@ -1,6 +1,6 @@
 """One answer that no document can carry is that answer's outcome, not the end of the run it belongs to.
 
-An engine may answer with a status that nobody knows, with a count of four hundred digits, with text that is none.
+An engine may answer with a status that does not exist, with a count of four hundred digits, with text that is none.
 """
 
 from __future__ import annotations

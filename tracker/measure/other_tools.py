@@ -3,7 +3,7 @@
 pytest-benchmark (--benchmark-json), asv (results/MACHINE/*.json), Google Benchmark (--benchmark_out) and
 github-action-benchmark (data.js, a whole history in one file). What a file does not say stays unknown.
 A machine is known by its processor, never by its host's name: that is new in every job of a hosted runner, and
-nobody else's to publish.
+not ours to publish.
 """
 
 from __future__ import annotations

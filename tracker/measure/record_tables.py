@@ -1,8 +1,8 @@
 """Records as runs: JSON lines, CSV, or a JSON list of flat objects, one mapping for all of them.
 
 A column has a meaning: it tells about the run (commit, started, ...), names what was measured (test, metric,
-parameter), or holds values in a unit. What nobody gives a meaning has the usual one of its name; a column of
-numbers in no known unit is kept as what may explain a change, since nobody said which way is better.
+parameter), or holds values in a unit. What is given no meaning has the usual one of its name; a column of
+numbers in no known unit is kept as what may explain a change, since its unit does not say which way is better.
 
     {"commit": "1af2…", "timestamp": "2026-03-30T08:50:26+00:00", "steps_per_second": 4.1e6, "ncon_mean": 22.3}
 

@@ -189,7 +189,7 @@ def _serve(
 
 
 def _alone() -> None:
-    """A process group of its own, and no stream of ours: what an adapter starts ends with it and holds nobody up."""
+    """A process group of its own, and no stream of ours: what an adapter starts ends with it and delays no reader."""
     if os.name == "posix":
         os.setpgid(0, 0)
     nothing = os.open(os.devnull, os.O_RDONLY)
