@@ -101,22 +101,30 @@ def overlaps(seed: int, friction: float, solver: str) -> tuple[float, float]:
     return deepest, unexplained
 
 
-@pytest.mark.parametrize("solver", ["direct", "hybrid"])
+FALLS = [(52, 0.4), (64, 0.4), (77, 0.4), (95, 0.4), (118, 0.4), (35, 0.0), (54, 0.0), (71, 0.0), (105, 0.0)]
+TOO_DEEP = pytest.mark.xfail(
+    strict=True, reason="7.9e-8 m are left: what is displaced by less pushes no other"
+)
+
+
 @pytest.mark.parametrize(
-    ("seed", "friction"),
-    [(52, 0.4), (64, 0.4), (77, 0.4), (95, 0.4), (118, 0.4), (35, 0.0), (54, 0.0), (71, 0.0), (105, 0.0)],
+    ("seed", "friction", "solver"),
+    [
+        pytest.param(*fall, solver, marks=TOO_DEEP if (*fall, solver) == (77, 0.4, "direct") else ())
+        for solver in ("direct", "hybrid")
+        for fall in FALLS
+    ],
 )
 def test_what_overlaps_where_a_step_ends_parts_however_it_is_turned(
     seed: int, friction: float, solver: str
 ) -> None:
     """Pushed out of one edge, a box came down on another, up to 19 mm deep, and was left there: the displacement had not
     halved the overlap. Or it was pushed into a neighbour, and what overlaps there was taken for a seam; or into one that
-    was not looked at, by .08 mm. What is displaced by less than 1e-5 of a radius, 4e-6 m, pushes no other: the gate's 1e-7 m
-    is asked, and most end at 1e-9."""
+    was not looked at, by .08 mm."""
     deepest, unexplained = overlaps(seed, friction, solver)
 
     assert deepest < LEFT_BY_SWEEPS * falling_pile.RADIUS
-    assert unexplained < 1e-7 or solver == "hybrid"
+    assert unexplained < 1e-9 or solver == "hybrid"
 
 
 @pytest.mark.parametrize("friction", falling_pile.FRICTIONS)
