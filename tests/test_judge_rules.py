@@ -16,6 +16,7 @@ from spook_tracker.tracker.judge.compare import same_commit
 from spook_tracker.tracker.judge.run_times import judge_noisy
 from spook_tracker.tracker.judge.series_history import judge_history
 from spook_tracker.tracker.judge.verdict import judge, judge_map
+from spook_tracker.tracker.judge.vocabulary import with_recoveries
 from tests.run_documents import definition, engine, run_of
 from tests.test_tracker_compare import side
 from tests.test_tracker_verdict import sample, series
@@ -149,3 +150,21 @@ def test_only_the_same_commit_can_contradict_itself(facts: dict, why: str) -> No
 def test_where_larger_is_better_less_is_worse() -> None:
     assert judge_noisy([1.0] * 10 + [0.9, 0.9], larger_is_better=True)[-1].state == "detected"
     assert judge_noisy([1.0] * 10 + [1.1, 1.1], larger_is_better=True)[-1].state == "green"
+
+
+def test_recovered_is_the_first_night_after_red_that_says_anything() -> None:
+    states = (
+        "recovered",
+        "detected",
+        "suspected",
+        "unjudged",
+        "green",
+        "green",
+        "detected",
+        "accepted",
+        "green",
+    )
+
+    assert list(with_recoveries(states)) == [
+        "green", "detected", "suspected", "unjudged", "recovered", "green", "detected", "accepted", "green",
+    ]  # fmt: skip

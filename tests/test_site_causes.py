@@ -124,10 +124,10 @@ def test_causes_say_what_became_of_them(site):
     red, back = (told(cause, book(nights())) for cause in causes_of(book(nights())))
 
     assert (red.standing, red.state, red.new) == ("detected", "fail", True)
-    assert (back.standing, back.state, back.new) == ("fixed", "pass", False)
+    assert (back.standing, back.state, back.new) == ("recovered", "pass", False)
     assert [night.index for night in back.ended] == [5, 5]
     page = Words(site / "regressions.html").text
-    assert "FIXED" in page.partition("Fixed, recovered and accepted")[2]
+    assert "RECOVERED" in page.partition("Recovered and accepted")[2]
 
 
 def test_the_feed_has_one_entry_for_a_cause_and_one_for_its_end(site):
@@ -136,7 +136,7 @@ def test_the_feed_has_one_entry_for_a_cause_and_one_for_its_end(site):
     titles = [entry.findtext("a:title", "", names) for entry in entries]
     links = [entry.find("a:link", names).get("href") for entry in entries]
 
-    assert [title.partition(":")[0] for title in titles] == ["red", "fixed", "red"]
+    assert [title.partition(":")[0] for title in titles] == ["red", "recovered", "red"]
     assert SUBJECT in titles[0]
     assert "(4 series of 3 tests)" in titles[0]
     page = (site / "regressions.html").read_text()
@@ -229,8 +229,8 @@ def test_the_list_is_searched_and_filtered_and_the_address_keeps_it(driver, site
         "return [...document.querySelectorAll('details.cause')].filter((d) => !d.hidden).map((d) =>"
         " [d.dataset.state, d.open, [...d.querySelectorAll('tbody tr')].filter((r) => !r.hidden).length])"
     )
-    opened(driver, site, "regressions.html#show=fixed")
-    assert driver.execute_script(shown) == [["fixed", False, 1]]
+    opened(driver, site, "regressions.html#show=recovered")
+    assert driver.execute_script(shown) == [["recovered", False, 1]]
 
     opened(driver, site, "regressions.html#q=door")
     assert driver.execute_script(shown) == [

@@ -23,6 +23,7 @@ from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.tonight import tonight
 from spook_tracker.tracker.library import trend
 from spook_tracker.tracker.website.publish import publish
+from tests.recoveries import recovered_alike
 from tests.synthetic_history import MACHINE, DocumentHistory, document, sample, series
 
 STEPS = (0.1, 0.05)
@@ -193,7 +194,7 @@ class Recorded(DocumentHistory):
 def test_every_output_says_the_same_of_a_series(
     given_history: tuple[list[RunDocument], list[Accepted]],
 ) -> None:
-    say_the_same(*given_history)
+    say_the_same(*noted(*given_history))
 
 
 def timed_history(seed: int, nights: int) -> tuple[list[RunDocument], list[Accepted]]:
@@ -218,7 +219,28 @@ def timed_history(seed: int, nights: int) -> tuple[list[RunDocument], list[Accep
 @settings(max_examples=40, deadline=None, suppress_health_check=list(HealthCheck))
 @given(st.integers(0, 10**6), st.integers(8, 24))
 def test_every_output_says_the_same_of_run_times_on_several_machines(seed: int, nights: int) -> None:
-    say_the_same(*timed_history(seed, nights))
+    say_the_same(*noted(*timed_history(seed, nights)))
+
+
+def test_every_output_says_that_a_run_time_recovered() -> None:
+    """Slow for six nights and back: the second night at the old level ends it."""
+    slow = [1.6 if 14 <= n < 20 else 1.0 for n in range(22)]
+    runs = [night(n, seconds(1e-3 * noise(n) * by) + one(0.4 + 0.2 * (n == 20))) for n, by in enumerate(slow)]
+
+    assert {f.series for f in tonight(DocumentHistory(runs), runs[-1]) if f.recovered} == {
+        "t/plain/time",
+        "t/plain/m/h=0.0166667",
+    }
+    say_the_same(runs, [])
+
+
+def noted(runs: list[RunDocument], accepted: list[Accepted]) -> tuple[list[RunDocument], list[Accepted]]:
+    """The same, told where a test fails on it."""
+    samples = (
+        f"{r.id} {r.engine.version} {[(s.series, s.value, s.outcome) for s in r.samples]}" for r in runs
+    )
+    note("\n".join(samples))
+    return runs, accepted
 
 
 def say_the_same(runs: list[RunDocument], accepted: list[Accepted]) -> None:
@@ -229,23 +251,21 @@ def say_the_same(runs: list[RunDocument], accepted: list[Accepted]) -> None:
     from spook_tracker.tracker.website.feed import atom
     from spook_tracker.tracker.website.nights import book
     from spook_tracker.tracker.website.page_index import health
+    from spook_tracker.tracker.website.page_index import recovered as page_recovered
 
-    note(
-        "\n".join(
-            f"{r.id} {r.engine.version} {[(s.series, s.value, s.outcome) for s in r.samples]}" for r in runs
-        )
-    )
     records: Any = Recorded(runs)
     findings = tonight(records, runs[-1], accepted)
     word = {f.series: f.verdict.word for f in findings}
     name = {f.series: f.name for f in findings if f.red}
+    recovered = {f.series for f in findings if f.recovered}
 
     lines = [line for line in map(unstyle, finding_lines(findings)) if line.startswith(("✗ t/", "✗ u/"))]
     assert [line.split("; ")[0] for line in lines] == [f"✗ {key}: {name[key]}" for key in name]
 
-    cases = ElementTree.fromstring(junit_of_night(findings).encode()).iter("testcase")
+    cases = list(ElementTree.fromstring(junit_of_night(findings).encode()).iter("testcase"))
     failed = {f"{c.get('classname')}/{c.get('name')}" for c in cases if c.find("failure") is not None}
     assert failed == set(name)
+    recovered_alike(findings, recovered, cases, trend, records, accepted)
 
     told = book(records, accepted)
     trends = {t.definition.key: t for test in told.tests for t in test.trends}
@@ -262,7 +282,10 @@ def say_the_same(runs: list[RunDocument], accepted: list[Accepted]) -> None:
     assert state == "fail" or not any(stands[key] == "fail" for key in name)
     _counts_alike(runs, told, stands, name)
 
+    assert page_recovered(told) == len(recovered)
     causes = causes_of(told)
+    ended = {h.series for c in causes for h in c.hits if h.end is not None and h.end is told.tonight}
+    assert recovered <= ended
     here = runs[-1].machine.fingerprint  # what is red on another machine lasts there
     lasting = [
         (hit.series, cause)

@@ -18,7 +18,7 @@ MOST_ANNOTATIONS = 10  # GitHub shows as many of a step
 
 
 def night_markdown(run: object, findings: Sequence[Finding], site: str = "") -> str:
-    """One sentence, what broke by cause, and a row for each red series; `site` is the address of the website."""
+    """One sentence, what broke by cause, and a row for each series red or recovered; `site` is the website's address."""
     engine, started = run.engine, run.started  # type: ignore[attr-defined]
     red = [finding for finding in findings if finding.red]
     lines = [f"### {escape(engine.name)} {escape(version(engine))}, {clock(started)} UTC", ""]
@@ -26,13 +26,15 @@ def night_markdown(run: object, findings: Sequence[Finding], site: str = "") -> 
     causes = causes_tonight(findings)
     if len(causes) < len(red):
         lines += [*(f"- {escape(cause.sentence)}" for cause in causes), ""]
-    if red:
+    shown = [*red, *(finding for finding in findings if finding.recovered)]
+    if shown:
         lines += ["| series | what | before | now | since |", "|---|---|---:|---:|---|"]
-    for finding in red[:MOST]:
-        cells = (_linked(finding, site), *map(escape, (finding.name, *_values(finding), finding.blame)))
+    for finding in shown[:MOST]:
+        what = "recovered" if finding.recovered else finding.name
+        cells = (_linked(finding, site), *map(escape, (what, *_values(finding), finding.blame)))
         lines.append("| " + " | ".join(cells) + " |")
-    if len(red) > MOST:
-        lines.append(f"\nand {len(red) - MOST} more")
+    if len(shown) > MOST:
+        lines.append(f"\nand {len(shown) - MOST} more")
     return "\n".join(lines).rstrip() + "\n"
 
 

@@ -235,7 +235,7 @@ def escape(text: str) -> str:
 
 
 def finding_lines(findings: Sequence[Finding], site: str = "") -> list[str]:
-    """What tonight came to: one sentence over all, a line for each cause of several, and one for each red series."""
+    """What tonight came to: one sentence over all, a line for each cause of several, each red and recovered series."""
     red = [finding for finding in findings if finding.red]
     causes = causes_tonight(findings)
     shared = [f"  {clean(cause.sentence)}" for cause in causes] if len(causes) < len(red) else []
@@ -243,6 +243,7 @@ def finding_lines(findings: Sequence[Finding], site: str = "") -> list[str]:
         summary(findings),
         *shared,
         *(click.style(_finding_line(finding, site), fg="red") for finding in red),
+        *(click.style(_finding_line(f, site), fg="green") for f in findings if f.recovered),
         *(f"note: {clean(note)}" for note in not_compared(_verdicts(findings))),
     ]
 
@@ -285,14 +286,17 @@ def _verdicts(findings: Sequence[Finding]) -> Iterator[tuple[str, Verdict]]:
 
 
 def summary(findings: Sequence[Finding]) -> str:
-    """One sentence: how many are red, how many of them since tonight, and which is the worst."""
+    """One sentence: how many are red, how many of them since tonight, which is the worst, how many recovered."""
     red = [finding for finding in findings if finding.red]
+    recovered = sum(finding.recovered for finding in findings)
+    also = f"; {recovered} recovered" if recovered else ""
     words = Counter(finding.verdict.word for finding in findings if not finding.red)
     if red:
         new = sum(finding.news for finding in red)
         news = f"{new} new tonight" if new else "none of them new tonight"
         worst = clean(f"the worst: {red[0].series}, {red[0].name}")
-        return click.style(f"✗ {len(red)} worse than the history, {news}; {worst}", fg="red", bold=True)
+        told = f"✗ {len(red)} worse than the history, {news}; {worst}{also}"
+        return click.style(told, fg="red", bold=True)
     if not findings:
         return click.style("? nothing was measured that could be judged", fg="yellow", bold=True)
     held = len(findings) - words["new"] - words["not_comparable"]
@@ -301,12 +305,12 @@ def summary(findings: Sequence[Finding]) -> str:
         parts.append(f"{words['new']} are measured for the first time: nothing to compare with yet")
     if words["not_comparable"]:
         parts.append(f"{words['not_comparable']} cannot be compared")
-    return click.style("✓ " + "; ".join(parts), fg="green")
+    return click.style("✓ " + "; ".join(parts) + also, fg="green")
 
 
 def _finding_line(finding: Finding, site: str) -> str:
     judged, definition = finding.judged, finding.definition
-    parts = [f"✗ {finding.series}: {finding.name}"]
+    parts = [f"✓ {finding.series}: recovered" if finding.recovered else f"✗ {finding.series}: {finding.name}"]
     if judged is not None and definition is not None:
         before, now = judged.pair
         parts.append(f"{value(before)} → {value(now, definition.unit)}")
@@ -340,6 +344,7 @@ def findings_json(findings: Sequence[Finding], then: Sequence[Any] = ()) -> str:
             "name": finding.name if finding.red else "",
             "red": finding.red,
             "news": finding.red and finding.news,
+            "state": finding.state,
             "sentence": finding.verdict.sentence,
             "value": finding.judged.night.sample.value if finding.judged else None,
             "levels": finding.judged.levels if finding.judged else None,
@@ -358,6 +363,7 @@ def findings_json(findings: Sequence[Finding], then: Sequence[Any] = ()) -> str:
             "name": change.name,
             "red": change.red,
             "news": change.red,
+            "state": "detected" if change.red else "green",
             "sentence": change.sentence,
             "value": change.after,
             "first_bad": "",

@@ -34,6 +34,7 @@ def _map(told: ToldMap) -> dict[str, Any]:
         "sentence": told.verdict.sentence,
         "stands": told.stands,
         "news": red and told.news,
+        "state": told.state,
         "first_bad": told.bad.engine.git_hash if red else "",
         "last_good": told.good.engine.git_hash if red else "",
     }

@@ -26,6 +26,7 @@ class Case(NamedTuple):
     failure: str = ""  # what is wrong with it
     crashed: bool = False
     skipped: str = ""  # why nothing can be said of it
+    said: str = ""  # of one that passes
 
 
 def legal(text: str) -> str:
@@ -58,7 +59,8 @@ def junit_of_night(findings: Sequence[Finding], then: Sequence[Any] = ()) -> str
         failure = f"{finding.name}: {finding.verdict.sentence}; {finding.blame}" if finding.red else ""
         sample = finding.judged.night.sample if finding.judged else None
         crashed = sample is not None and sample.outcome == "crashed"
-        cases[finding.test].append(Case(finding.series.partition("/")[2], failure, crashed))
+        said = f"recovered: {finding.verdict.sentence}" if finding.recovered else ""
+        cases[finding.test].append(Case(finding.series.partition("/")[2], failure, crashed, said=said))
     for old in then:
         asked = f" as asked at {old.commit[:12] or 'no commit'}"
         for change in old.changes:
@@ -94,6 +96,8 @@ def _document(cases: Mapping[str, Sequence[Case]]) -> str:
                 SubElement(case, "error" if one.crashed else "failure", message=legal(one.failure))
             elif one.skipped:
                 SubElement(case, "skipped", message=legal(one.skipped))
+            elif one.said:
+                SubElement(case, "system-out").text = legal(one.said)
     return _text(suites)
 
 

@@ -25,7 +25,7 @@ from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, STATES, 
 
 
 def summary(trends: Sequence[Told], maps: Sequence[ToldMap] = ()) -> str:
-    """One sentence over all: how many series are red in their newest night, and which is the worst."""
+    """One sentence over all: how many series are red in their newest night, which is the worst, how many recovered."""
     reds = [told for told in trends if told.nights and told.nights[-1].red]
     named = [
         (
@@ -42,10 +42,13 @@ def summary(trends: Sequence[Told], maps: Sequence[ToldMap] = ()) -> str:
     every = len(trends) + len(maps)
     elsewhere = [line for told in trends for line in _red_elsewhere(told)]
     beside = "".join(f"\n! red when another machine was last asked: {line}" for line in elsewhere)
+    states = [told.nights[-1].state for told in trends if told.nights] + [told.state for told in maps]
+    recovered = states.count("recovered")
+    also = f"; {recovered} recovered" if recovered else ""
     if not named:
-        return click.style(f"✓ {every} series, none of them red tonight", fg="green") + beside
+        return click.style(f"✓ {every} series, none of them red tonight{also}", fg="green") + beside
     _, _, key, name = min(named, key=lambda one: one[:2])
-    words = f"✗ {len(named)} of {every} series red; the worst: {clean(key)}, {name}"
+    words = f"✗ {len(named)} of {every} series red; the worst: {clean(key)}, {name}{also}"
     return click.style(words, fg="red", bold=True) + beside
 
 
@@ -88,11 +91,15 @@ def map_lines(maps: Sequence[ToldMap]) -> list[str]:
     """What became of each stability map, a line each."""
     return [
         clean(
-            f"{CLASSES[told.stands][0]} {told.key}: {told.verdict.name or spaced(told.verdict.word)}; "
+            f"{CLASSES[told.stands][0]} {told.key}: {_map_word(told)}; "
             f"{told.verdict.sentence}" + (f"; {blame(told.bad, told.good)}" if told.verdict.red else "")
         )
         for told in maps
     ]
+
+
+def _map_word(told: ToldMap) -> str:
+    return "recovered" if told.state == "recovered" else told.verdict.name or spaced(told.verdict.word)
 
 
 def trend_lines(told: Told, last: int = 10) -> list[str]:

@@ -19,10 +19,10 @@ from spook_tracker.tracker.judge.series_history import Judged, Told, blame
 from spook_tracker.tracker.judge.standing import expected
 from spook_tracker.tracker.judge.tonight import Finding
 from spook_tracker.tracker.judge.verdict import badness, limit_ratio
-from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class
+from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, OPEN, Class
 
-Standing = Literal["detected", "accepted", "fixed", "recovered"]
-STANDINGS: tuple[Standing, ...] = ("detected", "accepted", "recovered", "fixed")  # the worst first
+Standing = Literal["detected", "accepted", "recovered"]
+STANDINGS: tuple[Standing, ...] = ("detected", "accepted", "recovered")  # the worst first
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -175,15 +175,15 @@ def _hits_in(told: Told, nights: Sequence[Judged], over: Judged | None) -> list[
             elif judged.worse_at is not last:  # one more night tells better where it began
                 found[-1] = replace(_hit(told.key, told.definition, judged), told=found[-1].told)
             last = judged.worse_at
-        elif judged.state == "suspected":
+        elif judged.state in OPEN:
             continue
         elif judged.state == "accepted" and open_from == len(found):
             found.append(_hit(told.key, told.definition, judged, "accepted"))
             open_from = len(found)
         elif open_from < len(found):
-            end = judged.night.run
+            ended: Standing = "accepted" if judged.state == "accepted" else "recovered"
             found[open_from:] = [
-                replace(hit, standing=_ended(hit, judged), end=end) for hit in found[open_from:]
+                replace(hit, standing=ended, end=judged.night.run) for hit in found[open_from:]
             ]
             open_from = len(found)
     if over is not None:
@@ -191,13 +191,6 @@ def _hits_in(told: Told, nights: Sequence[Judged], over: Judged | None) -> list[
             replace(hit, standing="recovered", end=over.night.run) for hit in found[open_from:]
         ]
     return found
-
-
-def _ended(hit: Hit, judged: Judged) -> Standing:
-    """Fixed is a limit that holds again, or a value that is there again; recovered is back at its level."""
-    if judged.state == "accepted":
-        return "accepted"
-    return "fixed" if hit.stands == "fail" else "recovered"
 
 
 def _hit(key: str, definition: SeriesDefinition, judged: Judged, standing: Standing = "detected") -> Hit:

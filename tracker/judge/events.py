@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from spook_tracker.tracker.document.run_document import SeriesDefinition
 from spook_tracker.tracker.judge.series_history import Judged, Told
-from spook_tracker.tracker.judge.vocabulary import Class, Word
+from spook_tracker.tracker.judge.vocabulary import OPEN, Class, Word
 
 Standing = Literal["detected", "accepted", "recovered"]
 
@@ -65,7 +65,7 @@ def _events_in(told: Told, nights: Sequence[Judged], over: Judged | None) -> lis
     for judged in nights:
         if judged.red:
             stretch.append(judged)
-        elif stretch and judged.state != "suspected":
+        elif stretch and judged.state not in OPEN:
             standing: Standing = "accepted" if judged.state == "accepted" else "recovered"
             found.append(_event(told, stretch, standing, judged))
             stretch = []

@@ -53,6 +53,8 @@ def calm_nights(definition: SeriesDefinition, nights: Sequence[Judged]) -> Seque
             ),
         )
         if night.red or night.verdict.red
+        else msgspec.structs.replace(night, state="green")
+        if night.state == "recovered"
         else night
         for night in nights
     ]

@@ -18,7 +18,7 @@ from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.lane import Records, asked_for, is_placed
 from spook_tracker.tracker.judge.series_history import night_of
 from spook_tracker.tracker.judge.verdict import Verdict, judge_map
-from spook_tracker.tracker.judge.vocabulary import Class
+from spook_tracker.tracker.judge.vocabulary import Class, State
 from spook_tracker.tracker.judge.work import FAMILIES
 
 NO_MAP = Verdict(word="missing", sentence="a stability map asked for and not answered", name="missing")
@@ -38,6 +38,7 @@ class ToldMap:
     tonight: bool  # whether the newest run tells of it: holds it, or was asked for it
     news: bool  # whether `bad` is the newest run
     gone: bool = False  # asked for and not answered, given up or not
+    back: bool = False  # held again by the newest run, after runs that had lost it
 
     @property
     def key(self) -> str:
@@ -46,6 +47,12 @@ class ToldMap:
     @property
     def stands(self) -> Class:
         return stands_of(self.verdict)
+
+    @property
+    def state(self) -> State:
+        if self.verdict.red:
+            return "detected"
+        return "accepted" if self.gone else "recovered" if self.back else "green"
 
 
 def map_key(stability_map: MapData) -> str:
@@ -103,14 +110,13 @@ def _told(
     last, tonight = len(line) - 1, line[-1]
     place, run, newest = lane[0]
     key = map_key(newest)
-    without = (
-        i
-        for i in range(place + 1, last + 1)
-        if _floats(line[i]) == _floats(run)
-        and i > blind.get((key, _kind(line[i])), -1)
-        and asked(i, newest.test)
-    )
-    lost = next(without, None)
+
+    def first_without(start: int, end: int) -> int | None:
+        of_floats = (i for i in range(start, end) if _floats(line[i]) == _floats(run))
+        seeing = (i for i in of_floats if i > blind.get((key, _kind(line[i])), -1))
+        return next((i for i in seeing if asked(i, newest.test)), None)
+
+    lost = first_without(place + 1, last + 1)
     if lost is not None:
         gone = acceptance(accepted, key, math.nan, night_of(tonight), removed=True)
         return ToldMap(
@@ -124,7 +130,7 @@ def _told(
         )
     if len(lane) < 2:
         return None
-    _, before, older = lane[1]
+    earlier, before, older = lane[1]
     return ToldMap(
         newest=newest,
         verdict=judge_map(older, newest),
@@ -132,6 +138,7 @@ def _told(
         bad=run,
         tonight=place == last,
         news=place == last,
+        back=place == last and first_without(earlier + 1, place) is not None,
     )
 
 

@@ -35,7 +35,7 @@ from spook_tracker.tracker.judge.segments import Segment, boundary, inner_split,
 from spook_tracker.tracker.judge.shifts import BASE, FEWEST_BASE, RARE, SPANS, Shift, remembered, shift
 from spook_tracker.tracker.judge.slower import LEAST, Usual, change_in_words, slower
 from spook_tracker.tracker.judge.verdict import Verdict
-from spook_tracker.tracker.judge.vocabulary import State
+from spook_tracker.tracker.judge.vocabulary import State, with_recoveries
 
 MENDED = 0.25  # of its size: a red level that is left of it is none
 SETTLED = 30  # nights of a segment after which its boundary is known
@@ -94,7 +94,8 @@ def judged_and_segments(
     for place in range(len(values)):
         night = walk.night(place, bool(releases and releases[place]), bool(accepted and accepted[place]))
         told.append(night._replace(usual=walk.held_to()))
-    return told, walk.segments()
+    states = with_recoveries(night.state for night in told)
+    return [night._replace(state=state) for night, state in zip(told, states, strict=True)], walk.segments()
 
 
 @dataclass
@@ -130,6 +131,7 @@ class _Walk(PresentLevel):
         if not self._number(place):
             return self._no_value(place, accepted)
         change = self._worse_by(level, value)
+        self.broken = False
         self._see(place, change, threshold)
         found = self._begins()
         if found is not None:
@@ -297,7 +299,7 @@ class _Walk(PresentLevel):
             better = replace(better, sentence=f"{words}, inside the noise")
         return Noisy(
             verdict=better,
-            state="recovered" if was == "red" else "green",
+            state="green",
             against=before[-1],
             levels=(held.level, level),
         )
@@ -348,7 +350,6 @@ class _Walk(PresentLevel):
         self._settle()
         self._split_inside()
         fast = bool(self.off) and self.better
-        back, self.broken = self.broken and not self._red, False
         if self.now.standing == "red":
             return self._mended() or self._red_night(news=False)
         if self.now.standing == "flaky":
@@ -371,14 +372,13 @@ class _Walk(PresentLevel):
                 return self._drifted(old, recent, news=False)
             verdict = slower(change, level, self.values[place], "")
             return Noisy(verdict=verdict, state="suspected", against=good, levels=(level, self.values[place]))
-        state: State = "recovered" if back or was else "green"
         words = change_in_words(change)
         verdict = (
             Verdict(word="improved", sentence=words)
             if fast
             else Verdict(word="same", sentence=f"{words}, inside the noise")
         )
-        return Noisy(verdict=verdict, state=state, against=good, levels=(level, self.values[place]))
+        return Noisy(verdict=verdict, state="green", against=good, levels=(level, self.values[place]))
 
     def _red_night(self, news: bool, words: str = "") -> Noisy:
         assert self.reference is not None and self.now.where is not None and self.first is not None
@@ -405,7 +405,7 @@ class _Walk(PresentLevel):
         good = self.reference.last
         self.reference, self.first, self.now.standing = None, None, "recovered"
         verdict = Verdict(word="same", sentence=f"{change_in_words(change)}, inside the noise")
-        return Noisy(verdict=verdict, state="recovered", against=good, levels=(held, level))
+        return Noisy(verdict=verdict, state="green", against=good, levels=(held, level))
 
     def _flaky_night(self, level: float) -> Noisy:
         assert self.reference is not None

@@ -29,12 +29,12 @@ from spook_tracker.tracker.judge.calibration import engines_own, taken_again, un
 from spook_tracker.tracker.judge.explaining import calm_nights
 from spook_tracker.tracker.judge.lane import looked_at_again
 from spook_tracker.tracker.judge.lent import walk_with
-from spook_tracker.tracker.judge.run_times import judged_and_segments
+from spook_tracker.tracker.judge.run_times import Noisy, judged_and_segments
 from spook_tracker.tracker.judge.segments import Segment
 from spook_tracker.tracker.judge.slower import Usual, by_outcome, only_followed
 from spook_tracker.tracker.judge.standing import NO_VALUE, standing
 from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict, judge, same_bits
-from spook_tracker.tracker.judge.vocabulary import Class, State
+from spook_tracker.tracker.judge.vocabulary import Class, State, with_recoveries
 
 RELEASE = re.compile(r"v?\d+(\.\d+)*")
 NOISY_NIGHTS = 400  # how far back run times are judged again night by night
@@ -77,8 +77,8 @@ class Judged(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def pair(self) -> tuple[Number | None, Number]:
-        """What is printed beside the sentence: the value before and now, of red run times their levels."""
-        if self.red and self.levels is not None:
+        """What is printed beside the sentence: the value before and now, of run times red or recovered their levels."""
+        if self.state in ("detected", "recovered") and self.levels is not None:
             return Number(self.levels[0]), Number(self.levels[1])
         return None if self.against is None else self.against.sample.value, self.night.sample.value
 
@@ -257,7 +257,7 @@ def _judge_values(
         own = standing(definition, night.sample)
         if own == "none":  # the engine cannot be asked this: nothing became of the level that holds
             unasked = Verdict(word="not_comparable", sentence="not supported by this engine")
-            yield Judged(night=night, verdict=unasked, state="green", stands=own)
+            yield Judged(night=night, verdict=unasked, state="unjudged", stands=own)
             calm = None
             continue
         broken = own in ("fail", "watch")
@@ -417,6 +417,12 @@ def _why_not(before: Point, after: Point) -> str:
     return "measured in another float environment"
 
 
+def _only_followed(noisy: Noisy) -> Noisy:
+    if noisy.state not in ("detected", "suspected"):
+        return noisy
+    return noisy._replace(verdict=only_followed(noisy.verdict), state="green", first_bad=None, last_good=None)
+
+
 def _judge_times(
     key: str, definition: SeriesDefinition, history: Sequence[Point], accepted: Sequence[Accepted]
 ) -> list[Judged]:
@@ -430,7 +436,7 @@ def _judge_times(
         for place in (*sorted(set(every) - set(again)), *loud):
             own = standing(definition, history[place].sample)
             said = Verdict(word="not_comparable", sentence=loud[place]) if place in loud else old
-            found[place] = Judged(night=history[place], verdict=said, state="green", stands=own)
+            found[place] = Judged(night=history[place], verdict=said, state="unjudged", stands=own)
         places = [place for place in again if place not in loud]
         lane = [history[place] for place in places]
         values = engines_own(lane)
@@ -451,12 +457,14 @@ def _judge_times(
         )
         verdicts, segments = walk_with(walk, taken, [night_of(night.run) for night in lane])
         level_of = {i: segment for segment in segments for i in range(segment.first, segment.last + 1)}
-        for i, noisy in enumerate(verdicts):
-            noisy = noisy._replace(verdict=by_outcome(noisy.verdict, lane[i].sample))
-            if noisy.state in ("detected", "suspected") and is_read_off(definition):
-                noisy = noisy._replace(
-                    verdict=only_followed(noisy.verdict), state="green", first_bad=None, last_good=None
-                )
+        verdicts = [
+            noisy._replace(verdict=by_outcome(noisy.verdict, night.sample))
+            for noisy, night in zip(verdicts, lane, strict=True)
+        ]
+        if is_read_off(definition):
+            verdicts = list(map(_only_followed, verdicts))
+        states = with_recoveries(noisy.state for noisy in verdicts)
+        for i, (noisy, state) in enumerate(zip(verdicts, states, strict=True)):
             if more := taken_again(lane[i]):
                 noisy = noisy._replace(
                     verdict=replace(noisy.verdict, sentence=f"{noisy.verdict.sentence}{more}")
@@ -470,7 +478,7 @@ def _judge_times(
             found[places[i]] = Judged(
                 night=lane[i],
                 verdict=noisy.verdict,
-                state=noisy.state,
+                state=state,
                 stands=red_class(own, lane[i].sample) if noisy.state == "detected" else stands,
                 against=lane[noisy.against] if noisy.against is not None else None,
                 first_bad=first,

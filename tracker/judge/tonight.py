@@ -22,7 +22,7 @@ from spook_tracker.tracker.judge.series_history import (
     judge_all,
 )
 from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict
-from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class
+from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class, State
 
 MOST_NAMED = 8  # tests in one sentence
 HOW_TO_COMPARE = (
@@ -44,11 +44,17 @@ class Finding:
     news: bool = True  # red for a reason of tonight, not only still red
     good: Any = None  # of a map: the run it is compared with
     bad: Any = None  # of a map: the run it is of, or the first that has lost it
+    state: State  # red, accepted, recovered …
 
     @property
     def name(self) -> str:
         """What happened, in a word or two."""
         return name_of(self.judged) if self.judged else self.verdict.name or self.verdict.word
+
+    @property
+    def recovered(self) -> bool:
+        """Red at the last verdict, and no longer."""
+        return self.state == "recovered"
 
     @property
     def stands(self) -> Class:
@@ -102,6 +108,7 @@ def _of_map(told: ToldMap) -> Finding:
         news=told.news,
         good=told.good,
         bad=told.bad,
+        state=told.state,
     )
 
 
@@ -121,6 +128,7 @@ def of_run(told: Mapping[str, Told], run_id: str) -> list[Finding]:
                 verdict=judged.verdict,
                 red=judged.red,
                 news=judged.news,
+                state=judged.state,
             )
         )
     return worst_first(beside_findings(findings))

@@ -6,6 +6,7 @@ here the word, its mark, whether it is red and how bad it is.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Literal
 
@@ -27,7 +28,8 @@ Word = Literal[
 ]
 Class = Literal["fail", "watch", "accepted", "none", "pass", "followed"]
 Overall = Literal["regressed", "not_comparable", "same", "identical"]  # of two versions compared
-State = Literal["green", "detected", "accepted", "recovered", "suspected"]
+State = Literal["green", "detected", "accepted", "recovered", "suspected", "unjudged"]
+OPEN: tuple[State, ...] = ("suspected", "unjudged")  # states that say of a red series nothing new
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +99,18 @@ STATES: dict[State, str] = {
     "accepted": "! accepted",
     "recovered": "✓ recovered",
     "suspected": "? suspected",
+    "unjudged": "",
 }
+
+
+def with_recoveries(states: Iterable[State]) -> Iterator[State]:
+    """The states of a series, night after night, its first night after a red stretch recovered, and no other."""
+    red = False
+    for state in states:
+        if state in ("green", "recovered"):
+            state = "recovered" if red else "green"
+        yield state
+        red = state == "detected" or (red and state in OPEN)
 
 
 def spaced(word: str) -> str:

@@ -28,8 +28,8 @@ from spook_tracker.tracker.website.motions import SEEN, apart
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory
 from spook_tracker.tracker.website.page_rows import address
 
-SAID = {"detected": "RED", "accepted": "ACCEPTED", "fixed": "FIXED", "recovered": "RECOVERED"}
-SIGN: dict[str, Class] = {"accepted": "accepted", "fixed": "pass", "recovered": "pass"}
+SAID = {"detected": "RED", "accepted": "ACCEPTED", "recovered": "RECOVERED"}
+SIGN: dict[str, Class] = {"accepted": "accepted", "recovered": "pass"}
 
 
 @dataclass

@@ -36,6 +36,12 @@ def counted(book: Book) -> Count:
     return count_points((t.definition, t.told.nights[-1].night) for t in tonight(book))
 
 
+def recovered(book: Book) -> int:
+    """How many series and stability maps were red at their last verdict and no longer are."""
+    maps = [told.state for test in book.tests for told in test.told_maps if told.tonight]
+    return [*(t.told.nights[-1].state for t in tonight(book)), *maps].count("recovered")
+
+
 def health(book: Book) -> tuple[Class, Count]:
     """What the newest night stands for, and how many limits and set points hold."""
     found = counted(book)
@@ -86,7 +92,7 @@ def lead(book: Book, causes: Sequence[Cause]) -> dict[str, Any]:
         "old": old[:MOST_OLD],
         "old_left_out": max(0, len(old) - MOST_OLD),
         "most_tests": MOST_TESTS,
-        "blamed": _blamed(new, old),
+        "blamed": _blamed(new, old, recovered(book)),
     }
 
 
@@ -172,8 +178,8 @@ def summary(book: Book) -> str:
     return " ".join(parts)
 
 
-def _blamed(new: Sequence[ToldCause], old: Sequence[ToldCause]) -> str:
-    """How many causes there are, new apart from old."""
+def _blamed(new: Sequence[ToldCause], old: Sequence[ToldCause], recovered: int) -> str:
+    """How many causes there are, new apart from old, and how many series recovered tonight."""
     parts = []
     if new:
         parts.append(_worsened(new))
@@ -185,6 +191,8 @@ def _blamed(new: Sequence[ToldCause], old: Sequence[ToldCause]) -> str:
             if len(old) == 1
             else f"{len(old)} earlier causes are still red."
         )
+    if recovered:
+        parts.append("One series recovered." if recovered == 1 else f"{recovered} series recovered.")
     return " ".join(parts)
 
 
