@@ -88,8 +88,8 @@ MUTANTS = (
     mutant("contradiction-is-fine", "vocabulary", '"non_deterministic": Said("✗", red=True)', '"non_deterministic": Said("✗")'),
     mutant("dirty-is-clean", "compare", 'clean = before.git_hash != "" and not before.dirty and not after.dirty', 'clean = before.git_hash != ""'),
     mutant("any-commit-is-the-same", "compare", "return clean and (before.engine", "return clean or (before.engine"),
-    mutant("history-dirty-is-clean", "series_history", 'clean = old.git_hash != "" and not old.dirty and not new.dirty', 'clean = old.git_hash != ""'),
-    mutant("history-any-commit-is-the-same", "series_history", "return clean and (old.name", "return clean or (old.name"),
+    mutant("history-dirty-is-clean", "judged", 'clean = old.git_hash != "" and not old.dirty and not new.dirty', 'clean = old.git_hash != ""'),
+    mutant("history-any-commit-is-the-same", "judged", "return clean and (old.name", "return clean or (old.name"),
 )  # fmt: skip
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
-from spook_tracker.tracker.judge.series_history import commit_of
+from spook_tracker.tracker.judge.judged import commit_of
 from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.website.publish import publish
 from tests.browser import LIVE, SEEN, arrive, look, wait_for

@@ -12,7 +12,8 @@ import pytest
 
 from spook_tracker.tracker.judge.accepted import Accepted, AcceptedError, acceptance, read_accepted, unused
 from spook_tracker.tracker.judge.compare import compare
-from spook_tracker.tracker.judge.series_history import judge_history, night_of
+from spook_tracker.tracker.judge.judged import night_of
+from spook_tracker.tracker.judge.series_history import judge_history
 from tests.test_tracker_analyse import SERIES, history
 
 ENTRY = """

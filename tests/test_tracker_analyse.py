@@ -20,7 +20,7 @@ from spook_tracker.tracker.document.run_document import (
     SeriesHistory,
     Timing,
 )
-from spook_tracker.tracker.judge import series_history
+from spook_tracker.tracker.judge import exact_values
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.lane import run_times
 from spook_tracker.tracker.judge.maps import map_key
@@ -280,7 +280,7 @@ def test_nights_between_equal_nights_are_judged_without_a_look_and_alike(monkeyp
     values = [*([0.01] * 50), 0.02, *([0.01] * 50)]
     nights = history(*values, releases=(0, 20))
     short = judge_history("t/c/m", SERIES, nights)
-    monkeypatch.setattr(series_history, "_repeats", lambda before, after: False)
+    monkeypatch.setattr(exact_values, "_repeats", lambda before, after: False)
 
     assert judge_history("t/c/m", SERIES, nights) == short
 

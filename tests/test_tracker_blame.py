@@ -12,8 +12,9 @@ from spook_tracker.tracker.document.run_document import SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted, unused
 from spook_tracker.tracker.judge.compare import ComparedRun, compare, known
 from spook_tracker.tracker.judge.comparison_document import Side
+from spook_tracker.tracker.judge.judged import blame
 from spook_tracker.tracker.judge.lane import histories, line_of
-from spook_tracker.tracker.judge.series_history import blame, judge_all, judge_history
+from spook_tracker.tracker.judge.series_history import judge_all, judge_history
 from spook_tracker.tracker.judge.standing import Count, count
 from spook_tracker.tracker.judge.tonight import tonight
 from tests.synthetic_history import DocumentHistory
@@ -133,6 +134,6 @@ def test_what_an_engine_cannot_be_asked_is_never_red_and_hides_no_regression() -
     )
     told = judge_history("t/c/m", SERIES, [nights[0], nights[1]._replace(sample=lost), nights[2]])
 
-    assert states(told) == ["green", "green", "detected"]
+    assert states(told) == ["green", "unjudged", "detected"]
     assert told[1].stands == "none"
     assert count([(SERIES, lost)]) == Count()

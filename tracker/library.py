@@ -159,7 +159,7 @@ def idle_entries(
 ) -> list[str]:
     """A sentence for each entry of accepted.toml that does nothing to this run's findings."""
     from spook_tracker.tracker.judge.accepted import unused
-    from spook_tracker.tracker.judge.series_history import night_of
+    from spook_tracker.tracker.judge.judged import night_of
 
     names = {finding.series for finding in findings} | set(history.series_keys())
     held = {f.series for f in findings if not f.red and f.verdict.word != "expected"}

@@ -14,7 +14,7 @@ from spook_tracker.tracker.document.json_form import Number, readable
 from spook_tracker.tracker.judge.causes import causes_tonight
 from spook_tracker.tracker.judge.choice import worst_change
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Frontier, Side
-from spook_tracker.tracker.judge.series_history import Judged
+from spook_tracker.tracker.judge.judged import Judged
 from spook_tracker.tracker.judge.tonight import Finding, not_compared
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import OVERALL, QUIET, WORDS, spaced

@@ -8,8 +8,9 @@ from typing import Any
 from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.tracker.cli.report_compare import accused
 from spook_tracker.tracker.document.json_form import Number, readable
+from spook_tracker.tracker.judge.judged import Judged
 from spook_tracker.tracker.judge.maps import ToldMap
-from spook_tracker.tracker.judge.series_history import Judged, Told
+from spook_tracker.tracker.judge.series_history import Told
 
 
 def trend_json(trends: Iterable[Told], maps: Iterable[ToldMap] = ()) -> str:

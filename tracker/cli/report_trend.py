@@ -11,16 +11,9 @@ from spook_tracker.tracker.cli.report_table import ROLES, limit, number
 from spook_tracker.tracker.document.run_document import Run, SeriesDefinition
 from spook_tracker.tracker.document.wording import day
 from spook_tracker.tracker.judge.events import name_of
+from spook_tracker.tracker.judge.judged import Judged, blame, commit_of
 from spook_tracker.tracker.judge.maps import ToldMap
-from spook_tracker.tracker.judge.series_history import (
-    Judged,
-    Told,
-    blame,
-    commit_of,
-    is_noisy,
-    lanes_of,
-    on_one_clock,
-)
+from spook_tracker.tracker.judge.series_history import Told, is_noisy, lanes_of, on_one_clock
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, STATES, spaced
 
 

@@ -15,7 +15,8 @@ from typing import Any, Literal
 from spook_tracker.tracker.document.run_document import SeriesDefinition
 from spook_tracker.tracker.document.wording import number, times
 from spook_tracker.tracker.judge.events import name_of
-from spook_tracker.tracker.judge.series_history import Judged, Told, blame
+from spook_tracker.tracker.judge.judged import Judged, blame
+from spook_tracker.tracker.judge.series_history import Told
 from spook_tracker.tracker.judge.standing import expected
 from spook_tracker.tracker.judge.tonight import Finding
 from spook_tracker.tracker.judge.verdict import badness, limit_ratio

@@ -19,6 +19,7 @@ from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.compare_ladders import frontiers, run_times
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Side
 from spook_tracker.tracker.judge.explaining import beside_run_times, calm
+from spook_tracker.tracker.judge.judged import Judged, red_class
 from spook_tracker.tracker.judge.known import Known, judged_in, known
 from spook_tracker.tracker.judge.lane import (
     Records,
@@ -30,13 +31,7 @@ from spook_tracker.tracker.judge.lane import (
     run_time_histories,
 )
 from spook_tracker.tracker.judge.maps import NO_MAP, map_key, stands_of
-from spook_tracker.tracker.judge.series_history import (
-    Judged,
-    Told,
-    is_read_off,
-    judge_all,
-    red_class,
-)
+from spook_tracker.tracker.judge.series_history import Told, is_read_off, judge_all
 from spook_tracker.tracker.judge.slower import Usual, judge_time, only_followed, to_be_confirmed
 from spook_tracker.tracker.judge.standing import FOLLOWED, NO_VALUE, honest, standing
 from spook_tracker.tracker.judge.tonight import not_compared

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from spook_tracker.tracker.document.run_document import SeriesDefinition
-from spook_tracker.tracker.judge.series_history import Judged, Told
+from spook_tracker.tracker.judge.judged import Judged
+from spook_tracker.tracker.judge.series_history import Told
 from spook_tracker.tracker.judge.vocabulary import OPEN, Class, Word
 
 Standing = Literal["detected", "accepted", "recovered"]

@@ -18,7 +18,7 @@ from spook_tracker.tracker.judge.calibration import geometric_mean
 from spook_tracker.tracker.judge.comparison_document import Change
 
 if TYPE_CHECKING:
-    from spook_tracker.tracker.judge.series_history import Judged
+    from spook_tracker.tracker.judge.judged import Judged
     from spook_tracker.tracker.judge.tonight import Finding
 
 EXPLAINING = "explaining"

@@ -6,7 +6,8 @@ import math
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 
-from spook_tracker.tracker.judge.series_history import Judged, Told, commit_of
+from spook_tracker.tracker.judge.judged import Judged, commit_of
+from spook_tracker.tracker.judge.series_history import Told
 from spook_tracker.tracker.judge.slower import Usual
 
 

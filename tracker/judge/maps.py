@@ -15,8 +15,8 @@ from typing import Any
 
 from spook_tracker.tracker.document.run_document import MapData
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
+from spook_tracker.tracker.judge.judged import night_of
 from spook_tracker.tracker.judge.lane import Records, asked_for, is_placed
-from spook_tracker.tracker.judge.series_history import night_of
 from spook_tracker.tracker.judge.verdict import Verdict, judge_map
 from spook_tracker.tracker.judge.vocabulary import Class, State
 from spook_tracker.tracker.judge.work import FAMILIES

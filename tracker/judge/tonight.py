@@ -11,16 +11,10 @@ from spook_tracker.tracker.document.run_document import SeriesDefinition
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.events import name_of
 from spook_tracker.tracker.judge.explaining import beside_findings
+from spook_tracker.tracker.judge.judged import Judged, blame, blame_of, commit_of
 from spook_tracker.tracker.judge.lane import Records, histories, line_of
 from spook_tracker.tracker.judge.maps import ToldMap, stands_of, told_maps
-from spook_tracker.tracker.judge.series_history import (
-    Judged,
-    Told,
-    blame,
-    blame_of,
-    commit_of,
-    judge_all,
-)
+from spook_tracker.tracker.judge.series_history import Told, judge_all
 from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class, State
 

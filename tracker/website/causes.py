@@ -21,8 +21,8 @@ from spook_tracker.tracker.document.wording import (
     version,
 )
 from spook_tracker.tracker.judge.causes import Cause, Hit, causes
+from spook_tracker.tracker.judge.judged import blame
 from spook_tracker.tracker.judge.maps import map_key
-from spook_tracker.tracker.judge.series_history import blame
 from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.motions import SEEN, apart
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory

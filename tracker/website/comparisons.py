@@ -27,10 +27,10 @@ from spook_tracker.tracker.document.wording import (
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.compare import ComparedRun, compare, side_of
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
+from spook_tracker.tracker.judge.judged import Judged, is_release
 from spook_tracker.tracker.judge.known import judged_in, known_of
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
 from spook_tracker.tracker.judge.maps import may_be_dropped
-from spook_tracker.tracker.judge.series_history import Judged, is_release
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, QUIET, WORD_RANK, spaced
 from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.website.folder import digest

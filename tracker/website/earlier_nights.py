@@ -11,7 +11,7 @@ from datetime import datetime, timedelta
 from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.document.wording import day, instant, version
-from spook_tracker.tracker.judge.series_history import is_release
+from spook_tracker.tracker.judge.judged import is_release
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.website.nights import Night

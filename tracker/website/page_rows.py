@@ -22,7 +22,7 @@ from spook_tracker.tracker.document.wording import (
     seconds,
     slug,
 )
-from spook_tracker.tracker.judge.series_history import blame
+from spook_tracker.tracker.judge.judged import blame
 from spook_tracker.tracker.judge.standing import expected
 from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.events import Event
