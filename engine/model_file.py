@@ -72,5 +72,6 @@ class ModelRun:
     timed: bool = False
     accurate: bool = False  # the engine's most accurate setting in place of the file's
     conservative: bool = False  # without all that takes or gives energy but gravity and springs
+    swing: float = 0.0  # rad/s and m/s: conservative, without equality constraints, joints started by up to that at random
     gain: float = 1.0  # times the file's own, of its servos
     elsewhere: bool = False  # in a process of its own

@@ -40,8 +40,6 @@ def prepare(
     observe: Mapping[str, Observable] = NOTHING,
 ) -> Prepared:
     """Compile a scene for `duration` [s] or a number of `steps`, exactly one of them; see `simulate`."""
-    if isinstance(scene, ModelRun):
-        raise NotSupported(f"spook reads no {scene.model.format} yet")
     program = compile(scene, time_step=time_step, method=method, observe=observe)
     if (duration is None) == (steps is None):
         raise MethodError("give either a duration or a number of steps")
@@ -76,7 +74,25 @@ def simulate(
     A duration that is no whole number of time steps [s] is rounded to the nearest. `time_limit` is wall time
     [s]. Raises SceneError or MethodError with one sentence; a run that diverges is a Result that says so.
     """
+    if isinstance(scene, ModelRun):
+        return _of_model(scene, time_step, duration, method, time_limit)
     prepared = prepare(
         scene, time_step=time_step, duration=duration, steps=steps, method=method, observe=observe
     )
     return prepared.run(time_limit, time_stages)
+
+
+def _of_model(
+    asked: ModelRun, time_step: float, duration: float | None, method: Method, time_limit: float | None
+) -> Result:
+    """A model file as a scene, where MuJoCo is installed to read it."""
+    try:
+        from spook_tracker.engine.peers.spook_file import READS, run_model
+    except ImportError as error:
+        raise NotSupported(
+            f"spook reads model files by MuJoCo's parser, which is not installed ({error}); "
+            "install it with: pip install 'spook-tracker[mujoco]'"
+        ) from None
+    if asked.model.format not in READS:
+        raise NotSupported(f"spook reads no {asked.model.format}")
+    return run_model(asked, time_step, duration or 0.0, time_limit, method)

@@ -127,10 +127,12 @@ def test_the_settings_file_puts_its_models_among_the_questions(
     assert "other" in alone.output and "pendulum" not in alone.output
 
 
-def test_an_engine_that_reads_no_such_file_says_so(ball: Path) -> None:
-    ran = CliRunner().invoke(main, ["run", "--model", str(ball), "--no-record", "--workers", "0", "--all"])
+def test_an_engine_that_reads_no_such_file_says_so(tmp_path: Path) -> None:
+    file = tmp_path / "ball.sdf"
+    file.write_text('<sdf version="1.9"><model name="m"><link name="ball"/></model></sdf>')
+    ran = CliRunner().invoke(main, ["run", "--model", str(file), "--no-record", "--workers", "0", "--all"])
 
-    assert "spook reads no MJCF" in ran.output
+    assert "spook reads no SDF" in ran.output
     assert ran.exit_code == 2  # neither green nor red: nothing was measured
 
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import mujoco
 import numpy as np
+import numpy.typing as npt
 
 from spook_tracker.engine.model_file import Drive, ModelRun, Watched
 from spook_tracker.engine.peers.model_loop import Array, LoadedModel, elsewhere
@@ -62,6 +63,51 @@ def _line(error: Exception) -> str:
     return " ".join(str(error).split())[:240]
 
 
+def start_at(run: ModelRun, model: Any, data: Any) -> None:
+    """Put the model at its keyframe, by name or number, or as the file describes it; a swing gets its speeds."""
+    if keyframe := run.model.keyframe:
+        found = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_KEY, keyframe))
+        if found < 0 and keyframe.isdigit():
+            found = int(keyframe)
+        if not 0 <= found < model.nkey:
+            raise NotSupported(f"the model has no keyframe {keyframe!r}")
+        mujoco.mj_resetDataKeyframe(model, data, found)
+    if run.swing:
+        model.opt.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_EQUALITY)
+        data.qvel[:] = run.swing * np.random.default_rng(run.seed).uniform(-1.0, 1.0, model.nv)
+    mujoco.mj_forward(model, data)
+
+
+def bodies_of(run: ModelRun, model: Any) -> npt.NDArray[np.int64]:
+    """MuJoCo's numbers of the watched bodies."""
+    return np.array([_body(run, model, one) for one in run.model.watched], dtype=int)
+
+
+def _body(run: ModelRun, model: Any, watched: Watched) -> int:
+    found = 0
+    if watched.name:
+        found = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, watched.name))
+    for place in watched.path:
+        children = np.flatnonzero(np.asarray(model.body_parentid) == found)
+        children = children[children > 0]
+        found = int(children[place]) if found >= 0 and place < len(children) else -1
+    if found < 0:
+        raise NotSupported(f"mujoco finds no body {watched.label!r} in {Path(run.model.path).name}")
+    return found
+
+
+def size_of(run: ModelRun, model: Any, data: Any) -> float:
+    """Of what moves: how far its geoms reach from their middle, twice; its bodies where it has no geoms [m]."""
+    weld = np.asarray(model.body_weldid)
+    geoms = np.flatnonzero(weld[np.asarray(model.geom_bodyid)] != 0)
+    places = data.geom_xpos[geoms] if len(geoms) else data.xpos[weld != 0]
+    reach = np.asarray(model.geom_rbound)[geoms] if len(geoms) else np.zeros(len(places))
+    if not len(places):
+        raise NotSupported(f"nothing in {Path(run.model.path).name} moves")
+    size = 2.0 * float(np.max(np.linalg.norm(places - places.mean(axis=0), axis=1) + reach))
+    return size if np.isfinite(size) and size > 0.0 else float(model.stat.extent)
+
+
 class _Simulation(LoadedModel):
     """One model with its data."""
 
@@ -69,47 +115,15 @@ class _Simulation(LoadedModel):
         super().__init__(run, time_step, time_limit)
         self.model = model
         model.opt.timestep = time_step
+        stiffen(model, run.gain)
         _set(model, run)
         self.data = mujoco.MjData(model)
-        if run.model.keyframe:
-            mujoco.mj_resetDataKeyframe(model, self.data, self._key(run.model.keyframe))
-        self.bodies = np.array([self._body(one) for one in run.model.watched], dtype=int)
-        mujoco.mj_forward(model, self.data)
+        start_at(run, model, self.data)
+        self.bodies = bodies_of(run, model)
         self.moving = np.flatnonzero(np.asarray(model.body_weldid) != 0)
-        self.size, self.freedom = self._size(), model.nv
-        self.drive = _driven(run.model.drive, model, self.data)
+        self.size, self.freedom = size_of(run, model, self.data), model.nv
+        self.drive = driven(run.model.drive, model, self.data)
         self.varies = self.drive.varies
-
-    def _key(self, name: str) -> int:
-        found = int(mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_KEY, name))
-        if found < 0 and name.isdigit():
-            found = int(name)
-        if not 0 <= found < self.model.nkey:
-            raise NotSupported(f"the model has no keyframe {name!r}")
-        return found
-
-    def _body(self, watched: Watched) -> int:
-        found = 0
-        if watched.name:
-            found = int(mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, watched.name))
-        for place in watched.path:
-            children = np.flatnonzero(np.asarray(self.model.body_parentid) == found)
-            children = children[children > 0]
-            found = int(children[place]) if found >= 0 and place < len(children) else -1
-        if found < 0:
-            raise NotSupported(f"mujoco finds no body {watched.label!r} in {Path(self.run.model.path).name}")
-        return found
-
-    def _size(self) -> float:
-        """Of what moves: how far its geoms reach from their middle, twice; its bodies where it has no geoms [m]."""
-        m, d = self.model, self.data
-        geoms = np.flatnonzero(np.asarray(m.body_weldid)[np.asarray(m.geom_bodyid)] != 0)
-        places = d.geom_xpos[geoms] if len(geoms) else d.xpos[self.moving]
-        reach = np.asarray(m.geom_rbound)[geoms] if len(geoms) else np.zeros(len(places))
-        if not len(places):
-            raise NotSupported(f"nothing in {Path(self.run.model.path).name} moves")
-        size = 2.0 * float(np.max(np.linalg.norm(places - places.mean(axis=0), axis=1) + reach))
-        return size if np.isfinite(size) and size > 0.0 else float(m.stat.extent)
 
     def take(self, count: int) -> None:
         mujoco.mj_step(self.model, self.data, count)
@@ -195,19 +209,24 @@ class _Simulation(LoadedModel):
         return overlap, held / (strength * float(np.asarray(m.body_mass)[self.moving].sum()))
 
 
+def stiffen(model: Any, gain: float) -> None:
+    """Give the position servos so many times their own gains."""
+    if gain == 1.0:
+        return
+    servos = _servos(model)
+    if not servos.any():
+        raise NotSupported("the model has no position servos")
+    model.actuator_gainprm[servos, 0] *= gain
+    model.actuator_biasprm[servos, 1:3] *= gain
+
+
 def _set(model: Any, run: ModelRun) -> None:
     """The settings of a run that are not the file's."""
     if run.accurate:
         model.opt.integrator = mujoco.mjtIntegrator.mjINT_RK4
         model.opt.tolerance = min(1e-12, model.opt.tolerance)
         model.opt.iterations = max(200, model.opt.iterations)
-    if run.gain != 1.0:
-        servos = _servos(model)
-        if not servos.any():
-            raise NotSupported("the model has no position servos")
-        model.actuator_gainprm[servos, 0] *= run.gain
-        model.actuator_biasprm[servos, 1:3] *= run.gain
-    if run.conservative:
+    if run.conservative or run.swing:
         off = mujoco.mjtDisableBit
         model.opt.disableflags |= int(off.mjDSBL_CONTACT) | int(off.mjDSBL_LIMIT) | int(off.mjDSBL_ACTUATION)
         model.opt.disableflags |= int(off.mjDSBL_FRICTIONLOSS)
@@ -223,7 +242,7 @@ def _servos(model: Any) -> Any:
     return (gain > 0.0) & np.isclose(gain, -bias)
 
 
-class _Driven:
+class Driven:
     """The controls over time."""
 
     def __init__(self, drive: Drive, count: int, function: Callable[[float, int], Any] | None) -> None:
@@ -233,6 +252,7 @@ class _Driven:
         self.times, self.values = rows[:, 0], rows[:, 1:]
 
     def apply(self, data: Any) -> None:
+        """Set the controls for the step that begins at `data.time`."""
         if not self.varies:
             return
         if self.function is not None:
@@ -244,7 +264,8 @@ class _Driven:
             data.ctrl[:] = self.values[place] if place >= 0 else 0.0
 
 
-def _driven(drive: Drive, model: Any, data: Any) -> _Driven:
+def driven(drive: Drive, model: Any, data: Any) -> Driven:
+    """What sets the controls; those that are held are set at once. NotSupported says what does not fit the model."""
     if drive.kind == "table" and drive.rows and len(drive.rows[0]) != model.nu + 1:
         raise NotSupported(f"the table has {len(drive.rows[0]) - 1} controls and the model {model.nu}")
     function = None
@@ -253,7 +274,7 @@ def _driven(drive: Drive, model: Any, data: Any) -> _Driven:
         function = getattr(import_module(module), name)
     if drive.kind == "hold":
         data.ctrl[:] = holding(model, data)
-    return _Driven(drive, model.nu, function)
+    return Driven(drive, model.nu, function)
 
 
 def holding(model: Any, data: Any) -> Array:

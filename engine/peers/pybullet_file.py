@@ -29,6 +29,7 @@ def run_model(run: ModelRun, time_step: float, duration: float, time_limit: floa
         run.model.drive.kind != "zero"
         or run.model.keyframe
         or run.conservative
+        or run.swing
         or run.accurate
         or run.gain != 1.0
     ):

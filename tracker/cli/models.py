@@ -15,9 +15,12 @@ WORDS = {"model": "·", "runs": "✓", "part": "-", "refused": "✗", "fails": "
 @click.command("models", epilog=example("tracker models gymnasium --engine mujoco"))
 @click.argument("package", metavar="PACKAGE|DIR")
 @click.option("--engine", metavar="NAME", help="Also load each in this engine and take ten steps.")
+@click.option(
+    "--agree", is_flag=True, help="Also compare its swing, without contacts and losses, with MuJoCo's."
+)
 @click.option("--all", "everything", is_flag=True, help="Also list files that are parts of others.")
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1, 256))
-def models_command(package: str, engine: str | None, everything: bool, workers: int) -> None:
+def models_command(package: str, engine: str | None, agree: bool, everything: bool, workers: int) -> None:
     """List the MJCF, URDF and SDF files of an installed package, and say which are models and which load."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.measure.model_packages import files_of, loaded, looked_at
@@ -28,19 +31,36 @@ def models_command(package: str, engine: str | None, everything: bool, workers: 
         return
     common = _common(paths)
     found: list[Any] = []
-    for looked in loaded(paths, engine, workers) if engine else map(looked_at, paths):
+    if agree and engine is None:
+        raise click.UsageError("--agree compares an engine with MuJoCo; say which with --engine")
+    for looked in loaded(paths, engine, workers, agree) if engine else map(looked_at, paths):
         found.append(looked)
         if looked.word == "part" and not everything:
             continue
         name = str(looked.path.relative_to(common))
         what = f"{looked.format}, {looked.bodies} bodies, {looked.files} files" if looked.format else ""
-        say(
-            f"{WORDS[looked.word]} {name:<44} {what:<28} {looked.sentence.replace(f'{common}/', '')}".rstrip()
-        )
+        sentence = looked.sentence.replace(f"{common}/", "")
+        say(f"{WORDS[looked.word]} {name:<44} {what:<28} {_swing(looked)}{sentence}".rstrip())
     counts = Counter(looked.word for looked in found)
     say(
         f"{len(found)} files: {', '.join(f'{count} {word}' for word, count in counts.most_common())}; in {common}"
     )
+    if agree:
+        alike = [looked for looked in found if looked.agrees]
+        moving = sum(looked.bodies >= 3 for looked in alike)
+        both = sum(looked.word == "runs" for looked in alike)
+        say(
+            f"{len(alike)} swing as in MuJoCo, {moving} of them with three bodies on joints or more; "
+            f"{both} of them also run as the file has them"
+        )
+
+
+def _swing(looked: Any) -> str:
+    """How far it swings from where it does in MuJoCo, of its size, and what both engines' own steps leave."""
+    if (found := looked.agreement) is None:
+        return ""
+    sign = "=" if looked.agrees else "≠" if found.resolved else "?"
+    return f"{sign} {found.apart:7.1e} (steps {found.own:.0e}, {found.reference:.0e}) "
 
 
 def _common(paths: Any) -> Any:

@@ -6,7 +6,7 @@ Each file is loaded in a process that is watched: what hangs, dies or takes too 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from importlib.metadata import PackageNotFoundError, distribution, packages_distributions
 from pathlib import Path
@@ -18,12 +18,14 @@ from spook_tracker.engine.find import find
 from spook_tracker.engine.model_file import ModelFile, ModelRun
 from spook_tracker.engine.model_reading import ModelError, Reading, read
 from spook_tracker.engine.protocol import NotSupported
+from spook_tracker.tracker.measure.model_agreement import ALIKE, Agreement, agreement
 from spook_tracker.tracker.measure.model_files import SUFFIXES, ModelFileError
 
 LookedWord = Literal["model", "part", "refused", "runs", "fails"]
 PARTS = ("no model by itself", "part of other models", "nothing in", "begins with <")
 STEPS = 10  # that a model must take to be said to run
 LIMITS = crew.Limits(seconds=60.0, memory=4 << 30)
+LONG = crew.Limits(seconds=300.0, memory=4 << 30)
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +38,12 @@ class Looked:
     format: str = ""
     bodies: int = 0
     files: int = 0
+    agreement: Agreement | None = None
+
+    @property
+    def agrees(self) -> bool:
+        """Whether it swings as in MuJoCo."""
+        return self.agreement is not None and self.agreement.apart <= ALIKE
 
 
 def files_of(name: str) -> list[Path]:
@@ -64,9 +72,10 @@ def looked_at(path: Path) -> Looked:
         return Looked(path, "part" if part else "refused", str(error))
 
 
-def loaded(paths: Sequence[Path], engine: str, workers: int = 2) -> Iterator[Looked]:
-    """The same, each model also loaded and stepped by an engine."""
-    for path, answer in crew.answers(partial(_stepped, engine), list(paths), workers, LIMITS):
+def loaded(paths: Sequence[Path], engine: str, workers: int = 2, agree: bool = False) -> Iterator[Looked]:
+    """The same, each model also loaded and stepped by an engine, and its swing compared with MuJoCo's."""
+    look = partial(_compared if agree else _stepped, engine)
+    for path, answer in crew.answers(look, list(paths), workers, LONG if agree else LIMITS):
         yield Looked(path, "fails", answer.failure) if isinstance(answer, crew.Lost) else answer
 
 
@@ -74,12 +83,8 @@ def _said(path: Path, reading: Reading, word: LookedWord, sentence: str = "") ->
     return Looked(path, word, sentence, reading.format, reading.bodies, len(reading.files))
 
 
-def _stepped(engine: str, path: Path) -> Looked:
-    looked = looked_at(path)
-    if looked.word != "model":
-        return looked
-    reading = read(path)
-    model = ModelFile(
+def _model(path: Path, reading: Reading) -> ModelFile:
+    return ModelFile(
         path=str(path),
         format=reading.format,
         digest=reading.digest,
@@ -88,7 +93,25 @@ def _stepped(engine: str, path: Path) -> Looked:
         watched=reading.watched,
         assets={name: str(file) for name, file in reading.assets.items()},
     )
-    asked = ModelRun(model=model)
+
+
+def _compared(engine: str, path: Path) -> Looked:
+    """Stepped, and its swing compared: also of a model that is refused for what does not take part in a swing."""
+    looked = _stepped(engine, path)
+    if looked.word not in ("runs", "refused") or not looked.format:
+        return looked
+    try:
+        return replace(looked, agreement=agreement(_model(path, read(path)), engine))
+    except EngineError as error:
+        return replace(looked, sentence=looked.sentence or str(error))
+
+
+def _stepped(engine: str, path: Path) -> Looked:
+    looked = looked_at(path)
+    if looked.word != "model":
+        return looked
+    reading = read(path)
+    asked = ModelRun(model=_model(path, reading))
     try:
         done = find(engine).simulate(asked, time_step=reading.time_step, duration=STEPS * reading.time_step)
     except NotSupported as lack:

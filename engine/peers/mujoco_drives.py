@@ -1,0 +1,126 @@
+"""Actuators of a compiled MuJoCo model, joint by joint: what of them is linear, and what controls make of the rest."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import Any
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from spook_tracker.engine.peers.lacking import Lacks
+
+Array = npt.NDArray[np.float64]
+BY_JOINT = tuple(int(getattr(mujoco.mjtTrn, f"mjTRN_{kind}")) for kind in ("JOINT", "JOINTINPARENT"))
+BY_TENDON = int(mujoco.mjtTrn.mjTRN_TENDON)
+ONE_NUMBER = tuple(int(getattr(mujoco.mjtJoint, f"mjJNT_{kind}")) for kind in ("HINGE", "SLIDE"))
+AFFINE, UNBIASED = (int(getattr(mujoco.mjtBias, f"mjBIAS_{kind}")) for kind in ("AFFINE", "NONE"))
+FIXED, STATIC = int(mujoco.mjtGain.mjGAIN_FIXED), int(mujoco.mjtDyn.mjDYN_NONE)
+ALONG_JOINT = int(mujoco.mjtWrap.mjWRAP_JOINT)
+
+
+class Drives:
+    """On joints of places q, with l = Σ arm q: force = arm (gain u + b₀ + b₁ l + b₂ l̇), the last two on one joint alone."""
+
+    def __init__(self, model: Any, data: Any, on: bool, lacks: Lacks) -> None:
+        self.m, self.lacks = model, lacks
+        self.control = np.array(data.ctrl)
+        self._of: dict[int, list[tuple[int, float]]] = defaultdict(list)  # actuator, arm
+        off = int(getattr(model.opt, "disableactuator", 0))
+        for actuator in range(model.nu if on else 0):
+            group = int(model.actuator_group[actuator])
+            if 0 <= group < 31 and off >> group & 1:
+                continue
+            arms = self._arms(actuator)
+            if why := self._refused(actuator, arms):
+                name = mujoco.mj_id2name(model, mujoco.mjtObj.mjOBJ_ACTUATOR, actuator) or str(actuator)
+                lacks.add(f"an actuator {why}", "actuator", name)
+                continue
+            for joint, arm in arms:
+                self._of[joint].append((actuator, arm))
+
+    def _arms(self, actuator: int) -> list[tuple[int, float]]:
+        """Joints it acts on, and how far its length grows with each; empty where its transmission is another."""
+        m = self.m
+        kind, number = int(m.actuator_trntype[actuator]), int(m.actuator_trnid[actuator, 0])
+        gear = float(m.actuator_gear[actuator, 0])
+        if kind in BY_JOINT:
+            return [(number, gear)]
+        if kind != BY_TENDON:
+            return []
+        wraps = range(m.tendon_adr[number], m.tendon_adr[number] + m.tendon_num[number])
+        if any(int(m.wrap_type[wrap]) != ALONG_JOINT for wrap in wraps):
+            return []
+        return [(int(m.wrap_objid[wrap]), gear * float(m.wrap_prm[wrap])) for wrap in wraps]
+
+    def _refused(self, actuator: int, arms: list[tuple[int, float]]) -> str:
+        """Why it is not supported; empty if it is."""
+        m = self.m
+        servo = bool(np.any(self._bias(actuator)[1:]))
+        kinds = {
+            "that pulls by a way through space, a site or a body": not arms,
+            "on a ball or free joint": any(int(m.jnt_type[joint]) not in ONE_NUMBER for joint, _ in arms),
+            "with activation dynamics": int(m.actuator_dyntype[actuator]) != STATIC,
+            "with a gain or bias that is not affine": int(m.actuator_gaintype[actuator]) != FIXED
+            or int(m.actuator_biastype[actuator]) not in (AFFINE, UNBIASED),
+            "that is a servo of bounded force": servo
+            and (m.actuator_forcelimited[actuator] or any(m.jnt_actfrclimited[joint] for joint, _ in arms)),
+            "that is a servo of several joints": servo and len(arms) > 1,
+            "with damping of its own": bool(getattr(m, "actuator_damping", np.zeros(m.nu))[actuator]),
+        }
+        return next((what for what, there in kinds.items() if there), "")
+
+    def of(self, joint: int) -> list[tuple[int, float]]:
+        """Actuators of a joint, each with its arm."""
+        return self._of.get(joint, [])
+
+    def driven(self) -> list[int]:
+        """Joints with actuators."""
+        return sorted(self._of)
+
+    def armature(self, joint: int) -> float:
+        """Rotor inertia of its actuators, seen from the joint [kg m² or kg]."""
+        rotors = getattr(self.m, "actuator_armature", np.zeros(self.m.nu))
+        if any(rotors[actuator] and self._of_several(actuator) for actuator, _ in self.of(joint)):
+            self.lacks.add("an actuator with armature on several joints")
+        return sum(float(rotors[actuator]) * arm**2 for actuator, arm in self.of(joint))
+
+    def _of_several(self, actuator: int) -> bool:
+        return sum(actuator == one for held in self._of.values() for one, _ in held) > 1
+
+    def linear(self, joint: int) -> tuple[float, float]:
+        """Stiffness and damping that actuators give a joint."""
+        stiffness = damping = 0.0
+        for actuator, arm in self.of(joint):
+            _, by_place, by_speed = self._bias(actuator)
+            stiffness -= float(by_place) * arm**2
+            damping -= float(by_speed) * arm**2
+        return stiffness, damping
+
+    def _bias(self, actuator: int) -> Array:
+        found: Array = np.asarray(self.m.actuator_biasprm[actuator])[:3] * (
+            int(self.m.actuator_biastype[actuator]) == AFFINE
+        )
+        return found
+
+    def force(self, joint: int, here: float) -> float:
+        """What the actuators push with where the joint is `here` and stands still [N or N m]; controls within their ranges."""
+        m, total = self.m, 0.0
+        clamped = not m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_CLAMPCTRL)
+        for actuator, arm in self.of(joint):
+            control = float(self.control[actuator])
+            if m.actuator_ctrllimited[actuator] and clamped:
+                control = float(np.clip(control, *m.actuator_ctrlrange[actuator]))
+            constant, by_place, _ = self._bias(actuator)
+            force = (
+                float(m.actuator_gainprm[actuator, 0]) * control
+                + float(constant)
+                + float(by_place) * arm * here
+            )
+            if m.actuator_forcelimited[actuator]:
+                force = float(np.clip(force, *m.actuator_forcerange[actuator]))
+            total += arm * force
+        if m.jnt_actfrclimited[joint]:
+            total = float(np.clip(total, *m.jnt_actfrcrange[joint]))
+        return total

@@ -1,0 +1,248 @@
+"""Geoms of a compiled MuJoCo model as surfaces of ours: shapes, materials, and which bodies touch."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from itertools import combinations
+from typing import Any
+
+import mujoco
+import numpy as np
+import numpy.typing as npt
+
+from spook_tracker.engine.bodies import Material, RigidBody
+from spook_tracker.engine.errors import SceneError
+from spook_tracker.engine.meshes import HeightField
+from spook_tracker.engine.peers.lacking import Lacks
+from spook_tracker.engine.shapes import (
+    Box,
+    Capsule,
+    Compound,
+    ConvexHull,
+    Cylinder,
+    Part,
+    Plane,
+    Shape,
+    Sphere,
+)
+
+Array = npt.NDArray[np.float64]
+MOST_CORNERS = 64  # of a hull of ours, 16 of them round a face
+KIND = {int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")): name.lower() for name in (
+    "PLANE", "SPHERE", "CAPSULE", "CYLINDER", "BOX", "ELLIPSOID", "MESH", "HFIELD", "SDF")}  # fmt: skip
+
+
+def surfaces(
+    model: Any,
+    data: Any,
+    weld: npt.NDArray[np.int64],
+    main: Mapping[int, RigidBody],
+    tied: set[frozenset[str]],
+    lacks: Lacks,
+) -> tuple[dict[str, list[RigidBody]], list[RigidBody], list[tuple[str, str]]]:
+    """Moving bodies with their surfaces by name, a static body for each geom that stands still, and who never meets whom.
+
+    Geoms of one body that rub differently, or meet others, are surfaces of bodies of their own at the same place, which
+    share its mass and are to be locked to the first.
+    """
+    return _Surfaces(model, data, weld, main, tied, lacks).found()
+
+
+class _Surfaces:
+    def __init__(
+        self,
+        model: Any,
+        data: Any,
+        weld: npt.NDArray[np.int64],
+        main: Mapping[int, RigidBody],
+        tied: set[frozenset[str]],
+        lacks: Lacks,
+    ) -> None:
+        self.m, self.d, self.main, self.lacks = model, data, main, lacks
+        self.weld = weld[np.asarray(model.geom_bodyid)]
+        self.meets = self.meeting(tied)
+
+    def label(self, geom: int) -> str:
+        return mujoco.mj_id2name(self.m, mujoco.mjtObj.mjOBJ_GEOM, geom) or str(geom)
+
+    def meeting(self, tied: set[frozenset[str]]) -> npt.NDArray[np.bool_]:
+        """Which geoms may touch, by bits, bodies, exclusions and pairs."""
+        m = self.m
+        kind, affinity = np.asarray(m.geom_contype), np.asarray(m.geom_conaffinity)
+        found: npt.NDArray[np.bool_] = (kind[:, None] & affinity[None, :] != 0) | (
+            affinity[:, None] & kind[None, :] != 0
+        )
+        apart = np.eye(m.nbody, dtype=bool)  # whole bodies
+        place = {one.name: body for body, one in self.main.items()}
+        if not m.opt.disableflags & int(mujoco.mjtDisableBit.mjDSBL_FILTERPARENT):
+            for pair in tied:
+                both = [place[name] for name in pair if name in place]
+                if len(both) == 2:
+                    apart[np.ix_(both, both)] = True
+        found &= ~apart[np.ix_(self.weld, self.weld)]
+        bodies = np.asarray(m.geom_bodyid)
+        for one, two in (divmod(int(signature), 1 << 16) for signature in m.exclude_signature):
+            some = np.outer(bodies == one, bodies == two)
+            found &= ~(some | some.T)
+        for one, two in zip(m.pair_geom1, m.pair_geom2, strict=True):
+            found[one, two] = found[two, one] = True
+        return found
+
+    def found(self) -> tuple[dict[str, list[RigidBody]], list[RigidBody], list[tuple[str, str]]]:
+        bodies: dict[str, list[RigidBody]] = {}
+        fixed: list[RigidBody] = []
+        geoms: dict[str, int] = {}  # of every surface one geom
+        for body, alike in self.alike().items():
+            made = []
+            for place, same in enumerate(alike):
+                whole = self.main.get(body)
+                name = (
+                    f"geom {self.label(same[0])}"
+                    if whole is None
+                    else whole.name + (f" surface {place + 1}" if place else "")
+                )
+                try:
+                    one = (
+                        self.standing(name, same[0])
+                        if whole is None
+                        else self.moving(whole, name, same, len(alike))
+                    )
+                except SceneError as error:
+                    self.lacks.add(f"a surface as this one: {error}", "geom", self.label(same[0]))
+                    continue
+                if one is not None:
+                    geoms[name] = same[0]
+                    made.append(one)
+            if body:
+                bodies[self.main[body].name] = made
+            else:
+                fixed += made
+        apart = [
+            (one, two)
+            for one, two in combinations(geoms, 2)
+            if not self.meets[geoms[one], geoms[two]] and self.weld[[geoms[one], geoms[two]]].any()
+        ]
+        return bodies, fixed, apart
+
+    def alike(self) -> dict[int, list[list[int]]]:
+        """Geoms that touch anything, by body, together where they rub alike and meet the same; those that stand still alone."""
+        groups: dict[int, dict[Any, list[int]]] = {}
+        for geom in map(int, np.flatnonzero(self.meets.any(axis=1))):
+            body = int(self.weld[geom])
+            if body and body not in self.main:
+                continue
+            key = (self.material(geom), self.meets[geom].tobytes()) if body else geom
+            groups.setdefault(body, {}).setdefault(key, []).append(geom)
+        return {body: list(alike.values()) for body, alike in groups.items()}
+
+    def moving(self, body: RigidBody, name: str, geoms: list[int], share: int) -> RigidBody | None:
+        axes = np.zeros(9)
+        mujoco.mju_quat2Mat(axes, np.array(body.orientation))
+        turn = axes.reshape(3, 3)
+        parts = []
+        for geom in geoms:
+            shape = self.shape(geom)
+            if shape is None or isinstance(shape, Plane | HeightField):
+                self.lacks.add(f"a geom of kind {self.kind(geom)} on what moves", "geom", self.label(geom))
+                continue
+            place = turn.T @ (self.d.geom_xpos[geom] - body.position)
+            axes = turn.T @ self.d.geom_xmat[geom].reshape(3, 3)
+            parts.append(Part(shape=shape, position=tuple(place), orientation=_quaternion(axes)))
+        if not parts:
+            return None
+        mass, inertia = float(body.mass or 0.0) / share, tuple(moment / share for moment in body.inertia)
+        shape = Compound(tuple(parts))
+        return replace(
+            body, name=name, shape=shape, mass=mass, inertia=inertia, material=self.material(geoms[0])
+        )
+
+    def standing(self, name: str, geom: int) -> RigidBody | None:
+        shape = self.shape(geom)
+        if shape is None:
+            self.lacks.add(f"a geom of kind {self.kind(geom)}", "geom", self.label(geom))
+            return None
+        place, turn = self.d.geom_xpos[geom], self.d.geom_xmat[geom].reshape(3, 3)
+        if isinstance(shape, HeightField):
+            place = place - turn @ np.array([*self.m.hfield_size[self.m.geom_dataid[geom], :2], 0.0])
+        return RigidBody(
+            name=name, position=tuple(place), orientation=_quaternion(turn), motion="static", shape=shape,
+            material=self.material(geom),
+        )  # fmt: skip
+
+    def kind(self, geom: int) -> str:
+        return KIND.get(int(self.m.geom_type[geom]), "of this kind")
+
+    def material(self, geom: int) -> Material:
+        """Friction of the kinds that its condim has."""
+        m, kinds = self.m, int(self.m.geom_condim[geom])
+        sliding, spin, roll = (float(x) for x in m.geom_friction[geom])
+        return Material(
+            friction=sliding if kinds > 1 else 0.0,
+            torsional_friction=spin if kinds > 3 else 0.0,
+            rolling_friction=roll if kinds > 4 else 0.0,
+        )
+
+    def shape(self, geom: int) -> Shape | None:
+        m = self.m
+        kind, (x, y, z) = KIND.get(int(m.geom_type[geom])), (float(s) for s in m.geom_size[geom])
+        if kind == "sphere":
+            return Sphere(x)
+        if kind == "capsule":
+            return Capsule(x, 2.0 * y)
+        if kind == "cylinder":
+            return Cylinder(x, 2.0 * y)
+        if kind == "box":
+            return Box((2.0 * x, 2.0 * y, 2.0 * z))
+        if kind == "plane":
+            return Plane()
+        if kind == "ellipsoid":
+            return _hull(np.array([x, y, z]) * _spread(MOST_CORNERS))
+        if kind == "mesh":
+            mesh = int(m.geom_dataid[geom])
+            first = int(m.mesh_vertadr[mesh])
+            return _hull(np.array(m.mesh_vert[first : first + m.mesh_vertnum[mesh]], dtype=float))
+        if kind == "hfield":
+            return self.height_field(int(m.geom_dataid[geom]))
+        return None
+
+    def height_field(self, field: int) -> HeightField:
+        """MuJoCo's rows go along y, its data are parts of the height; below its zero lies a base, which nothing meets here."""
+        m = self.m
+        rows, columns, first = (int(getattr(m, f"hfield_{name}")[field]) for name in ("nrow", "ncol", "adr"))
+        half_x, half_y, top, _ = (float(s) for s in m.hfield_size[field])
+        data = top * np.asarray(m.hfield_data[first : first + rows * columns], dtype=float).reshape(
+            rows, columns
+        )
+        spacing = (2.0 * half_x / (columns - 1), 2.0 * half_y / (rows - 1))
+        return HeightField(spacing, tuple(map(tuple, data.T.tolist())))
+
+
+def _spread(count: int) -> Array:
+    """Directions: both ways along the axes, and the others evenly over a ball, by the golden angle."""
+    count -= 6
+    up = 1.0 - 2.0 * (np.arange(count) + 0.5) / count
+    turn = np.pi * (3.0 - np.sqrt(5.0)) * np.arange(count)
+    flat = np.sqrt(1.0 - up * up)
+    return np.vstack([np.eye(3), -np.eye(3), np.column_stack([flat * np.cos(turn), flat * np.sin(turn), up])])
+
+
+def _hull(points: Array) -> ConvexHull:
+    """The hull of points; with more corners than ours holds, of those that reach furthest in directions spread evenly."""
+    count = MOST_CORNERS
+    while True:
+        kept = points
+        if len(points) > count:
+            kept = points[np.unique(np.argmax(points @ _spread(count).T, axis=0))]
+        try:
+            return ConvexHull(tuple(map(tuple, kept.tolist())))
+        except SceneError:
+            if count <= 8:
+                raise
+            count //= 2
+
+
+def _quaternion(axes: Any) -> Any:
+    found = np.zeros(4)
+    mujoco.mju_mat2Quat(found, np.ascontiguousarray(axes).ravel())
+    return tuple(found / np.linalg.norm(found))

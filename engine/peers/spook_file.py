@@ -1,0 +1,212 @@
+"""A user's own model in our engine: MJCF and URDF, read by MuJoCo's parser, run as a scene of ours."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+
+from spook_tracker.engine.errors import MethodError
+from spook_tracker.engine.forces import Load
+from spook_tracker.engine.joints import AxialJoint
+from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.model_file import ModelRun
+from spook_tracker.engine.observe import (
+    ContactForce,
+    JointCoordinate,
+    KineticEnergy,
+    Penetration,
+    PotentialEnergy,
+    Quantity,
+    Violation,
+)
+from spook_tracker.engine.peers.model_loop import Array, LoadedModel, elsewhere, resident
+from spook_tracker.engine.peers.mujoco_file import LOADS, bodies_of, driven, load, size_of, start_at, stiffen
+from spook_tracker.engine.peers.mujoco_scene import Translated, translate
+from spook_tracker.engine.protocol import NotSupported
+from spook_tracker.engine.result import Result, SimulationFailed
+from spook_tracker.engine.run import Run, start
+from spook_tracker.engine.scene import Scene
+
+READS = ("MJCF", "URDF")
+ACCURATE = (  # from the best on: the first that a scene allows
+    Method(composition="order6"),
+    Method(half_step_velocities=True, corrections=2),
+    Method(half_step_velocities=True),
+    PLAIN,
+)
+
+
+def run_model(
+    run: ModelRun, time_step: float, duration: float, time_limit: float | None, method: Method = PLAIN
+) -> Result:
+    """Load the file, drive it for `duration` [s] and read what is asked for."""
+    if run.elsewhere:
+        return elsewhere(__name__, run, time_step, duration, time_limit)
+    before, began = resident(), time.perf_counter()
+    simulation = _Simulation(run, time_step, time_limit, method)
+    loads = [time.perf_counter() - began]
+    simulation.megabytes = resident() - before
+    if run.timed:
+        for _ in range(LOADS - 1):
+            began = time.perf_counter()
+            _Simulation(run, time_step, time_limit, method)
+            loads.append(time.perf_counter() - began)
+    return simulation.result(duration, min(loads))
+
+
+def compiled(run: ModelRun) -> Any:
+    """What MuJoCo makes of the file."""
+    mujoco.set_mju_user_warning(lambda _: None)
+    try:
+        return load(run)
+    except (ValueError, OSError) as error:
+        said = " ".join(str(error).split())[:240]
+        raise NotSupported(
+            f"spook reads by MuJoCo's parser, which refuses {Path(run.model.path).name}: {said}"
+        ) from None
+
+
+class _Simulation(LoadedModel):
+    """A scene that is held, with the model it was made from."""
+
+    megabytes = 0.0  # that the process took more
+
+    def __init__(self, run: ModelRun, time_step: float, time_limit: float | None, method: Method) -> None:
+        super().__init__(run, time_step, time_limit)
+        model = compiled(run)
+        stiffen(model, run.gain)
+        self.model, self.data = model, mujoco.MjData(model)
+        start_at(run, model, self.data)
+        self.drive = driven(run.model.drive, model, self.data)
+        self.varies = self.drive.varies and not run.conservative
+        self.size = size_of(run, model, self.data)
+        watched = bodies_of(run, model)
+        self.made: Translated = translate(
+            model, self.data, conservative=run.conservative or run.swing > 0.0, text=_text(run)
+        )
+        self.watched = [self.made.bodies[body] for body in watched]
+        self.freedom = 3 * len(self.made.moving)
+        self.held = self._started(method)
+        self.read()
+
+    def _started(self, method: Method) -> Run:
+        scene = self.made.scene
+        if self.run.push:
+            loads = (Load(name=f"push on {name}", body=name) for name in self.made.moving)
+            scene = replace(scene, forces=(*scene.forces, *loads))
+        refused: MethodError | None = None
+        for one in ACCURATE if self.run.accurate else (method,):
+            try:
+                return start(scene, time_step=self.step, method=one, observe=self._observed(scene))
+            except MethodError as error:
+                refused = error
+        raise NotSupported(f"spook cannot run this model so: {refused}")
+
+    def _observed(self, scene: Scene) -> dict[str, Quantity]:
+        """What is read at samples and at the end."""
+        self.fixed = [b.name for b in scene.bodies if b.motion == "static"]  # type: ignore[union-attr]
+        self.ties = [c.name for c in scene.constraints if c.name.startswith("equality ")]
+        self.limits = {c.name: c.limit for c in scene.constraints if isinstance(c, AxialJoint) and c.limit}
+        found: dict[str, Quantity] = {name: Violation(name) for name in self.ties}
+        found |= {name: JointCoordinate(name) for name in self.limits}
+        if scene.contacts:
+            found |= {"overlap": Penetration()} | {f"load {name}": ContactForce(name) for name in self.fixed}
+        if self.run.conservative:
+            found |= {"potential": PotentialEnergy(), "kinetic": KineticEnergy()}
+        return found
+
+    def take(self, count: int) -> None:
+        try:
+            self.held.step(count)
+        except SimulationFailed as failed:
+            self.broken = failed.result.failure
+
+    broken = ""
+
+    def trouble(self) -> str:
+        return self.broken
+
+    def push(self, change: Array) -> None:
+        """As forces on what moves, for one step."""
+        for name, speed in zip(self.made.moving, change.reshape(-1, 3), strict=True):
+            force = speed * self.made.moving[name] / self.step
+            self.held.set_load(f"push on {name}", force=tuple(force))
+
+    def control(self) -> None:
+        if not self.varies:
+            return
+        self.data.time = self.held.time
+        self.drive.apply(self.data)
+        drives = self.made.drives
+        drives.control = np.array(self.data.ctrl)
+        for joint in drives.driven():
+            here = float(self.data.qpos[self.model.jnt_qposadr[joint]])  # the start's: the data stay there
+            self.held.set_motor(self.made.joints[joint], force=drives.force(joint, here))
+
+    def read(self) -> None:
+        self.now = self.held.state
+
+    def poses(self) -> tuple[Array, Array]:
+        places, turns = [], []
+        for one in self.watched:
+            place, turn = one.place, one.turn
+            if one.name:
+                axes = _matrix(self.now[one.name][3:7])
+                place, turn = self.now[one.name][:3] + axes @ place, axes @ turn
+            places.append(place)
+            turns.append(_quaternion(turn))
+        return np.array(places), np.array(turns)
+
+    def speeds(self) -> tuple[Array, Array]:
+        moving = np.array([self.now[name][7:] for name in self.made.moving])
+        return np.linalg.norm(moving[:, :3], axis=1), np.linalg.norm(moving[:, 3:], axis=1)
+
+    def state(self) -> Array:
+        return np.concatenate(list(self.held.state.values()))
+
+    def at_sample(self) -> dict[str, Any]:
+        found: dict[str, Any] = {"violation": self._violation()}
+        if self.run.conservative:
+            found["energy"] = [float(self.held["potential"]), float(self.held["kinetic"])]
+        return found
+
+    def _violation(self) -> float:
+        worst = [float(np.max(np.abs(self.held[name]))) for name in self.ties]
+        for name, limit in self.limits.items():
+            here = float(self.held[name])
+            worst.append(max(limit.lower - here, here - limit.upper))
+        return max([0.0, *worst])
+
+    def at_end(self) -> dict[str, Any]:
+        scene = self.made.scene
+        found: dict[str, Any] = {"overlap": np.array(0.0), "load": np.array(0.0)}
+        if scene.contacts:
+            gravity = np.array(scene.gravity)
+            weight = float(gravity @ gravity) * sum(self.made.moving.values())
+            carried = sum(float(self.held[f"load {name}"] @ gravity) for name in self.fixed)
+            found["overlap"] = np.array(max(0.0, float(self.held["overlap"])))
+            found["load"] = np.array(carried / weight if weight else 0.0)
+        if self.run.timed:
+            found["megabytes"] = np.array(self.megabytes)
+        return found
+
+
+def _text(run: ModelRun) -> str:
+    return Path(run.model.path).read_text(encoding="utf-8", errors="replace")
+
+
+def _matrix(turn: Array) -> Array:
+    found = np.zeros(9)
+    mujoco.mju_quat2Mat(found, turn)
+    return found.reshape(3, 3)
+
+
+def _quaternion(axes: Array) -> Array:
+    found = np.zeros(4)
+    mujoco.mju_mat2Quat(found, np.ascontiguousarray(axes).ravel())
+    return found

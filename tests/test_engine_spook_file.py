@@ -1,0 +1,282 @@
+"""A model file in our engine does what MuJoCo says it does, and what it cannot say is refused by name and line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine.errors import EngineError
+from spook_tracker.engine.find import find
+from spook_tracker.engine.model_file import Drive, ModelFile, ModelRun
+from spook_tracker.engine.model_reading import read
+from spook_tracker.engine.protocol import NotSupported
+from spook_tracker.engine.result import Result
+
+mujoco = pytest.importorskip(
+    "mujoco", reason="the extra mujoco is not installed: pip install 'spook-tracker[mujoco]'"
+)
+from spook_tracker.tracker.measure.model_agreement import ALIKE, agreement  # noqa: E402
+
+LINK = '<geom type="capsule" size=".03 .2" pos=".1 .05 -.2" mass="1.2"/>'
+TIP = '<body name="tip" pos="0 .1 -.4">{joints}<geom type="box" size=".05 .1 .15" pos="0 .02 -.1" mass=".7"/></body>'
+
+
+def _arm(joints: str, tip: str, more: str = "") -> str:
+    return (
+        f'<mujoco><option timestep=".002"/><worldbody><body name="arm" pos="0 0 1">{joints}{LINK}'
+        f"{TIP.format(joints=tip)}</body></worldbody>{more}</mujoco>"
+    )
+
+
+HINGE = '<joint name="swing" axis="0 1 0"/>'
+SWINGS = {
+    "hinges askew": _arm('<joint axis="1 2 0" pos=".02 0 .1"/>', '<joint axis="0 .3 1" pos="0 0 .1"/>'),
+    "a slide on a hinge": _arm(HINGE, '<joint type="slide" axis="1 0 2"/>'),
+    "balls": _arm('<joint type="ball"/>', '<joint type="ball" pos="0 0 .05"/>'),
+    "flying": _arm("<freejoint/>", '<joint axis="1 0 0"/>'),
+    "three joints in one body": _arm(
+        '<joint type="slide" axis="1 0 0"/><joint type="slide" axis="0 0 1"/><joint axis="0 1 0" pos=".1 0 0"/>',
+        '<joint axis="1 0 0"/><joint axis="0 1 0" pos="0 0 .1"/><joint axis="0 0 1" pos="0 .1 0"/>',
+    ),
+    "armature": _arm(
+        '<joint axis="0 1 0" armature=".3"/>',
+        '<joint axis="1 0 0" armature=".05"/><joint type="slide" axis="0 1 1" armature="2"/>',
+    ),
+    "springs": _arm(
+        '<joint axis="0 1 0" stiffness="40" springref="20"/>',
+        '<joint type="slide" axis="0 0 1" stiffness="300" armature=".1" ref=".1"/>',
+    ),
+    "welded parts": _arm(
+        HINGE,
+        '<joint axis="1 0 0"/><body pos=".1 .2 0" euler="20 30 0"><geom type="ellipsoid" size=".1 .05 .02" mass=".4"/></body>',
+    ),
+    "inertia as given": _arm(
+        HINGE,
+        '<joint axis="1 0 0"/><inertial pos=".1 0 0" mass="2" fullinertia=".03 .04 .05 .003 -.002 .001"/>',
+    ),
+    "a motor's rotor": _arm(HINGE, HINGE.replace("swing", "elbow"), '<actuator><motor joint="elbow" gear="3"/></actuator>'),
+}  # fmt: skip
+
+
+def _model(
+    tmp_path: Path, text: str, name: str = "model.xml", drive: Drive | None = None, keyframe: str = ""
+) -> ModelFile:
+    file = tmp_path / name
+    file.write_text(text)
+    found = read(file)
+    return ModelFile(
+        path=str(file), format=found.format, digest=found.digest, time_step=found.time_step, watched=found.watched,
+        drive=drive or Drive(), keyframe=keyframe, gravity=found.gravity,
+    )  # fmt: skip
+
+
+def _both(model: ModelFile, lasts: float, step: float = 1e-3, **more: object) -> tuple[Result, Result, float]:
+    """Ours and MuJoCo's, and how far their watched bodies end up apart [m]."""
+    asked = ModelRun(model=model, samples=(lasts,), **more)  # type: ignore[arg-type]
+    ours, theirs = (find(e).simulate(asked, time_step=step, duration=lasts) for e in ("spook", "mujoco"))
+    return ours, theirs, float(np.abs(ours["position"] - theirs["position"]).max())
+
+
+@pytest.mark.parametrize("kind", SWINGS)
+def test_a_swing_is_mujocos(kind: str, tmp_path: Path) -> None:
+    """To a millionth of the size after a second, by MuJoCo's Runge-Kutta and by a composition of ours."""
+    found = agreement(_model(tmp_path, SWINGS[kind]), "spook")
+
+    assert found.resolved
+    assert found.apart < 0.01 * ALIKE
+
+
+def test_urdf_is_read_as_well(tmp_path: Path) -> None:
+    link = '<inertial><mass value="1"/><origin xyz=".1 0 -.2"/><inertia ixx=".02" iyy=".03" izz=".01" ixy="0" ixz="0" iyz="0"/></inertial>'
+    text = (
+        f'<robot name="r"><link name="base"/><link name="upper">{link}</link><link name="lower">{link}</link>'
+        '<joint name="a" type="continuous"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/></joint>'
+        '<joint name="b" type="prismatic"><parent link="upper"/><child link="lower"/><origin xyz="0 0 -.4" rpy=".3 0 0"/>'
+        '<axis xyz="1 0 0"/><limit lower="-1" upper="1" effort="10" velocity="1"/></joint></robot>'
+    )
+    found = agreement(_model(tmp_path, text, "r.urdf"), "spook")
+
+    assert found.resolved and found.apart < 0.01 * ALIKE
+
+
+def test_damping_springs_and_servos_are_mujocos_as_the_step_falls(tmp_path: Path) -> None:
+    """Plain steps against plain steps: what is between both halves with the step."""
+    text = _arm(
+        '<joint name="swing" axis="0 1 0" damping=".8" stiffness="5" armature=".1"/>',
+        '<joint name="elbow" axis="1 0 0" damping=".3"/>',
+        '<actuator><position joint="swing" kp="30" kv="2"/><velocity joint="elbow" kv=".5"/><motor joint="elbow" gear="2"/></actuator>',
+    )  # fmt: skip
+    model = _model(tmp_path, text, drive=Drive(kind="sinusoid", amplitude=0.7, frequency=0.8))
+
+    coarse, fine = (_both(model, 1.0, step)[2] for step in (2e-3, 1e-3))
+
+    assert fine < 2e-3
+    assert fine < 0.65 * coarse
+
+
+def test_friction_limits_and_bounded_motors_hold_as_in_mujoco(tmp_path: Path) -> None:
+    text = _arm(
+        '<joint name="swing" axis="0 1 0" frictionloss="20"/>',
+        '<joint name="elbow" axis="1 0 0" damping="1" range="-30 10" limited="true"/>',
+        '<actuator><motor joint="elbow" gear="5" ctrlrange="-1 1" forcerange="-.8 .8" forcelimited="true" ctrllimited="true"/></actuator>',
+    )  # fmt: skip
+    model = _model(tmp_path, text, drive=Drive(kind="table", rows=((0.0, 4.0),)))
+    ours, _, apart = _both(model, 2.0)
+
+    assert apart < 5e-3  # MuJoCo's friction creeps and its limits yield
+    assert abs(float(ours["violation"][-1])) < 1e-4
+
+
+def test_a_gear_and_a_weld_hold(tmp_path: Path) -> None:
+    gear = '<equality><joint joint1="elbow" joint2="swing" polycoef="0 -2 0 0 0" solref=".004 1"/></equality>'
+    _, _, geared = _both(_model(tmp_path, _arm(HINGE, '<joint name="elbow" axis="1 0 0"/>', gear)), 0.5)
+    weld = '<equality><weld body1="arm" body2="tip" solref=".004 1"/></equality>'
+    _, _, welded = _both(_model(tmp_path, _arm(HINGE, '<joint axis="1 0 0"/>', weld)), 0.5)
+
+    assert geared < 2e-3
+    assert welded < 2e-3
+
+
+RESTS = """<mujoco><worldbody><geom type="plane" size="2 2 1" friction="1"/>
+<body name="box" pos="0 0 .13"><freejoint/><geom type="box" size=".1 .1 .1" friction="1"/>
+<geom type="box" size=".02 .02 .02" pos="0 0 .12" friction=".3"/></body>
+<body name="ball" pos=".5 0 .1"><freejoint/><geom size=".1" contype="{bits}"/></body></worldbody>
+<keyframe><key name="high" qpos="0 0 1 1 0 0 0 .5 0 1 1 0 0 0"/></keyframe></mujoco>"""
+
+
+def test_what_rests_rests_where_it_should_and_carries_its_weight(tmp_path: Path) -> None:
+    model = _model(tmp_path, RESTS.format(bits=1))
+    found = find("spook").simulate(ModelRun(model=model, until_settled=True), time_step=0.002, duration=2.0)
+
+    assert found["settled"] < 1.0
+    assert [found.final_state[name][2] for name in ("box", "ball")] == pytest.approx([0.1, 0.1], abs=1e-4)
+    assert float(found["load"]) == pytest.approx(1.0, abs=1e-3)
+    assert float(found["overlap"]) < 1e-4
+
+
+def test_bits_exclusions_and_keyframes_are_the_files(tmp_path: Path) -> None:
+    text = RESTS.format(bits=2).replace(
+        "<keyframe>", '<contact><exclude body1="box" body2="world"/></contact><keyframe>'
+    )
+    text = text.replace('contype="2"', 'contype="2" conaffinity="4"')
+    model = _model(tmp_path, text, keyframe="high")
+    asked = ModelRun(model=model, samples=(0.0, 0.8))
+    found = find("spook").simulate(asked, time_step=0.002, duration=0.8)
+
+    assert found["position"][0][:, 2] == pytest.approx([1.0, 1.0])
+    assert found["position"][1][:, 2] == pytest.approx(
+        1.0 - 0.5 * 9.81 * 0.8**2, abs=0.01
+    )  # both fall through
+
+
+def test_every_shape_lies_on_the_floor(tmp_path: Path) -> None:
+    shapes = {
+        "sphere": ('type="sphere" size=".1"', 0.1),
+        "capsule": ('type="capsule" size=".1 .2" euler="90 0 0"', 0.1),
+        "cylinder": ('type="cylinder" size=".2 .05"', 0.05),
+        "box": ('type="box" size=".1 .2 .05"', 0.05),
+        "mesh": ('type="mesh" mesh="brick"', 0.1),
+        "ellipsoid": ('type="ellipsoid" size=".2 .2 .1"', 0.1),
+    }
+    bodies = "".join(
+        f'<body name="{name}" pos="{place} 0 {height + 0.01}"><freejoint/><geom {geom}/></body>'
+        for place, (name, (geom, height)) in enumerate(shapes.items())
+    )
+    corners = " ".join(f"{x} {y} {z}" for x in (-0.2, 0.2) for y in (-0.2, 0.2) for z in (-0.1, 0.1))
+    text = (
+        f'<mujoco><asset><mesh name="brick" vertex="{corners}"/></asset><worldbody><geom type="plane" size="9 9 1"/>'
+        f"{bodies}</worldbody></mujoco>"
+    )
+    model = _model(tmp_path, text)
+    found = find("spook").simulate(ModelRun(model=model, samples=(1.0,)), time_step=0.002, duration=1.0)
+
+    heights = dict(zip((one.label for one in model.watched), found["position"][-1][:, 2], strict=True))
+    for name, (_, height) in shapes.items():
+        loss = 0.08 * height if name == "ellipsoid" else 1e-3  # a hull of 64 corners lies inside it
+        assert heights[name] == pytest.approx(height, abs=loss), name
+
+
+def test_a_ball_settles_in_the_valley_of_a_height_field(tmp_path: Path) -> None:
+    rows = " ".join(f"{abs(x) / 4:.3f}" for _ in range(5) for x in range(-4, 5))  # a valley along y at x = 0
+    text = (
+        f'<mujoco><asset><hfield name="v" nrow="5" ncol="9" size="2 1 1 .1" elevation="{rows}"/></asset><worldbody>'
+        '<geom type="hfield" hfield="v"/><body name="ball" pos=".3 .2 .6"><freejoint/><geom size=".1"/></body>'
+        "</worldbody></mujoco>"
+    )
+    model = _model(tmp_path, text)
+    end = find("spook").simulate(ModelRun(model=model, samples=(8.0,)), time_step=0.004, duration=8.0)
+    x, y, z = end["position"][-1][0]
+
+    assert (y, z) == pytest.approx((0.2, 0.1 * 5**0.25 / 5**0.25 * (1.25**0.5)), abs=0.03)
+    assert abs(x) < 0.2
+
+
+LACKING = {
+    "a ball joint with springs, damping, limits or actuators (joint 'j' in line 2)": '<joint name="j" type="ball" damping="1"/>',
+    "a ball joint with armature or friction (joint 'j' in line 2)": '<joint name="j" type="ball" armature="1"/>',
+    "a tendon with stiffness (tendon 't' in line 5)": HINGE,
+    "an actuator with activation dynamics (actuator 'a' in line 7)": HINGE,
+    "a medium (option density, viscosity)": HINGE,
+    "gravity compensation (body 'b' in line 2)": HINGE,
+}
+
+
+def test_what_it_lacks_is_named_with_its_line_and_all_of_it_at_once(tmp_path: Path) -> None:
+    text = """<mujoco><option density="1.2"/><worldbody>
+<body name="b" gravcomp="1"><joint name="j" type="ball" damping="1" armature="1"/><geom size=".1"/>
+<body pos="0 0 -1"><joint name="swing" axis="0 1 0"/><geom size=".1"/></body></body></worldbody>
+<tendon>
+<fixed name="t" stiffness="3"><joint joint="swing" coef="1"/></fixed></tendon>
+<actuator>
+<general name="a" joint="swing" dyntype="filter" dynprm="1"/></actuator></mujoco>"""
+    model = _model(tmp_path, text)
+
+    with pytest.raises(NotSupported) as refused:
+        find("spook").simulate(ModelRun(model=model), time_step=0.002, duration=0.1)
+
+    for said in LACKING:
+        assert said in str(refused.value)
+    assert "\n" not in str(refused.value)
+
+
+def test_a_tie_that_is_open_at_the_start_is_refused(tmp_path: Path) -> None:
+    tie = '<equality><connect name="far" body1="tip" anchor="0 0 0" solref=".01 1"/></equality>'
+    text = _arm(HINGE, '<joint axis="1 0 0"/>', tie)
+    bent = text.replace("</mujoco>", '<keyframe><key qpos="1 0"/></keyframe></mujoco>')
+
+    with pytest.raises(NotSupported, match=r"a tie that starts .* apart .*\(equality 'far' in line 1\)"):
+        find("spook").simulate(
+            ModelRun(model=_model(tmp_path, bent, keyframe="0")), time_step=0.002, duration=0.1
+        )
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("<mujoco><worldbody><body>", "is no XML"),
+        (_arm(HINGE, "").replace("<geom", '<geom mesh="none" type="mesh"/><geom'), "mesh"),
+        ('<!DOCTYPE x [<!ENTITY a "aaaa">]><mujoco/>', "declares XML entities"),
+        (_arm(HINGE, "").replace("<worldbody>", '<asset><mesh file="../../out.stl"/></asset><worldbody>'), "outside"),
+        (_arm(HINGE, "").replace("<worldbody>", '<asset><mesh file="none.stl"/></asset><worldbody>'), "no file"),
+        ("<mujoco><!--" + "x" * 20_000_000 + "--><worldbody/></mujoco>", "20 MB"),
+    ],
+)  # fmt: skip
+def test_a_bad_file_is_one_sentence(text: str, said: str, tmp_path: Path) -> None:
+    with pytest.raises(EngineError, match=said) as refused:
+        find("spook").simulate(ModelRun(model=_model(tmp_path, text)), time_step=0.002, duration=0.1)
+
+    assert "\n" not in str(refused.value)
+
+
+def test_the_same_bits_come_twice_and_from_another_process(tmp_path: Path) -> None:
+    model = _model(tmp_path, RESTS.format(bits=1))
+    hashes = {
+        find("spook")
+        .simulate(ModelRun(model=model, elsewhere=where), time_step=0.002, duration=0.5)
+        .state_hash
+        for where in (False, False, True)
+    }
+
+    assert len(hashes) == 1
