@@ -6,7 +6,8 @@ import subprocess
 
 import pytest
 
-from spook_tracker.tracker.store.ancestry import commit_order
+from spook_tracker.tracker.judge.judged import BY_TIME, blame
+from spook_tracker.tracker.store.ancestry import commit_order, lineages
 from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.record import record
 from tests.run_documents import KEY, definition, engine, run, run_of, sample
@@ -86,6 +87,25 @@ def test_git_knows_the_order_of_commits_between_which_nothing_ran(session, tmp_p
 
     assert hashes(history_of(session, repository, *given)) == [first, last]
     assert hashes(History(session, nowhere)) == [last, first]  # without git, only the clocks speak
+
+
+def test_blame_says_that_time_alone_orders_commits_of_which_no_ancestry_is_known(session, tmp_path, nowhere):
+    repository, (first, _, last) = repository_of_three(tmp_path)
+    known = history_of(session, repository, commit(first), commit(last, "0" * 40)).runs()
+    unknown = History(session, nowhere).runs()
+    every = history_of(session, nowhere, commit(A), commit(B, A), commit(C, B)).runs()
+    chain = [run for run in every if run.engine.git_hash in (A, B, C)]
+
+    assert BY_TIME not in blame(known[1], known[0])
+    assert blame(unknown[1], unknown[0]).endswith(BY_TIME)
+    assert [BY_TIME in blame(chain[2], bad) for bad in chain[:2]] == [False, False]
+
+
+def test_a_lineage_is_what_parents_or_git_tie_together():
+    tied = lineages("abcdxy", {"b": "a", "c": "b", "y": "-"}, known="xd")
+
+    assert len({tied[commit] for commit in "abc"}) == len({tied[commit] for commit in "xd"}) == 1
+    assert len(set(tied.values())) == 3  # y is alone: its parent was never measured
 
 
 def repository_of_three(tmp_path):

@@ -11,7 +11,7 @@ from spook_tracker.tracker.cli.report_table import ROLES, limit, number
 from spook_tracker.tracker.document.run_document import Run, SeriesDefinition
 from spook_tracker.tracker.document.wording import day
 from spook_tracker.tracker.judge.events import name_of
-from spook_tracker.tracker.judge.judged import Judged, blame, commit_of
+from spook_tracker.tracker.judge.judged import BY_TIME, Judged, blame, commit_of, of_one_lineage
 from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.series_history import Told, is_noisy, lanes_of, on_one_clock
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, STATES, spaced
@@ -34,7 +34,9 @@ def summary(trends: Sequence[Told], maps: Sequence[ToldMap] = ()) -> str:
     ]
     every = len(trends) + len(maps)
     elsewhere = [line for told in trends for line in _red_elsewhere(told)]
-    beside = "".join(f"\n! red when another machine was last asked: {line}" for line in elsewhere)
+    lines = [f"! the nights of {clean(told.key)} are {BY_TIME}" for told in trends if _by_time(told)]
+    beside = "".join(f"\n{line}" for line in lines[:1])
+    beside += "".join(f"\n! red when another machine was last asked: {line}" for line in elsewhere)
     states = [told.nights[-1].state for told in trends if told.nights] + [told.state for told in maps]
     recovered = states.count("recovered")
     also = f"; {recovered} recovered" if recovered else ""
@@ -43,6 +45,10 @@ def summary(trends: Sequence[Told], maps: Sequence[ToldMap] = ()) -> str:
     _, _, key, name = min(named, key=lambda one: one[:2])
     words = f"✗ {len(named)} of {every} series red; the worst: {clean(key)}, {name}{also}"
     return click.style(words, fg="red", bold=True) + beside
+
+
+def _by_time(told: Told) -> bool:
+    return not of_one_lineage(judged.night.run for judged in told.nights)
 
 
 def _red_elsewhere(told: Told) -> Iterator[str]:

@@ -19,7 +19,7 @@ from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.compare_ladders import frontiers, run_times
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Side
 from spook_tracker.tracker.judge.explaining import beside_run_times, calm
-from spook_tracker.tracker.judge.judged import Judged, red_class
+from spook_tracker.tracker.judge.judged import BY_TIME, Judged, of_one_lineage, red_class
 from spook_tracker.tracker.judge.known import Known, judged_in, known
 from spook_tracker.tracker.judge.lane import (
     Records,
@@ -135,7 +135,10 @@ def compare_in(
         told |= judge_all(histories(records, line, reds), accepted)
         document = compare(earlier, later, accepted, known(told, old.id, new.id))
     standing = {key: judged for key, judged in judged_in(times, (new.id,))[new.id].items() if judged.red}
-    return _beside_history(document, standing, against_history)
+    document = _beside_history(document, standing, against_history)
+    if of_one_lineage(line) or not any(change.first_bad for change in document.changes):
+        return document
+    return msgspec.structs.replace(document, notes=(*document.notes, f"the history is {BY_TIME}"))
 
 
 def _beside_history(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from datetime import UTC, date, datetime
 from functools import lru_cache
 
@@ -18,6 +19,7 @@ from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import Class, State
 
 RELEASE = re.compile(r"v?\d+(\.\d+)*")
+BY_TIME = "ordered by time, as neither parents nor git here tell how these commits descend from each other"
 SURE = 0.995  # a boundary as probable needs no range
 
 
@@ -97,8 +99,16 @@ def blame(bad: Run, good: Run | None) -> str:
     if good is None:
         return f"first bad commit {commit_of(bad)}, last good unknown"
     if bad.engine.git_hash and good.engine.git_hash not in ("", *bad.engine.parents):
-        return f"bad since {commit_of(bad)}, last good {commit_of(good)}: any commit between may be the first"
+        words = (
+            f"bad since {commit_of(bad)}, last good {commit_of(good)}: any commit between may be the first"
+        )
+        return words if of_one_lineage((good, bad)) else f"{words}; {BY_TIME}"
     return f"first bad commit {commit_of(bad)}, last good {commit_of(good)}"
+
+
+def of_one_lineage(runs: Iterable[Run]) -> bool:
+    """Whether ancestry tells the order of these runs' commits, and not time alone."""
+    return len({getattr(run, "lineage", "") for run in runs} - {""}) < 2
 
 
 def red_class(own: Class, sample: Sample) -> Class:

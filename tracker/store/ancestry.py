@@ -8,6 +8,24 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
 
+def lineages(
+    commits: Iterable[str], parents: Mapping[str, Sequence[str]], known: Sequence[str] = ()
+) -> dict[str, str]:
+    """Each commit with a name of its lineage: commits of one are tied by parents or by git, of two by time alone."""
+    found: dict[str, str] = {commit: commit for commit in commits}
+
+    def root(commit: str) -> str:
+        while found[commit] != commit:
+            commit = found[commit] = found[found[commit]]
+        return commit
+
+    links = [(parent, commit) for commit in found for parent in parents.get(commit, ())]
+    for earlier, later in [*links, *itertools.pairwise(commit for commit in known if commit in found)]:
+        if earlier in found:
+            found[root(later)] = root(earlier)
+    return {commit: root(commit) for commit in found}
+
+
 def commit_order(
     commits: Iterable[str],
     parents: Mapping[str, Sequence[str]],

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
+from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -24,7 +25,7 @@ from spook_tracker.tracker.document.run_document import (
     SeriesHistory,
 )
 from spook_tracker.tracker.store import git, rows
-from spook_tracker.tracker.store.ancestry import commit_order
+from spook_tracker.tracker.store.ancestry import commit_order, lineages
 from spook_tracker.tracker.store.damage import told_of_damage
 from spook_tracker.tracker.store.identity import identity
 from spook_tracker.tracker.store.reader import CHUNK, Reader, SessionReader, file_reader, listed
@@ -315,6 +316,8 @@ class History:
                 made = (_utc(engine.commit_time), _utc(run.started))
                 age[engine.git_hash] = min(age.get(engine.git_hash, made), made)
         known = git.order(self.repository, age) if len(age) > 1 else []
+        lineage = lineages(age, parents, known)
+        runs = [replace(run, lineage=lineage[run.engine.git_hash]) if run.ordered else run for run in runs]
         place = {
             commit: index for index, commit in enumerate(commit_order(age, parents, age.__getitem__, known))
         }

@@ -44,6 +44,7 @@ class RunInfo:
     gates_passed: int
     asked: document.Asked | None = None  # None: not known
     content: str = ""  # hash of what was measured; empty: not known
+    lineage: str = ""  # runs of one are ordered by ancestry, of two by time; empty: not of a commit
 
     @property
     def green(self) -> bool:

@@ -50,6 +50,7 @@ class Night:
     machine: Machine
     asked: Any = None  # tracker.document.run_document.Asked; None: not known
     content: str = ""  # hash of what was measured; empty: not known
+    lineage: str = ""  # as in tracker.store.versions.RunInfo
 
     @cached_property
     def label(self) -> str:
@@ -224,7 +225,7 @@ def _chapter(
     nights = [
         Night(
             index, run.id, run.started, run.finished, run.trigger, run.ci_address, run.tracker_version,
-            run.engine, run.machine, getattr(run, "asked", None), history.content(run.id),
+            run.engine, run.machine, getattr(run, "asked", None), history.content(run.id), getattr(run, "lineage", ""),
         )
         for index, run in enumerate(runs)
     ]  # fmt: skip
