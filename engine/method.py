@@ -35,7 +35,7 @@ class Method:
     half_step_velocities  velocities live at mid-step: half-kick start, mid-step read-out. Order 2, with contacts as long
                        as they last on flat ground: rolling, sliding in a line, gripping; or without friction on round
                        ground. A slide that turns, rolling over round ground, what opens or closes, forces that follow
-                       the velocity (springs with viscosity, drag): order 1 as in plain
+                       the velocity (springs with viscosity, drag): order 1 as in plain. What bounces keeps its energy
     string_stiffness   treat the transverse stiffness of taut links, the geometric one of loaded joints, implicitly
     substeps           steps of h/substeps per reported step
     composition        symmetric composition of half-step steps; order 2 (none), 4, 6 or 8 on smooth scenes.

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 from spook_tracker.engine.bodies import WORLD, RigidBody
 from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.forces import Fluid, Load, Spring
-from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Joint, frictions
+from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, frictions
 from spook_tracker.engine.method import Method
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.tyres import Tyre
@@ -81,12 +80,6 @@ def check_rigid(scene: Scene, method: Method, touching: bool) -> None:
             f"within a step leaves order 1; use half_step_velocities, of order 2 while contacts last, or give Scene "
             f"contacts=False"
         )
-    bouncing = next((b.name for b in _that_may_touch(scene) if b.material.restitution), None)
-    if touching and bouncing is not None:
-        raise MethodError(
-            f"method: {wanted} is for contacts that last, but {bouncing!r} has a restitution, and impacts leave order 1, "
-            f"that of the plain method; leave one of them out, or give Scene contacts=False"
-        )
     if method.solver != "direct":
         raise MethodError(f"method: {wanted} needs the direct solver")
     for joint in scene.constraints:
@@ -104,25 +97,6 @@ def check_rigid(scene: Scene, method: Method, touching: bool) -> None:
             f"method: string_stiffness of distances is for scenes of particles only, and {distance!r} is one here; "
             f"use a Ball at its ends, or leave it out"
         )
-
-
-def _that_may_touch(scene: Scene) -> Iterator[RigidBody]:
-    """Bodies with a shape that some other may meet: one of the two dynamic, no joint and no `no_contact` between."""
-    solid = [b for b in scene.bodies if isinstance(b, RigidBody) and b.shape is not None]
-    apart = {frozenset(pair) for pair in scene.no_contact}
-    apart |= {
-        frozenset(end for end in joint.between if isinstance(end, str))
-        for joint in scene.constraints
-        if isinstance(joint, Distance | Joint)
-    }
-    for body in solid:
-        if any(
-            other is not body
-            and "dynamic" in (body.motion, other.motion)
-            and frozenset((body.name, other.name)) not in apart
-            for other in solid
-        ):
-            yield body
 
 
 def _bounded(joint: Constraint) -> str | None:

@@ -21,7 +21,7 @@ def dropped(
         reached = z + h * (v - h * g) <= 0.0
         if reached and -v > g * h:
             until = z / -(v - h * g)
-            v = -bouncing_ball.RESTITUTION * (v - until * g) - (h - until) * g
+            v = -bouncing_ball.RESTITUTION * (v - (0.5 * h + until) * g) - (0.5 * h - until) * g
             z = (h - until) * v
         elif reached:
             z, v = 0.0, 0.0

@@ -60,6 +60,23 @@ def test_what_feels_something_out_of_reach_is_counted(campaign: Any) -> None:
         assert campaign.felt(places, speeds, speeds, time_step, len(walls), True) == ghosts
 
 
+def test_what_rebounds_faster_than_its_restitution_says_has_gained(campaign: Any) -> None:
+    """A ball of 2 kg that comes at 5 m/s and leaves a hundredth faster; one that only falls, lies or leaves as fast wins nothing."""
+    h, fall = 1 / 60, 9.81 / 60
+    masses = np.array([0.0, 2.0])
+
+    def won(before: float, after: float) -> float:
+        v = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, before]])
+        w = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, after]])
+        height = h * after
+        return float(campaign.rise(masses, v, w, after**2 - before**2 + 2.0 * 9.81 * height, h))
+
+    assert won(-5.0, -5.0 - fall) < 0.0
+    assert won(0.0, 0.0) == 0.0
+    assert won(-5.0, 5.0) <= 0.0
+    assert won(-5.0, 1.01 * 5.0) > 0.2
+
+
 def test_what_gains_energy_is_not_kept(campaign: Any) -> None:
     assert not campaign.Ending(0, "direct", "completed", 2e-9, 1).kept
     assert not campaign.Ending(0, "direct", "timed_out", 0.0, 1).kept

@@ -1,8 +1,10 @@
-"""Elastic balls under gravity: a blow takes nothing, and a step of fall what it takes without one, wherever the blow is in it.
+"""Elastic balls under gravity: no blow takes or gives energy, wherever in a step it is, and however many there are.
 
-With the kick k = h g and an elastic blow R at the share s of a step, v₊ = R(v + s k) + (1 − s) k and
-q₊ = q + s h (v + k) + (1 − s) h v₊. Since R keeps |v|, E₊ − E = ½ m |v₊|² − ½ m |v|² − m g·(q₊ − q) = −½ m |k|² for
-every s and every R, several blows included: what symplectic Euler loses in a step of free flight, no more and no less.
+A step's velocity v is that of the middle of the step before: with the kick k = h g a ball in free flight goes along a parabola
+on which it has v + k/2 where the step begins. Blows R at the shares s of a step act on v + (1/2 + s) k, and what is left of k, which
+may be negative, comes after the last: v₊ = R(v + (1/2 + s) k) + (1/2 − s) k and q₊ = q + s h (v + k) + (1 − s) h v₊. Since R keeps |v|,
+½ m |v + k/2|² − m g·q is the same for every s and every R, several blows included. With E of the velocities v it is
+E − ½ h g·p, p the momentum, up to what does not change.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ from spook_tracker.engine import (
     Lock,
     Material,
     Method,
+    Momentum,
     Position,
     RigidBody,
     Scene,
@@ -62,23 +65,36 @@ def ball(
 
 
 def changes(
-    bodies: list[RigidBody], steps: int, time_step: float, solver: str, impacts: Impacts, *locks: Lock
+    bodies: list[RigidBody],
+    steps: int,
+    time_step: float,
+    solver: str,
+    impacts: Impacts,
+    *locks: Lock,
+    carried: bool = False,
 ) -> tuple[np.ndarray, float]:
-    """What each step changes of the energy, J, and the energy above the lowest place there is, J."""
+    """What each step changes of the energy, J, and the energy above the lowest place there is, J. Of what lies on something, or
+    is locked (`carried`), the speed at the start of a step is v."""
     result = simulate(
         Scene(bodies=tuple(bodies), constraints=locks, gravity=(0.0, 0.0, -GRAVITY)),
         time_step=time_step,
         steps=steps,
         method=Method(solver=solver, impacts=impacts),  # type: ignore[arg-type]
-        observe={"energy": Trace(quantity=Energy())},
+        observe={"energy": Trace(quantity=Energy()), "momentum": Trace(quantity=Momentum())},
     )
     assert result.status == "completed"
-    return np.diff(result["energy"]), float(result["energy"][0])
+    energy = result["energy"] - (not carried) * 0.5 * time_step * GRAVITY * result["momentum"][:, 2]
+    return np.diff(energy), float(result["energy"][0])
 
 
 def flight(*masses: float) -> float:
-    """What a step of free flight takes, J."""
+    """What a step of free flight takes of the energy with v, J."""
     return 0.5 * sum(masses) * (GRAVITY * H) ** 2
+
+
+def half_kicks(*masses: float, time_step: float = H) -> float:
+    """The energy of half a kick, J: what lies still has none of it, and what begins to fall has."""
+    return 0.125 * sum(masses) * (GRAVITY * time_step) ** 2
 
 
 @pytest.mark.parametrize("impacts", IMPACTS)
@@ -87,7 +103,7 @@ def flight(*masses: float) -> float:
 def test_balls_that_touch_as_they_fly_are_carried_by_no_body(
     share: float, solver: str, impacts: Impacts
 ) -> None:
-    """Two rise, one on top of the other, and meet a third: each half of the kick before the blow used to come after it."""
+    """Two rise, one on top of the other, and meet a third."""
     up, down, heavy = 2.4, 1.5, 8.0
     gap = share * H * (up + down)
     places = (0.0, 2 * RADIUS, 4 * RADIUS + gap)
@@ -98,7 +114,7 @@ def test_balls_that_touch_as_they_fly_are_carried_by_no_body(
     ]
     change, _ = changes(bodies, 3, H, solver, impacts)
 
-    np.testing.assert_allclose(change, -flight(4.0, 0.5, heavy), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(change, 0.0, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("impacts", IMPACTS)
@@ -116,7 +132,7 @@ def test_a_ball_that_rises_along_a_wall_is_not_carried_by_it(
     ]
     change, _ = changes(bodies, 3, H, solver, impacts)
 
-    np.testing.assert_allclose(change, -flight(1.0), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(change, 0.0, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("impacts", IMPACTS)
@@ -133,7 +149,7 @@ def test_balls_locked_to_each_other_are_carried_by_no_body(
         ball("lower", (0.0, 0.0, -3.0 * RADIUS), (0.0, 0.0, speed), 3.0),
     ]
     lock = Lock(name="lock", between=("upper", "lower"), compliance=0.0)
-    change, _ = changes(bodies, 3, H, solver, impacts, lock)
+    change, _ = changes(bodies, 3, H, solver, impacts, lock, carried=True)
 
     np.testing.assert_allclose(change, -flight(1.0, 3.0), rtol=0, atol=1e-9)
 
@@ -151,7 +167,7 @@ def test_a_ball_that_has_left_the_floor_is_not_carried_by_it(share: float, solve
     ]
     change, _ = changes(bodies, 1, H, solver, "successive")
 
-    np.testing.assert_allclose(change, -flight(1.0), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(change, 0.0, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("impacts", IMPACTS)
@@ -177,7 +193,7 @@ def test_a_ball_hit_on_a_slope_wins_nothing(
         ball("rises", (0.0, 0.0, 0.0), tuple(2.0 * up)),
         ball("falls", tuple((2 * RADIUS + share * H * 3.0) * up), tuple(-1.0 * up), 3.0),
     ]
-    change, energy = changes(bodies, 4, H, solver, impacts)
+    change, energy = changes(bodies, 4, H, solver, impacts, carried=True)
 
     assert change.max() <= 1e-9 * energy
 
@@ -208,11 +224,12 @@ def test_the_floor_carries_what_lies_on_it_until_an_impact_lifts_it(
             "floor": Final(quantity=ContactForce("floor")),
         },
     )
-    (change,) = np.diff(result["energy"])
     rises = result["velocity"][1:, 2]
+    (change,) = np.diff(result["energy"])
+    change -= 0.5 * H * GRAVITY * rises @ (1.0, 2.0)
 
     assert rises[0] > 1.0
-    assert -flight(1.0, 2.0) < change <= 0.0
+    assert -half_kicks(1.0, 2.0) < change <= 1e-12
     assert -result["floor"][2] == pytest.approx(3.0 * GRAVITY + rises @ (1.0, 2.0) / H, rel=1e-12)
 
 
@@ -236,7 +253,7 @@ def test_what_loses_its_support_in_an_impact_wins_nothing_by_its_fall(
             "comes", tuple(support - (2.0 * large + share * H * speed) * way), tuple(speed * way), 1.0, large
         ),
     ]
-    change, energy = changes(bodies, 1, H, solver, impacts)
+    change, energy = changes(bodies, 1, H, solver, impacts, carried=True)
 
     assert change.max() <= 1e-9 * energy
 
@@ -254,7 +271,7 @@ def test_an_impact_that_comes_before_the_expected_one_takes_nothing(solver: str)
     ]
     change, _ = changes(bodies, 1, H, solver, "successive")
 
-    np.testing.assert_allclose(change, -flight(light, heavy, heavy), rtol=0, atol=1e-9)
+    np.testing.assert_allclose(change, 0.0, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
@@ -274,12 +291,17 @@ def test_what_an_impact_lifts_falls_until_the_next_one(share: float, solver: str
         time_step=H,
         steps=1,
         method=Method(solver=solver, impacts="successive"),  # type: ignore[arg-type]
-        observe={"energy": Trace(quantity=Energy()), "roof": Final(quantity=ContactForce("roof"))},
+        observe={
+            "energy": Trace(quantity=Energy()),
+            "velocity": Final(quantity=Velocity()),
+            "roof": Final(quantity=ContactForce("roof")),
+        },
     )
     (change,) = np.diff(result["energy"])
+    change -= 0.5 * H * GRAVITY * result["velocity"][2:, 2] @ (1.0, 2.0)
 
     assert result["roof"][2] > 0.0
-    assert -flight(1.0, 2.0) < change <= 0.0
+    assert -half_kicks(1.0, 2.0) < change <= 1e-12
 
 
 @pytest.mark.parametrize("impacts", IMPACTS)
@@ -308,7 +330,7 @@ def test_a_ball_that_slides_up_to_a_steeper_slope_wins_nothing(
     (up, normal), speed = ways[0], 2.0
     place = RADIUS * normal - (RADIUS * math.tan(0.03) + share * H * speed) * up
     change, energy = changes(
-        [*planks, ball("slides", tuple(place), tuple(speed * up))], 1, H, solver, impacts
+        [*planks, ball("slides", tuple(place), tuple(speed * up))], 1, H, solver, impacts, carried=True
     )
 
     assert change[0] <= 1e-9 * energy
@@ -376,6 +398,13 @@ def gas(seed: int, across: int) -> list[RigidBody]:
 def test_elastic_balls_between_walls_never_gain_energy(
     rate: int, across: int, solver: str, impacts: Impacts
 ) -> None:
+    """Successive blows keep it. Where several at once stop a ball without rebound, rows may hold a part of its kick and leave it as
+    much as half a kick is worth, ⅛ m (g h)²; all that is won in a run is no more."""
     for seed in range(4):
-        change, energy = changes(gas(seed, across), 2 * rate, 1 / rate, solver, impacts)
-        assert change.max() <= 1e-9 * energy, seed
+        bodies, h = gas(seed, across), 1 / rate
+        change, energy = changes(bodies, 2 * rate, h, solver, impacts)
+        half = half_kicks(*(body.mass for body in bodies if body.mass), time_step=h)
+        most = 1e-9 * energy + (half if impacts == "simultaneous" else 0.0)
+        assert np.cumsum(change).max() <= most, seed
+        if impacts == "successive":
+            assert np.abs(change).max() <= most, seed

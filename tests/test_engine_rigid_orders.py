@@ -22,7 +22,6 @@ from spook_tracker.engine import (
     Hinge,
     JointCoordinate,
     Limit,
-    Material,
     MaximumAbsolute,
     Method,
     MethodError,
@@ -296,14 +295,10 @@ def box(name: str, x: float) -> RigidBody:
 def test_what_a_method_cannot_carry_is_refused_by_name(method: Method) -> None:
     hinge = Hinge(name="knee", between=(WORLD, "a"), axis=(0.0, 0.0, 1.0), limit=Limit(lower=-1.0, upper=1.0))
 
-    bouncing = dataclasses.replace(box("b", 3.0), material=Material(restitution=0.5))
-    why = (
-        r"'b' has a restitution"
-        if method == HALF
-        else r"surfaces may touch.*leaves order 1.*half_step_velocities"
-    )
-    with pytest.raises(MethodError, match=rf"{why}.*contacts=False"):
-        compile(Scene(bodies=(box("a", 0.0), bouncing)), time_step=0.01, method=method)
+    if method != HALF:
+        why = r"surfaces may touch.*leaves order 1.*half_step_velocities.*contacts=False"
+        with pytest.raises(MethodError, match=why):
+            compile(Scene(bodies=(box("a", 0.0), box("b", 3.0))), time_step=0.01, method=method)
     with pytest.raises(MethodError, match=r"'knee' has a limit; order 1 is the highest"):
         compile(Scene(bodies=(box("a", 0.0),), constraints=(hinge,)), time_step=0.01, method=method)
     with pytest.raises(MethodError, match="needs the direct solver"):

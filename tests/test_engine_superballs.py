@@ -16,6 +16,7 @@ from spook_tracker.engine import (
     Final,
     Material,
     Method,
+    Momentum,
     Plane,
     RigidBody,
     Scene,
@@ -100,11 +101,13 @@ def test_no_rubber_gains_energy(solver: str, seed: int) -> None:
         time_step=1 / 240,
         steps=240,
         method=Method(solver=solver),  # type: ignore[arg-type]
-        observe={"energy": Trace(quantity=Energy())},
+        observe={"energy": Trace(quantity=Energy()), "momentum": Trace(quantity=Momentum())},
     )
 
-    energy = np.asarray(run["energy"])
-    assert np.diff(energy).max() <= 1e-9 * energy[0]
+    # On the parabolas that bodies go along, with v + g h/2; rows that hold a part of a kick may leave half of one.
+    energy = run["energy"] - 0.5 * 9.81 / 240 * run["momentum"][:, 2]
+    half_kick = sum(body.mass or 0.0 for body in bodies) * (9.81 / 240) ** 2 / 8.0
+    assert (energy - np.minimum.accumulate(energy)).max() <= half_kick < 1e-3 * energy[0]
 
 
 @pytest.mark.parametrize("share", [-0.1, 1.1, math.nan])

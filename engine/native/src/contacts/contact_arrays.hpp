@@ -92,7 +92,7 @@ struct PenetrationRecord {
 struct EventSearch {
     std::vector<std::size_t> members;
     std::vector<std::uint64_t> impact_pair;  // the pair of the island's impact, plus one
-    std::vector<char> plain, bouncy;
+    std::vector<char> plain, bouncy, rests;
     std::vector<double> when, speed;
     std::vector<std::size_t> moving_along, may_move_along;  // how many move along the forces, and may
 };
@@ -107,7 +107,7 @@ struct ImpactArrays {
     std::vector<Vec6> before, mixed, next;
     std::vector<std::array<double, 2>> returned;  // of the slip of each point, m/s
     std::vector<double> limit, energy, share, low, high, asked, first, closing;
-    std::vector<char> rises, answered, touched, taking_part, balls, is_hit;  // the last by body
+    std::vector<char> rises, answered, touched, taking_part, balls, is_hit, rests;  // the last two by body
 };
 
 struct EnergySums {

@@ -64,6 +64,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
         dv_ext_[b] = sum(free_velocity[b], velocity[b], -1.0);
         prescribed_[b] = solver_index_[b] < 0 ? velocity[b] : Vec6{};
     }
+    whole_dv_ext_ = dv_ext_;
     has_external_drive_ = conveys_ || std::any_of(prescribed_.begin(), prescribed_.end(),
                                                   [](const Vec6& v) { return v != Vec6{}; });
     // By island, of which there may be as many as bodies, however late; a copy of the stage has no room for them.
@@ -115,6 +116,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
         return false;
     }
     state_.counters.contacts += points_.size();
+    apply_half_of_forces();
     order_points();
     measure_points();
     return true;

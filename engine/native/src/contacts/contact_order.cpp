@@ -35,10 +35,12 @@ void ContactStage::find_events() {
     for (const auto& [a, b] : joints_)
         if (a >= 0 && b >= 0) join(a, b);
 
-    auto& [members, impact_pair, plain, bouncy, when, speed, moving_along, may_move_along] = arrays_.events;
+    auto& [members, impact_pair, plain, bouncy, rests, when, speed, moving_along, may_move_along] =
+        arrays_.events;
     members.assign(solver_index_.size(), 0);
     impact_pair.assign(solver_index_.size(), 0);
     plain.assign(solver_index_.size(), 1), bouncy.assign(solver_index_.size(), 0);
+    rests.assign(solver_index_.size(), 0);
     moving_along.assign(solver_index_.size(), 0), may_move_along.assign(solver_index_.size(), 0);
     when.assign(solver_index_.size(), -1.0);
     for (std::size_t b = 0; b < solver_index_.size(); ++b)
@@ -65,6 +67,7 @@ void ContactStage::find_events() {
         impact_pair[island] = pair;
         when[island] = point.toi;
         bouncy[island] = bouncy[island] || material(point.contact).restitution > 0.0;
+        rests[island] = rests[island] || comes_to_rest(point, point.toi / options_.time_step);
     }
     // A plastic impact among bodies that may meet others after it acts at the start of the step, as the rows of those
     // others will: bodies moved to an event's time would not be where such rows expect them. Nor are successive impacts among
@@ -89,9 +92,9 @@ void ContactStage::find_events() {
         if (impact_pair[island] == 0 || !plain[island] || members[island] > event_bodies) continue;
         if (moving_along[island] > may_move_along[island]) continue;
         event_time_[b] = when[island];
-        if (!supported_[b] && !jointed_[b]) toi_fraction_[b] = when[island] / options_.time_step;
-        velocity_[b] = sum(velocity_[b], dv_ext_[b], toi_fraction_[b]);
-        for (double& k : dv_ext_[b]) k *= 1.0 - toi_fraction_[b];
+        if (is_free(b))
+            apply_forces_until(
+                b, part_of_forces(when[island] / options_.time_step, rebounds_ && !rests[island]));
     }
     for (Point& point : points_) {
         if (point.toi < 0.0) continue;
@@ -99,6 +102,34 @@ void ContactStage::find_events() {
         point.event = event_time_[body] >= 0.0;
         if (point.event) point.contact.point.gap = std::max(0.0, point.meeting_gap);
     }
+}
+
+/// Forces act on a free body up to this part of the step; the rest of them comes with the solve.
+void ContactStage::apply_forces_until(std::size_t b, double part) {
+    velocity_[b] = sum(velocity_[b], whole_dv_ext_[b], part - toi_fraction_[b]);
+    dv_ext_[b] = sum(Vec6{}, whole_dv_ext_[b], 1.0 - part);
+    toi_fraction_[b] = part;
+}
+
+/// Where bodies may rebound, free ones that are not moved to the time of an impact have half of the forces before any.
+void ContactStage::apply_half_of_forces() {
+    for (std::size_t b = 0; rebounds_ && b < solver_index_.size(); ++b)
+        if (solver_index_[b] >= 0 && is_free(b) && event_time_[b] < 0.0)
+            apply_forces_until(b, part_of_forces(0.0, true));
+}
+
+/// Whether forces bring the bodies of a point together again within a step of which this part has passed when they meet.
+bool ContactStage::comes_to_rest(const Point& point, double part) const {
+    double approach = relative(point, point.contact.point.normal, velocity_, false), push = 0.0;
+    const auto follow = [&](int b, Vec6 row) {
+        if (solver_index_[b] < 0 || !is_free(b)) return;
+        const double own = dot(row, whole_dv_ext_[b]);
+        push += own, approach += (part_of_forces(part, true) - toi_fraction_[b]) * own;
+    };
+    const Vec3 n = point.contact.point.normal;
+    follow(point.contact.first, contact_row(n, point.first_arm));
+    follow(point.contact.second, contact_row(-n, point.second_arm));
+    return material(point.contact).restitution * -approach < 0.5 * (1.0 - part) * -push;
 }
 
 /// Sorts the points by key and finds each one's predecessor in the step before.
@@ -140,7 +171,8 @@ void ContactStage::measure_points() {
                    point.impact > 0.0) {  // an impact of this step has brought them together
             point.bounce = 0.0;
         } else if (speed > 0.0 && gap + time_left(point) * (point.approach + point.dv_ext) < 0.0) {
-            const double ahead = 2.0 * (-point.dv_ext / h) * gap / (speed * speed);
+            const double push = relative(point, contact.point.normal, whole_dv_ext_, false);
+            const double ahead = 2.0 * (-push / h) * gap / (speed * speed);
             const double left = psi > 0.0 ? psi * psi - (1.0 - psi * psi) * ahead : 0.0;
             if (left > 0.0) point.bounce = std::min(1.0, std::sqrt(left));
             else if (plastic_first_) point.bounce = 0.0;

@@ -87,6 +87,7 @@ ContactStage::ContactStage(Detection detection, const std::vector<SurfaceMateria
         conveys_ = conveys_ || norm(material.surface_velocity) > 0.0;
         oriented_ = oriented_ || material.is_oriented();
         resists_turning_ = resists_turning_ || material.resists_turning();
+        rebounds_ = rebounds_ || material.restitution > 0.0;
     }
     const std::size_t bodies = solver_index_.size();
     for (std::size_t b = 0; b < bodies; ++b) {

@@ -19,8 +19,8 @@
 // with v, which their supports agree with; flying ones with v + h M⁻¹ f, whether or not they touch.
 //
 // An impact of balls that no other contact disturbs is an event at its own time t within the step, with the normal and the
-// arms of the meeting: impulses act there, with the part t/h of the step's forces before and the rest after, and both bodies
-// move by t v₋ + (h − t) v₊.
+// arms of the meeting: impulses act there, with a part of the step's forces before and the rest after, and both bodies
+// move by t v₋ + (h − t) v₊. Which part: contacts/supported_bodies.cpp.
 // Other impacts act at the start of the step: the gap may close, no more; with restitution a step early, psi then
 // reduced to psi', psi'² = psi² − (1 − psi²) 2 a g/V², a the approaching acceleration and V the approaching
 // speed, so that the fall still ahead is not won twice.
@@ -289,6 +289,10 @@ private:
     bool add_toi_point_at_start(const OpenPair& open, double time, const std::vector<Vec6>& velocity);
     void move_impacts_to_start(std::size_t from, const std::vector<Vec6>& velocity);
     void find_events();
+    bool is_free(std::size_t b) const noexcept { return !supported_[b] && !jointed_[b]; }
+    void apply_forces_until(std::size_t body, double part);
+    void apply_half_of_forces();
+    bool comes_to_rest(const Point& point, double part) const;
     // supported_bodies.cpp
     void note_supports(Point& point);
     void find_supported();
@@ -318,7 +322,7 @@ private:
     bool needs_stop_impact(const MixedSystem& system, std::size_t known, const std::vector<Vec6>& next);
     bool pass_other_ends(const MixedSystem& system, std::size_t joints);
     void find_earliest_impacts(MixedSystem& system, std::vector<std::size_t>& hit_points);
-    void apply_forces_before(std::size_t body, MixedSystem& system);
+    void apply_forces_before(std::size_t body, double part, MixedSystem& system);
     Vec6 path_until(std::size_t body, double time) const;
     double gap_at(const Point& point, double time) const;
     double last_impact_time(const Point& point) const noexcept;
@@ -419,7 +423,7 @@ private:
     bool conveys_ = false;             // some surface moves along itself
     bool has_external_drive_ = false;  // or, in this step, something that does not move by itself
     bool oriented_ = false;            // some surface has a friction that differs with the direction
-    bool resists_turning_ = false;
+    bool resists_turning_ = false, rebounds_ = false;  // some surface does
     bool swings_ = false;     // some surface has sides: what turns on it may meet elsewhere
     std::vector<char> ball_;  // bodies whose only surface is a sphere round their centre
     IslandSolver resting_solver_, impact_solver_, projection_solver_;
@@ -429,14 +433,13 @@ private:
     std::vector<char> yielding_;
     std::vector<double> body_compliance_;  // of contacts of jointed bodies, see find_body_compliance(), 1/kg
     double expected_overlap_ = 0.0;        // of the last step: how near to look at balls, no more
-    LargeArray<PenetrationRecord> penetrations_,
-        projected_;                      // points of the step's pairs where it ends; of all its projections
-    std::vector<Pose> projected_poses_;  // where bodies were at the last of them
-    bool moved_far_ = false;             // the last may not have been enough, see moves_far()
-    std::vector<char> reconsidered_;     // which bodies are, by body; empty: for every body
-    bool ran_away_ = false;              // in this solve: islands that are not too large are solved directly
-    std::vector<Vec6> next_;             // velocities between iterations, per body of the scene
-    std::vector<char> changed_;  // bodies with another than at the look before: the rest was judged then
+    LargeArray<PenetrationRecord> penetrations_, projected_;  // of the step's end; of all its projections
+    std::vector<Pose> projected_poses_;                       // where bodies were at the last of them
+    bool moved_far_ = false;          // the last may not have been enough, see moves_far()
+    std::vector<char> reconsidered_;  // which bodies are, by body; empty: for every body
+    bool ran_away_ = false;           // in this solve: islands that are not too large are solved directly
+    std::vector<Vec6> next_;          // velocities between iterations, per body of the scene
+    std::vector<char> changed_;       // bodies with another than at the look before: the rest was judged then
     std::size_t handed_over_ = 0, ordered_ = 0;  // points the PGS solver has; points in order
     Unanswered unanswered_;
     std::vector<CachedContact> unordered_;
@@ -445,6 +448,7 @@ private:
 
     std::vector<Pose> poses_;
     std::vector<Vec6> velocity_, dv_ext_, predicted_;  // v, h M⁻¹ f, and what bodies are cast along
+    std::vector<Vec6> whole_dv_ext_;                   // the second before an impact takes its part
     LargeArray<OpenPair> open_;
     int met_ = 0;                         // of them
     std::vector<IndexPair> open_bodies_;  // of each, to look through many that did not move; empty: not yet
@@ -461,10 +465,9 @@ private:
         bool first_presses, second_presses, both;  // on each other, supported or not
     };
     std::vector<SupportPair> support_pairs_;
-    std::vector<Vec6> support_impulse_dv_;  // what supports took of a body's kick until they let it go
-    std::vector<double> depth_;             // of a body's closed contacts, m
-    std::vector<double>
-        predicted_sinking_;  // what iterations that have not settled would add to it in this step, m
+    std::vector<Vec6> support_impulse_dv_;   // what supports took of a body's kick until they let it go
+    std::vector<double> depth_;              // of a body's closed contacts, m
+    std::vector<double> predicted_sinking_;  // what unsettled iterations would add to it in the step, m
     std::vector<Contact> scratch_;
     std::vector<int> points_of_, points_begin_;  // points by moving body, and where each one's begin
     std::vector<int> root_;

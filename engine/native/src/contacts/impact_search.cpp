@@ -132,6 +132,7 @@ bool ContactStage::meets(const std::vector<Vec6>& next, bool stop_hit, bool rebo
     if (found > 0) move_impacts_to_start(closed_points, next);
     if (points_.empty()) return false;
     state_.counters.contacts += points_.size();
+    apply_half_of_forces();
     order_points();
     return true;
 }

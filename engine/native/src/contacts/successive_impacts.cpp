@@ -48,14 +48,10 @@ void ContactStage::move_to_last_impact(Point& point) {
 
 /// Forces act on a free ball until the time it is moved to, and the rest of them after it: what a fall towards a wall wins
 /// until then is lost on the way back.
-void ContactStage::apply_forces_before(std::size_t b, MixedSystem& system) {
-    const double lead = clock_[b] / options_.time_step;
-    if (supported_[b] || !(lead > toi_fraction_[b])) return;
-    const double part = (lead - toi_fraction_[b]) / (1.0 - toi_fraction_[b]);
-    toi_fraction_[b] = lead;
-    const Vec6 more = sum(Vec6{}, dv_ext_[b], part);
-    velocity_[b] = sum(velocity_[b], more);
-    for (double& k : dv_ext_[b]) k *= 1.0 - part;
+void ContactStage::apply_forces_before(std::size_t b, double part, MixedSystem& system) {
+    if (supported_[b] || !(part > toi_fraction_[b])) return;
+    const Vec6 more = sum(Vec6{}, whole_dv_ext_[b], part - toi_fraction_[b]);
+    apply_forces_until(b, part);
     const Mat6& mass = system.mass[solver_index_[b]];
     for (int i = 0; i < 6; ++i)
         for (int j = 0; j < 6; ++j) system.momentum[solver_index_[b]][i] += mass[6 * i + j] * more[j];
@@ -82,15 +78,18 @@ void ContactStage::find_earliest_impacts(MixedSystem& system, std::vector<std::s
         double& earliest = first[island_of(islands, points_[k])];
         earliest = std::min(earliest, closing[k]);
     }
-    std::vector<char>&hit = arrays_.impact.is_hit, &balls = arrays_.impact.balls;
-    hit.assign(solver_index_.size(), 0), balls.assign(islands.count, 1);
+    std::vector<char>&hit = arrays_.impact.is_hit, &balls = arrays_.impact.balls,
+    &rests = arrays_.impact.rests;
+    hit.assign(solver_index_.size(), 0), balls.assign(islands.count, 1), rests = hit;
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
         const double now = first[island_of(islands, point)];
         if (!is_impact(point) || (closing[k] > now && !is_closed(point.contact, gap_at(point, now))))
             continue;
         hit_points.push_back(k);
-        hit[point.contact.first] = hit[point.contact.second] = 1;
+        const bool stays = comes_to_rest(point, std::min(1.0, now / options_.time_step));
+        for (const int b : {point.contact.first, point.contact.second})
+            hit[b] = 1, rests[b] = rests[b] || stays;
     }
     const auto island = [&](std::size_t b) {
         return solver_index_[b] >= 0 ? islands.of_body[solver_index_[b]] : -1;
@@ -103,7 +102,8 @@ void ContactStage::find_earliest_impacts(MixedSystem& system, std::vector<std::s
         if (const double time = std::min(first[own], options_.time_step); hit[b] && time > clock_[b]) {
             path_[b] = path_until(b, time);
             clock_[b] = time;
-            if (balls[own]) apply_forces_before(b, system);
+            if (balls[own])
+                apply_forces_before(b, part_of_forces(time / options_.time_step, !rests[b]), system);
         }
         if (!balls[own] || moves_along_forces(static_cast<int>(b))) continue;
         event_time_[b] = clock_[b];

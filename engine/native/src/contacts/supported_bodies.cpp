@@ -1,12 +1,14 @@
 // Which bodies are supported. Bodies touch where one lies on the other, and also where they fly side by side: these fall as if they
 // were alone. A body is supported if the step's forces press it, from one to the next, onto what does not move by itself.
 //
-// Until the time t of an event a free body takes the part t/h of its kick k, and goes with v + k: whatever the impact, it
-// loses ½ |k|² in the step, as it does in free flight. A supported one stays on its way with v, its support taking the kick:
+// A free body goes along a parabola, on which it has v + k/2 at the start of a step with the kick k. Until the time t of an event
+// it takes (1/2 + t/h) k, and goes with v + k: ½ |v + k/2|² and the height change by what the impact takes, and by nothing else,
+// whatever t, and however many impacts come (tests/test_engine_elastic_balls.py). One that comes to rest in the event takes t/h k, or
+// it would be lifted by the rest. A supported one stays on its way with v, its support taking the kick:
 // all of it is left for the rest of the step, and the energy changes by (t/h) k·(v₊ − v) − ½ |v₊ − v₁|² with v₁ after the
 // impact. That is a gain where the impact gives a speed along the forces. So a supported body that moves along them already is not advanced, but
 // where what it meets can only push against them, see find_events(). Another body that an impact sends along them, or against
-// them, is let go, with the rest of the kick. What still would be won, at most ½ |k|² by falling in the rest of the step,
+// them, is let go, and free from then on. What still would be won, at most ½ |k|² by falling in the rest of the step,
 // is paid in height.
 #include <algorithm>
 #include <cmath>
@@ -81,7 +83,7 @@ void ContactStage::release_support(int body, const Vec6& velocity) {
     const Vec3 kick = linear(dv_ext_[body]), before = linear(velocity_[body]);
     if (is_along(kick, before) || !is_along(kick, linear(velocity) - before)) return;
     supported_[body] = 0;
-    toi_fraction_[body] = event_time_[body] / options_.time_step;
+    toi_fraction_[body] = part_of_forces(event_time_[body] / options_.time_step, rebounds_);
     for (int i = 0; i < 6; ++i) support_impulse_dv_[body][i] = toi_fraction_[body] * dv_ext_[body][i];
     for (double& k : dv_ext_[body]) k *= 1.0 - toi_fraction_[body];
 }

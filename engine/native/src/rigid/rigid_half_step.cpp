@@ -196,6 +196,13 @@ void RigidSystem::read_half_step() {
     for (int i = 0; i < bodies(); ++i) {
         if (!constants_[i].moves()) continue;
         BodyState& s = live_.bodies[i];
+        if (touching_ &&
+            contacts_->toi_fraction(i) > 0.0) {  // what an impact within the step makes of it comes later
+            s.velocity = live_.before[i].velocity + 0.5 * kick(i);
+            s.angular_momentum = live_.before[i].angular_momentum + 0.5 * twist(i);
+            refresh(constants_[i], s);
+            continue;
+        }
         s.velocity = 0.5 * (s.velocity + live_.before[i].velocity);
         s.angular_momentum = 0.5 * (s.angular_momentum + live_.before[i].angular_momentum);
         if (!constants_[i].particle) refresh(constants_[i], s);
