@@ -7,7 +7,9 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+
+import numpy as np
 
 from spook_tracker.engine.check import Rotation, Vector
 
@@ -70,7 +72,7 @@ def hull(points: Sequence[Vector]) -> tuple[tuple[Vector, ...], tuple[Face, ...]
 def _planes(points: Sequence[Vector], flat: float, thin: float) -> dict[tuple[int, ...], Vector]:
     """The planes that have all points on one side: which points lie in each, and its outward normal."""
     found: dict[tuple[int, ...], Vector] = {}
-    for i, j, k in itertools.combinations(range(len(points)), 3):
+    for i, j, k in _supporting(points, 2.0 * flat, 0.5 * thin):
         if any(i in flat_set and j in flat_set and k in flat_set for flat_set in found):
             continue
         normal = cross(minus(points[j], points[i]), minus(points[k], points[i]))
@@ -95,6 +97,21 @@ def _planes(points: Sequence[Vector], flat: float, thin: float) -> dict[tuple[in
                 return {}  # all in one plane
             found[tuple(members)] = (nx, ny, nz)
     return found
+
+
+def _supporting(points: Sequence[Vector], flat: float, thin: float) -> Iterator[tuple[int, int, int]]:
+    """Triples, in order, whose plane may have all points on one side: few of the many, to be looked at exactly."""
+    given = np.array(points)
+    for i in range(len(given) - 2):
+        away = given - given[i]
+        j, k = np.triu_indices(len(given) - i - 1, 1)
+        j, k = j + i + 1, k + i + 1
+        normals = np.cross(away[j], away[k])
+        length = np.linalg.norm(normals, axis=1)
+        heights = normals @ away.T
+        aside = (heights.min(axis=1) < -flat * length) & (heights.max(axis=1) > flat * length)
+        for one in np.flatnonzero(~aside & (length > thin)):
+            yield i, int(j[one]), int(k[one])
 
 
 def _loop(points: Sequence[Vector], indices: Sequence[int], normal: Vector) -> Face:
