@@ -27,6 +27,7 @@ from spook_tracker.engine.protocol import Capabilities, Configuration, NotSuppor
 from spook_tracker.engine.recorded_joints import cross, joint_point, turned
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
+from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Sphere
 
 BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
@@ -100,6 +101,27 @@ class MuJoCo:
             mujoco.set_mjcb_passive(None)
 
 
+def start_speeds(scene: Scene, made: Model, model: Any, data: Any) -> Array:
+    """Joint speeds (nv,) from the bodies' velocities at the start; `data` is there."""
+    points, speeds, rows = set(made.point_bodies), [], []
+    for body in scene.bodies:
+        if getattr(body, "motion", "dynamic") != "dynamic":
+            continue
+        moving, turning = np.zeros((3, model.nv)), np.zeros((3, model.nv))
+        number = int(mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_BODY, body.name))
+        mujoco.mj_jacBody(model, data, moving, turning, number)
+        rows.append(moving)
+        speeds.append(body.velocity)
+        if body.name not in points:
+            rows.append(turning)
+            speeds.append(body.angular_velocity)  # type: ignore[union-attr]
+    wanted = np.array(speeds, dtype=float).ravel()
+    if not wanted.any():
+        return np.zeros(model.nv)
+    found: Array = np.linalg.lstsq(np.concatenate(rows), wanted, rcond=None)[0]
+    return found
+
+
 class _Run:
     """One model with its data, and what is read off it."""
 
@@ -136,24 +158,9 @@ class _Run:
             mujoco.set_mjcb_passive(_attraction(self, fields))
 
     def _start(self) -> None:
-        """Joint speeds from the bodies' velocities at the start."""
-        scene = self.task.scene
         mujoco.mj_forward(self.model, self.data)
-        points, speeds, rows = set(self.made.point_bodies), [], []
-        for body in scene.bodies:
-            if getattr(body, "motion", "dynamic") != "dynamic":
-                continue
-            moving, turning = np.zeros((3, self.model.nv)), np.zeros((3, self.model.nv))
-            mujoco.mj_jacBody(self.model, self.data, moving, turning, self._body(body.name))
-            rows.append(moving)
-            speeds.append(body.velocity)
-            if body.name not in points:
-                rows.append(turning)
-                speeds.append(body.angular_velocity)  # type: ignore[union-attr]
-        wanted = np.array(speeds, dtype=float).ravel()
-        if wanted.any():
-            self.data.qvel[:] = np.linalg.lstsq(np.concatenate(rows), wanted, rcond=None)[0]
-            mujoco.mj_forward(self.model, self.data)
+        self.data.qvel[:] = start_speeds(self.task.scene, self.made, self.model, self.data)
+        mujoco.mj_forward(self.model, self.data)
 
     def recording(self, setup: float) -> Recording:
         def step(count: int) -> None:

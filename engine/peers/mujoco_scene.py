@@ -32,7 +32,7 @@ from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.scene import Scene
 
 Array = npt.NDArray[np.float64]
-LIGHT = 1e-9  # of its mass and inertia, what stands between two joints of one body
+LIGHT = 1e-8  # of its mass and inertia, what stands between two joints of one body
 FADING = 1e-9  # 1/s: stiffness over damping of a joint that is damped alone
 APART = 1e-6  # of the model's extent: how far a tie may be open at the start
 FREE, BALL, SLIDE, HINGE = (
@@ -320,7 +320,7 @@ class _Translation:
         if armature or stiffness:
             self.carriage(
                 number,
-                armature or LIGHT * float(m.body_subtreemass[m.jnt_bodyid[number]]),
+                armature or LIGHT * float(m.dof_M0[dof]),
                 stiffness,
                 rest - here,
             )

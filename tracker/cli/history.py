@@ -349,9 +349,16 @@ def _kinds_of(test: Any) -> set[str]:
 
 @click.command(epilog=example("tracker show pendulum"))
 @click.argument("test")
+@click.option(
+    "--format",
+    "form",
+    type=click.Choice(["text", "mjcf"]),
+    default="text",
+    help="Or its scene as a file for MuJoCo.",
+)
 @json_option
 @source_options
-def show(test: str, as_json: bool, engine: str, catalogue: str) -> None:
+def show(test: str, form: str, as_json: bool, engine: str, catalogue: str) -> None:
     """Show one test: question, model, theory, limits and their sources."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.report_catalogue import card
@@ -367,6 +374,10 @@ def show(test: str, as_json: bool, engine: str, catalogue: str) -> None:
         from spook_tracker.tracker.cli.report_json import show_json
 
         click.echo(show_json(test, tests[test]))
+    elif form == "mjcf":
+        from spook_tracker.tracker.measure.cards import scene_file
+
+        click.echo(scene_file(tests[test]), nl=False)
     else:
         say(card(test, tests[test]))
 

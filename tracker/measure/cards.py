@@ -6,7 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from spook_tracker.engine.errors import EngineError
 from spook_tracker.scalar_tests.case import ScalarTest
+from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import EngineVersion, StageChoice, TestCard
 from spook_tracker.tracker.measure.commit import changed_since, subject_and_author
 from spook_tracker.tracker.measure.question import ask, sentence
@@ -53,6 +55,22 @@ def explained(test: ScalarTest, engine: Any) -> Any:
     return engine.explain(
         example.scene, time_step=example.time_step, method=example.method, observe=example.observe
     )
+
+
+def scene_file(test: ScalarTest) -> str:
+    """Its example scene as MJCF. Raises TrackerError with what that cannot say, or what is not installed."""
+    try:
+        from spook_tracker.engine.peers.mjcf import mjcf
+    except ImportError as error:
+        raise TrackerError(
+            f"MJCF is checked by MuJoCo, which is not installed ({error}); install it with: "
+            "pip install 'spook-tracker[mujoco]'"
+        ) from None
+    try:
+        example = test.example()
+        return mjcf(example.scene, example.time_step)
+    except EngineError as lack:
+        raise TrackerError(f"{test.title}: {lack}") from None
 
 
 def engine_version(engine: Any) -> EngineVersion:

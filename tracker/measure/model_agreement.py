@@ -23,7 +23,7 @@ LASTS = 1.0  # s
 ALIKE = 1e-6  # of the size
 STEPS = {REFERENCE: 1e-3}  # s, to begin with
 STEP = 1e-2  # s, of an engine that is asked with the highest order it has
-FINEST = 2.5e-4  # s
+FINEST = 1e-5  # s
 RESOLVED = 0.1 * ALIKE  # of the size: what halving a step may still change
 
 

@@ -24,6 +24,7 @@ from spook_tracker.tracker.measure.model_files import SUFFIXES, ModelFileError
 LookedWord = Literal["model", "part", "refused", "runs", "fails"]
 PARTS = ("no model by itself", "part of other models", "nothing in", "begins with <")
 STEPS = 10  # that a model must take to be said to run
+LONGEST = 20.0  # s that those steps may take
 LIMITS = crew.Limits(seconds=60.0, memory=4 << 30)
 LONG = crew.Limits(seconds=300.0, memory=4 << 30)
 
@@ -98,7 +99,7 @@ def _model(path: Path, reading: Reading) -> ModelFile:
 def _compared(engine: str, path: Path) -> Looked:
     """Stepped, and its swing compared: also of a model that is refused for what does not take part in a swing."""
     looked = _stepped(engine, path)
-    if looked.word not in ("runs", "refused") or not looked.format:
+    if not looked.format:
         return looked
     try:
         return replace(looked, agreement=agreement(_model(path, read(path)), engine))
@@ -113,7 +114,9 @@ def _stepped(engine: str, path: Path) -> Looked:
     reading = read(path)
     asked = ModelRun(model=_model(path, reading))
     try:
-        done = find(engine).simulate(asked, time_step=reading.time_step, duration=STEPS * reading.time_step)
+        done = find(engine).simulate(
+            asked, time_step=reading.time_step, duration=STEPS * reading.time_step, time_limit=LONGEST
+        )
     except NotSupported as lack:
         return _said(path, reading, "refused", str(lack))
     except EngineError as error:
