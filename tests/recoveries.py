@@ -50,7 +50,7 @@ def _recovers_once(told: Any) -> None:
         machine = judged.night.run.machine
         on = machine.fingerprint if told.definition.kind == "time" else machine.float_environment
         where = judged.night.test_version, on
-        if judged.state in ("suspected", "unjudged"):
+        if judged.state == "unjudged":
             continue
         before = last.get(where)
         if judged.state == "recovered":

@@ -155,16 +155,16 @@ def test_where_larger_is_better_less_is_worse() -> None:
 def test_recovered_is_the_first_night_after_red_that_says_anything() -> None:
     states = (
         "recovered",
-        "detected",
         "suspected",
+        "detected",
         "unjudged",
         "green",
         "green",
         "detected",
+        "suspected",
         "accepted",
-        "green",
     )
 
     assert list(with_recoveries(states)) == [
-        "green", "detected", "suspected", "unjudged", "recovered", "green", "detected", "accepted", "green",
+        "green", "suspected", "detected", "unjudged", "recovered", "green", "detected", "recovered", "accepted",
     ]  # fmt: skip

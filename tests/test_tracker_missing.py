@@ -12,9 +12,10 @@ from spook_tracker.tracker.document.run_document import Asked
 from spook_tracker.tracker.judge.accepted import Accepted, read_accepted
 from spook_tracker.tracker.judge.lane import RECENT, SPARSE, elsewhere, histories, line_of
 from spook_tracker.tracker.judge.tonight import tonight
+from spook_tracker.tracker.library import compare
 from spook_tracker.tracker.website.publish import publish
 from tests.synthetic_history import DocumentHistory, sample, series
-from tests.test_tracker_one_judge import night, one, rungs
+from tests.test_tracker_one_judge import Recorded, night, one, rungs, seconds
 
 GATE = series("gone", "m", role="gate", limit=1.0)
 COMPANION = series("t", "n", role="companion", limit=1.0)
@@ -77,6 +78,37 @@ def test_a_run_of_some_tests_misses_nothing_of_the_others() -> None:
     part = replace(night(1, [*one(0.5), (COMPANION, sample(COMPANION, 0.5))]), trigger="manual")
 
     assert set(found([both(0), part])) == {COMPANION.key, one(0.5)[0][0].key}
+
+
+def timed(number: int, times: bool, machine: str = "m") -> Any:
+    """A night of our own that says it was asked for test t: a value, and a run time where there are `times`."""
+    run = asked(number, [*one(0.5), *(seconds(1e-3) if times else [])], "t")
+    return replace(run, machine=replace(run.machine, fingerprint=machine))
+
+
+TIME = "t/plain/time"
+
+
+def test_a_run_time_that_stops_while_its_siblings_go_on_is_missing_and_red() -> None:
+    runs = [timed(n, times=n < 3) for n in range(5)]
+
+    assert found(runs[:4])[TIME] == ("missing", True, True)
+    assert found(runs)[TIME] == ("missing", True, False)
+    document = compare(Recorded(runs), runs[2].id, runs[3].id)  # type: ignore[arg-type]
+    assert {change.series for change in document.changes if change.red} == {TIME}
+    assert found([*runs, timed(5, times=True)])[TIME][1] is False
+
+
+def test_a_run_time_is_not_missed_where_it_never_was_timed() -> None:
+    """Neither on another machine, nor by a run of other tests, nor where it is read off a ladder's clock."""
+    elsewhere_timed = [timed(0, times=True), timed(1, times=True), timed(2, times=False, machine="n")]
+    of_others = replace(asked(2, one(0.5), "u"), machine=elsewhere_timed[0].machine)
+    read_off = series("t", "ladder:e:time-to-error", kind="time", better="smaller", time_step=None)
+    ladder = [asked(0, [*one(0.5), (read_off, sample(read_off, 1.0))], "t"), asked(1, one(0.5), "t")]
+
+    assert not any(red for _, red, _ in found(elsewhere_timed).values())
+    assert not any(red for _, red, _ in found([*elsewhere_timed[:2], of_others]).values())
+    assert not any(red for _, red, _ in found(ladder).values())
 
 
 def _branched() -> list[Any]:

@@ -41,9 +41,8 @@ from spook_tracker.tracker.judge.pairs import (
     to_be_repeated,
     usual_spread,
 )
-from spook_tracker.tracker.judge.series_history import is_read_off
 from spook_tracker.tracker.judge.verdict import badness, same_bits
-from spook_tracker.tracker.judge.work import with_work
+from spook_tracker.tracker.judge.work import is_read_off, with_work
 from spook_tracker.tracker.measure.commits import CommitError
 
 Ask = Callable[[Sequence[str]], RunDocument]  # puts these tests, all if none are named, to a fresh process

@@ -231,9 +231,10 @@ function judgeSeries(key, old, now, before, after, accepted) {
   if ((!old || !now) && definition.kind === "work") { return null; }
   let told, word = null;
   if (!old) { told = verdict("new", "measured for the first time"); } else if (!now) {
-    const family = FAMILY[definition.kind], tests = after.asked[family];
-    const missed = (tests || []).includes(definition.test) && definition.kind !== "time";
-    const removed = after.whole && definition.role === "gate" && tests;
+    const timed = definition.kind === "time", here = !timed || (!definition.read_off && before.machine === after.machine);
+    const tests = (here ? timed ? ["values", "sweep"] : [FAMILY[definition.kind]] : []).filter((family) => after.asked[family]).map((family) => after.asked[family]);
+    const missed = tests.some((asked) => asked.includes(definition.test));
+    const removed = after.whole && definition.role === "gate" && tests.length > 0;
     if (old.outcome === "missing" && (missed || removed)) {
       told = verdict("identical", "still missing", { ulps: 0n });
     } else if (missed) {

@@ -20,7 +20,7 @@ from spook_tracker.tracker.judge.series_history import Told
 from spook_tracker.tracker.judge.standing import expected
 from spook_tracker.tracker.judge.tonight import Finding
 from spook_tracker.tracker.judge.verdict import badness, limit_ratio
-from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, OPEN, Class
+from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class
 
 Standing = Literal["detected", "accepted", "recovered"]
 STANDINGS: tuple[Standing, ...] = ("detected", "accepted", "recovered")  # the worst first
@@ -176,7 +176,7 @@ def _hits_in(told: Told, nights: Sequence[Judged], over: Judged | None) -> list[
             elif judged.worse_at is not last:  # one more night tells better where it began
                 found[-1] = replace(_hit(told.key, told.definition, judged), told=found[-1].told)
             last = judged.worse_at
-        elif judged.state in OPEN:
+        elif judged.state == "unjudged":
             continue
         elif judged.state == "accepted" and open_from == len(found):
             found.append(_hit(told.key, told.definition, judged, "accepted"))

@@ -31,13 +31,13 @@ from spook_tracker.tracker.judge.lane import (
     run_time_histories,
 )
 from spook_tracker.tracker.judge.maps import NO_MAP, map_key, stands_of
-from spook_tracker.tracker.judge.series_history import Told, is_read_off, judge_all
+from spook_tracker.tracker.judge.series_history import Told, judge_all
 from spook_tracker.tracker.judge.slower import Usual, judge_time, only_followed, to_be_confirmed
 from spook_tracker.tracker.judge.standing import FOLLOWED, NO_VALUE, honest, standing
 from spook_tracker.tracker.judge.tonight import not_compared
 from spook_tracker.tracker.judge.verdict import Verdict, judge, judge_map
 from spook_tracker.tracker.judge.vocabulary import OVERALL, RED, WORD_RANK, Class, Overall, Word
-from spook_tracker.tracker.judge.work import FAMILIES
+from spook_tracker.tracker.judge.work import families_of, is_read_off
 
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 TIMES = ("time", "run_time")
@@ -207,9 +207,11 @@ def _series_changes(before: ComparedRun, after: ComparedRun, history: Known) -> 
             verdict = Verdict(word="new", sentence="measured for the first time")
             changes.append(_change(key, new[0], None, new[1], verdict))
         elif new is None and old is not None:
-            family = FAMILIES[old[0].kind]
-            asked = old[0].test in asked_of.get(family, ())
-            removed = after.whole and old[0].role == "gate" and family in asked_of
+            of_times = old[0].kind == "time"
+            here = not of_times or old_run.machine == new_run.machine
+            families = families_of(old[0]) if here else ()
+            asked = any(old[0].test in asked_of.get(family, ()) for family in families)
+            removed = after.whole and old[0].role == "gate" and any(f in asked_of for f in families)
             changes.append(_gone(key, old, asked, removed))
         elif old is not None and new is not None:
             if why := _another_question(old[0], new[0]):
@@ -238,10 +240,9 @@ def same_commit(before: Side, after: Side) -> bool:
     return clean and (before.engine, before.git_hash) == (after.engine, after.git_hash)
 
 
-def _gone(key: str, old: tuple[SeriesDefinition, Sample], asked: bool, removed: bool) -> Change:
+def _gone(key: str, old: tuple[SeriesDefinition, Sample], missed: bool, removed: bool) -> Change:
     """A value that is not there: a gap where the test was run, silence where it was not asked."""
     definition, sample = old
-    missed = asked and definition.kind != "time"
     if sample.outcome == "missing" and (missed or removed):
         still = Verdict(word="identical", sentence="still missing", ulps=0)
         return _change(key, definition, sample, None, still)

@@ -10,7 +10,7 @@ from typing import Any, Literal
 from spook_tracker.tracker.document.run_document import SeriesDefinition
 from spook_tracker.tracker.judge.judged import Judged
 from spook_tracker.tracker.judge.series_history import Told
-from spook_tracker.tracker.judge.vocabulary import OPEN, Class, Word
+from spook_tracker.tracker.judge.vocabulary import Class, Word
 
 Standing = Literal["detected", "accepted", "recovered"]
 
@@ -66,7 +66,7 @@ def _events_in(told: Told, nights: Sequence[Judged], over: Judged | None) -> lis
     for judged in nights:
         if judged.red:
             stretch.append(judged)
-        elif stretch and judged.state not in OPEN:
+        elif stretch and judged.state != "unjudged":
             standing: Standing = "accepted" if judged.state == "accepted" else "recovered"
             found.append(_event(told, stretch, standing, judged))
             stretch = []

@@ -23,7 +23,7 @@ from spook_tracker.tracker.document.run_document import (
     SeriesHistory,
 )
 from spook_tracker.tracker.judge.calibration import ladder_timing, that_counts
-from spook_tracker.tracker.judge.work import FAMILIES, Samples, with_work
+from spook_tracker.tracker.judge.work import FAMILIES, Samples, families_of, with_work
 
 _point = partial(tuple.__new__, Point)  # a point of its four parts, in a third of the time
 RECENT = 60  # runs read with all their evidence: state hashes, failures, counters, timings;
@@ -226,8 +226,8 @@ def with_missing(
     What a run was asked for it stores. Of a run that does not say (recorded by an earlier tracker, or by another
     tool), it is taken to be every value of the tests and families (values, sweep, stability) it measured, and for
     a nightly the whole catalogue. If the whole catalogue was asked, a gate whose test is gone is removed, not
-    forgotten. What is read off the clock is not missed: a machine may be too busy for it. A run that neither says
-    nor is among the measured is not asked. Where `measured` are some tests alone, `whole` tells of all that a run
+    forgotten. A run time is missed on a machine that timed it before; what is read off a ladder's clock is not missed: a
+    machine may be too busy for it. A run that neither says nor is among the measured is not asked. Where `measured` are some tests alone, `whole` tells of all that a run
     answered.
     """
     place = {run.id: i for i, run in enumerate(runs)}
@@ -247,19 +247,22 @@ def with_missing(
     told = {}
     for key, series in found.items():
         definition = series.definition
-        if definition.kind in ("time", "work"):
+        families = families_of(definition)
+        if definition.kind == "work" or not families:
             told[key] = series
             continue
         points = list(series.points)
         answered = {point.run.id for point in points}
         first = place[points[0].run.id]
         silent = [i for i in telling if i > first and ids[i] not in answered]
-        family = FAMILIES[definition.kind]
+        begun = _begun(series, place) if silent and definition.kind == "time" else None
         for i in silent:
             if runs[i].engine.name != points[0].run.engine.name:
                 continue
-            gone = definition.test not in asked(i).get(family, ())
-            if gone and not removed(i, family, definition.role == "gate"):
+            if begun is not None and begun.get(runs[i].machine.fingerprint, i) >= i:
+                continue  # that machine has never timed it
+            gone = not any(definition.test in asked(i).get(family, ()) for family in families)
+            if gone and not any(removed(i, family, definition.role == "gate") for family in families):
                 continue
             why = "removed from the catalogue" if gone else "asked for and not answered"
             lost = Sample(
@@ -270,6 +273,14 @@ def with_missing(
             points.sort(key=lambda point: place[point.run.id])
         told[key] = SeriesHistory(definition, tuple(points))
     return told
+
+
+def _begun(series: SeriesHistory, place: Mapping[str, int]) -> dict[str, int]:
+    """By machine, the place of the first run that timed a series."""
+    first: dict[str, int] = {}
+    for point in series.points:
+        first.setdefault(point.run.machine.fingerprint, place[point.run.id])
+    return first
 
 
 def asked_for(run: Any, samples: Samples) -> dict[str, set[str]]:

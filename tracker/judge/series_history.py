@@ -32,6 +32,7 @@ from spook_tracker.tracker.judge.slower import by_outcome, only_followed
 from spook_tracker.tracker.judge.standing import standing
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import Class, with_recoveries
+from spook_tracker.tracker.judge.work import is_read_off
 
 NOISY_NIGHTS = 400  # how far back run times are judged again night by night
 
@@ -134,11 +135,6 @@ def on_one_clock(night: Point) -> Hashable:
 def is_noisy(definition: SeriesDefinition) -> bool:
     """Whether the same build may give another value: run times only."""
     return definition.kind == "time"
-
-
-def is_read_off(definition: SeriesDefinition) -> bool:
-    """Whether a time is read off a ladder: time to an error, error in a time."""
-    return definition.metric.endswith((":time-to-error", ":error-in-time"))
 
 
 def _only_followed(noisy: Noisy) -> Noisy:

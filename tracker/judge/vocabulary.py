@@ -29,7 +29,6 @@ Word = Literal[
 Class = Literal["fail", "watch", "accepted", "none", "pass", "followed"]
 Overall = Literal["regressed", "not_comparable", "same", "identical"]  # of two versions compared
 State = Literal["green", "detected", "accepted", "recovered", "suspected", "unjudged"]
-OPEN: tuple[State, ...] = ("suspected", "unjudged")  # states that say of a red series nothing new
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,13 +103,18 @@ STATES: dict[State, str] = {
 
 
 def with_recoveries(states: Iterable[State]) -> Iterator[State]:
-    """The states of a series, night after night, its first night after a red stretch recovered, and no other."""
+    """The states of a series, night after night, its first night after a red stretch recovered, and no other.
+
+    A night without a verdict ends no stretch; a value that comes back is recovered, even if it is suspected to be slow.
+    """
     red = False
     for state in states:
-        if state in ("green", "recovered"):
-            state = "recovered" if red else "green"
+        if state == "recovered" or (red and state == "suspected"):
+            state = "green"
+        if state == "green" and red:
+            state = "recovered"
         yield state
-        red = state == "detected" or (red and state in OPEN)
+        red = state == "detected" or (red and state == "unjudged")
 
 
 def spaced(word: str) -> str:

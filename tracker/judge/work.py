@@ -53,6 +53,21 @@ FAMILIES = {
     "work": "work",
 }
 
+OF_TIMES = ("values", "sweep")  # of a run that does not say what it was asked for, either may tell
+
+
+def families_of(definition: SeriesDefinition) -> tuple[str, ...]:
+    """With which families a series is asked for; none where nobody misses it, as what is read off a ladder's clock."""
+    if definition.kind != "time":
+        return (FAMILIES[definition.kind],)
+    return () if is_read_off(definition) else OF_TIMES
+
+
+def is_read_off(definition: SeriesDefinition) -> bool:
+    """Whether a time is read off a ladder: time to an error, error in a time."""
+    return definition.metric.endswith((":time-to-error", ":error-in-time"))
+
+
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 
 

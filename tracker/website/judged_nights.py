@@ -22,8 +22,8 @@ from spook_tracker.tracker.judge.judged import commit_of
 from spook_tracker.tracker.judge.known import of_two
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
 from spook_tracker.tracker.judge.rank import question
-from spook_tracker.tracker.judge.series_history import Told, is_read_off
-from spook_tracker.tracker.judge.work import Samples, with_work
+from spook_tracker.tracker.judge.series_history import Told
+from spook_tracker.tracker.judge.work import Samples, is_read_off, with_work
 from spook_tracker.tracker.website.folder import digest
 from spook_tracker.tracker.website.nights import Book, Chapter, Night, Records
 
