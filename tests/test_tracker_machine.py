@@ -28,6 +28,43 @@ def test_another_processor_has_another_fingerprint(monkeypatch):
     assert machine().float_environment == here.float_environment
 
 
+RUNNER = ("ImageOS", "ImageVersion", "CI_DISPOSABLE_ENVIRONMENT", "CI_JOB_IMAGE")
+
+
+def hosted(patch: pytest.MonkeyPatch, **said: str):
+    for name in RUNNER:
+        patch.delenv(name, raising=False)
+    for name, value in said.items():
+        patch.setenv(name, value)
+    return machine()
+
+
+def test_a_hosted_runner_is_known_by_its_image_and_says_that_it_may_be_any_host(monkeypatch):
+    own = hosted(monkeypatch)
+    first = hosted(monkeypatch, ImageOS="ubuntu24", ImageVersion="20260101.1")
+    later = hosted(monkeypatch, ImageOS="ubuntu24", ImageVersion="20260108.1")
+    other = hosted(monkeypatch, ImageOS="ubuntu22", ImageVersion="20260101.1")
+
+    assert len({found.fingerprint for found in (own, first, other)}) == 3
+    assert first.fingerprint == later.fingerprint
+    assert first.processor == f"{own.processor}, any machine of the runner image ubuntu24"
+    assert (first.operating_system, later.operating_system) == (
+        f"{own.operating_system} ubuntu24 20260101.1",
+        f"{own.operating_system} ubuntu24 20260108.1",
+    )
+
+
+def test_a_container_names_the_machine_only_where_the_runner_is_thrown_away(monkeypatch):
+    own = hosted(monkeypatch)
+
+    assert hosted(monkeypatch, CI_JOB_IMAGE="python:3.12") == own
+    assert (
+        "python:3.12"
+        in hosted(monkeypatch, CI_JOB_IMAGE="python:3.12", CI_DISPOSABLE_ENVIRONMENT="true").processor
+    )
+    assert hosted(monkeypatch, ImageOS="two\nlines") == own
+
+
 def test_one_bit_of_one_library_function_is_another_float_environment(monkeypatch):
     here = float_environment()
     changed = tuple(

@@ -10,12 +10,14 @@ import hashlib
 import math
 import os
 import platform
+import re
 import struct
 from collections.abc import Callable
 from pathlib import Path
 
 from spook_tracker.tracker.document.run_document import Machine
 
+PLAIN = re.compile(r"[\w./:@-]{1,100}", re.ASCII)
 PROBES = (0.1, 0.7, 1.3, 2.9, 11.0, 123.456, 600.1)
 LIBRARY: tuple[Callable[[float], float], ...] = (
     math.sin,
@@ -36,14 +38,28 @@ def machine() -> Machine:
     processor = _processor()
     system = f"{platform.system()} {platform.machine()}"
     cores = os.cpu_count() or 1
-    identity = "\n".join((processor, str(cores), system, platform.libc_ver()[0]))
+    image, built = _image()
+    known = (processor, str(cores), system, platform.libc_ver()[0], *filter(None, [image]))
     return Machine(
-        fingerprint=hashlib.sha256(identity.encode()).hexdigest()[:16],
-        processor=processor,
+        fingerprint=hashlib.sha256("\n".join(known).encode()).hexdigest()[:16],
+        processor=f"{processor}, any machine of the runner image {image}" if image else processor,
         cores=cores,
-        operating_system=f"{system} {platform.release()}",
+        operating_system=" ".join(filter(None, (system, platform.release(), image, built))),
         float_environment=float_environment(),
     )
+
+
+def _image() -> tuple[str, str]:
+    """The image of a hosted runner, whose host is another one in every job, and which of its builds; empty elsewhere.
+
+    A build comes every week or two and is told, the image is part of the fingerprint: GitHub's ImageOS and
+    ImageVersion; GitLab's CI_JOB_IMAGE, where CI_DISPOSABLE_ENVIRONMENT says that the machine is thrown away.
+    """
+    said = os.environ.get
+    image, built = said("ImageOS", ""), said("ImageVersion", "")
+    if not image and said("CI_DISPOSABLE_ENVIRONMENT") == "true":
+        image = said("CI_JOB_IMAGE", "")
+    return tuple(word if PLAIN.fullmatch(word) else "" for word in (image, built))  # type: ignore[return-value]
 
 
 def float_environment() -> str:
