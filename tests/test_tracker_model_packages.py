@@ -9,7 +9,8 @@ from click.testing import CliRunner
 
 from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.measure.model_files import ModelFileError
-from spook_tracker.tracker.measure.model_packages import files_of, loaded, looked_at
+from spook_tracker.tracker.measure.model_packages import files_of, loaded, looked_at, stood
+from spook_tracker.tracker.measure.model_standing import Standing
 
 MODEL = '<mujoco><worldbody><body><freejoint/><geom size=".1"/></body></worldbody></mujoco>'
 
@@ -68,3 +69,51 @@ def test_the_command_counts_them(folder: Path) -> None:
     assert ran.exit_code == 0
     assert "4 files: 2 model" in ran.output
     assert "part.xml" not in ran.output
+
+
+SWING = '<mujoco><worldbody><body pos="0 0 2"><joint axis="0 1 0"/><geom type="capsule" size=".02 .3" pos=".3 0 0"/></body></worldbody></mujoco>'
+SOFT = """<mujoco><worldbody><geom type="plane" size="1 1 1"/><body name="ball" pos="0 0 .1"><freejoint/>
+<geom size=".1" solref="-500 -20"/></body></worldbody></mujoco>"""
+
+
+def test_of_several_engines_it_is_told_which_stand_together(tmp_path: Path) -> None:
+    pytest.importorskip(
+        "mujoco", reason="the extra mujoco is not installed: pip install 'spook-tracker[mujoco]'"
+    )
+    (tmp_path / "swing.xml").write_text(SWING)
+    (tmp_path / "soft.xml").write_text(SOFT)
+
+    found = {path.name: one for path, one in stood(files_of(str(tmp_path)), ("mujoco", "spook", "nobody"))}
+
+    swing, soft = found["swing.xml"], found["soft.xml"]
+    assert isinstance(swing, Standing) and isinstance(soft, Standing)
+    assert {one.groups for one in swing.checkpoints} == {(("mujoco", "spook"),)}
+    assert soft.checkpoints[-1].groups == (("mujoco",), ("spook",))  # one sinks in, the other lies on top
+    assert soft.checkpoints[-1].distance["mujoco", "spook"] > 5e-4
+    assert "nobody" in swing.refused
+
+
+def test_the_command_says_it_at_each_time(tmp_path: Path) -> None:
+    pytest.importorskip(
+        "mujoco", reason="the extra mujoco is not installed: pip install 'spook-tracker[mujoco]'"
+    )
+    file = tmp_path / "soft.xml"
+    file.write_text(SOFT)
+    asked = ["models", str(file), "--engine", "mujoco", "--engine", "spook"]
+    ran = CliRunner().invoke(main, asked, prog_name="tracker")
+
+    assert ran.exit_code == 0, ran.output
+    assert "5.00 s  mujoco" in ran.output
+    assert "of both errors" in ran.output
+
+
+def test_a_swing_is_compared_with_mujocos(tmp_path: Path) -> None:
+    pytest.importorskip(
+        "mujoco", reason="the extra mujoco is not installed: pip install 'spook-tracker[mujoco]'"
+    )
+    (tmp_path / "swing.xml").write_text(SWING)
+    ran = CliRunner().invoke(main, ["models", str(tmp_path), "--engine", "spook", "--agree"])
+    alone = CliRunner().invoke(main, ["models", str(tmp_path), "--agree"])
+
+    assert "1 swing as in MuJoCo" in ran.output
+    assert alone.exit_code == 2

@@ -13,23 +13,34 @@ WORDS = {"model": "·", "runs": "✓", "part": "-", "refused": "✗", "fails": "
 
 
 @click.command("models", epilog=example("tracker models gymnasium --engine mujoco"))
-@click.argument("package", metavar="PACKAGE|DIR")
-@click.option("--engine", metavar="NAME", help="Also load each in this engine and take ten steps.")
+@click.argument("package", metavar="PACKAGE|DIR|FILE")
+@click.option(
+    "--engine", "engines", metavar="NAME", multiple=True,
+    help="Also load each in this engine and take ten steps; of several, say which stand together at growing times.",
+)  # fmt: skip
 @click.option(
     "--agree", is_flag=True, help="Also compare its swing, without contacts and losses, with MuJoCo's."
 )
 @click.option("--all", "everything", is_flag=True, help="Also list files that are parts of others.")
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1, 256))
-def models_command(package: str, engine: str | None, agree: bool, everything: bool, workers: int) -> None:
+def models_command(
+    package: str, engines: tuple[str, ...], agree: bool, everything: bool, workers: int
+) -> None:
     """List the MJCF, URDF and SDF files of an installed package, and say which are models and which load."""
     from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.measure.model_packages import files_of, loaded, looked_at
+    from spook_tracker.tracker.measure.model_packages import files_of, loaded, looked_at, stood
 
     paths = files_of(package)
     if not paths:
         say(f"{package} holds no .xml, .mjcf, .urdf or .sdf files")
         return
     common = _common(paths)
+    if len(engines) > 1:
+        for path, found_together in stood(paths, engines, workers):
+            for line in _standing_lines(str(path.relative_to(common)), found_together):
+                say(line)
+        return
+    engine = engines[0] if engines else None
     found: list[Any] = []
     if agree and engine is None:
         raise click.UsageError("--agree compares an engine with MuJoCo; say which with --engine")
@@ -61,6 +72,35 @@ def _swing(looked: Any) -> str:
         return ""
     sign = "=" if looked.agrees else "≠" if found.resolved else "?"
     return f"{sign} {found.apart:7.1e} (steps {found.own:.0e}, {found.reference:.0e}) "
+
+
+def _standing_lines(name: str, found: Any) -> list[str]:
+    """One model: a line for each time, with the groups of engines and how far they are apart."""
+    if isinstance(found, str):
+        return [f"{name}: {found}"]
+    lines = [f"{name}, {found.size:.3g} m: engines within their own step errors stand together"]
+    for point in found.checkpoints:
+        first = point.groups[0]
+        groups = " | ".join(_group(point, group, first) for group in point.groups)
+        lines.append(f"  {point.time:5.2f} s  {groups}")
+    return lines + [f"  {engine}: {why}" for engine, why in found.refused.items()]
+
+
+def _group(point: Any, group: tuple[str, ...], first: tuple[str, ...]) -> str:
+    """mujoco = spook; and of another group how far [m] it is from the first, and that in its step errors."""
+    names = " = ".join(f"{engine} ±{point.error[engine]:.1e}" for engine in group)
+    if group == first:
+        return names
+    far, errors = min(
+        (point.distance.get((a, b), point.distance.get((b, a))), point.error[a] + point.error[b])
+        for a in group
+        for b in first
+    )
+    return (
+        f"{names}, {far:.2g} m away, {far / errors:.2g} of both errors"
+        if errors
+        else f"{names}, {far:.2g} m away"
+    )
 
 
 def _common(paths: Any) -> Any:

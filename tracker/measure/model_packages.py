@@ -20,6 +20,7 @@ from spook_tracker.engine.model_reading import ModelError, Reading, read
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.tracker.measure.model_agreement import ALIKE, Agreement, agreement
 from spook_tracker.tracker.measure.model_files import SUFFIXES, ModelFileError
+from spook_tracker.tracker.measure.model_standing import Standing, standing
 
 LookedWord = Literal["model", "part", "refused", "runs", "fails"]
 PARTS = ("no model by itself", "part of other models", "nothing in", "begins with <")
@@ -48,7 +49,9 @@ class Looked:
 
 
 def files_of(name: str) -> list[Path]:
-    """Every file that could be a model: of a folder, or of an installed package by its own or its import name."""
+    """Every file that could be a model: itself, of a folder, or of an installed package by its own or its import name."""
+    if Path(name).is_file():
+        return [Path(name)]
     if Path(name).is_dir():
         return sorted(path for path in Path(name).rglob("*") if path.suffix.lower() in SUFFIXES)
     try:
@@ -78,6 +81,24 @@ def loaded(paths: Sequence[Path], engine: str, workers: int = 2, agree: bool = F
     look = partial(_compared if agree else _stepped, engine)
     for path, answer in crew.answers(look, list(paths), workers, LONG if agree else LIMITS):
         yield Looked(path, "fails", answer.failure) if isinstance(answer, crew.Lost) else answer
+
+
+def stood(
+    paths: Sequence[Path], engines: Sequence[str], workers: int = 2
+) -> Iterator[tuple[Path, Standing | str]]:
+    """Of every model where these engines take it, or one sentence; what is no model by itself is left out."""
+    for path, answer in crew.answers(partial(_stood, tuple(engines)), list(paths), workers, LONG):
+        if isinstance(answer, crew.Lost):
+            yield path, answer.failure
+        elif answer is not None:
+            yield path, answer
+
+
+def _stood(engines: tuple[str, ...], path: Path) -> Standing | str | None:
+    looked = looked_at(path)
+    if looked.word != "model":
+        return looked.sentence if looked.word == "refused" else None
+    return standing(_model(path, read(path)), engines)
 
 
 def _said(path: Path, reading: Reading, word: LookedWord, sentence: str = "") -> Looked:
