@@ -98,7 +98,7 @@ from spook_tracker.engine.observe import (
 )
 from spook_tracker.engine.program import Program, StageChoice
 from spook_tracker.engine.result import Broken, Result, SimulationFailed
-from spook_tracker.engine.run import Run, Snapshot, start
+from spook_tracker.engine.run import Run, start
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import (
     Box,
@@ -114,6 +114,7 @@ from spook_tracker.engine.shapes import (
     Sphere,
 )
 from spook_tracker.engine.simulation import Prepared, prepare, simulate
+from spook_tracker.engine.snapshot import Snapshot
 from spook_tracker.engine.time_functions import Ramp, Sinusoid, Table, TimeFunction
 from spook_tracker.engine.tyres import Tyre
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import os
+import sys
 import threading
+import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol
@@ -137,13 +139,23 @@ class Program:
         """Every stage there is, kept or left out, with the reason in words."""
         return self._choices
 
-    def run(self, steps: int, time_limit: float | None = None, time_stages: bool = False) -> Result:
+    def run(
+        self,
+        steps: int,
+        time_limit: float | None = None,
+        time_stages: bool = False,
+        *,
+        since: float | None = None,
+    ) -> Result:
         """Run from the start for that many steps, natively and with the GIL released.
 
-        `time_limit` [s] of wall time ends the run as "timed_out", within a step, too;
+        `time_limit` [s] of wall time, from now or `since` (as `time.monotonic` tells it), ends the run as "timed_out",
+        before the first step or within one, too; velocities that only another solve would have told are then NaN.
         `time_stages` measures seconds by stage, which slows the run down.
         """
         steps, limit = check.step_count(steps), check.wall_time(time_limit)
+        if limit and since is not None:
+            limit = max(limit - (time.monotonic() - since), sys.float_info.min)
         for name, what in self._observe.items():
             if max(what.first, what.last or 0) > steps:
                 raise MethodError(f"observe {name!r}: its samples end beyond the last step, {steps}")

@@ -21,7 +21,6 @@ import math
 import threading
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
 from types import MappingProxyType, TracebackType
 from typing import Any
 
@@ -39,8 +38,10 @@ from spook_tracker.engine.observe import Final, Quantity
 from spook_tracker.engine.program import Program
 from spook_tracker.engine.result import Array, Result, SimulationFailed
 from spook_tracker.engine.scene import Scene
+from spook_tracker.engine.snapshot import Snapshot
 from spook_tracker.engine.time_functions import at_start
 
+A_LITTLE = 0.04  # s: to read a run in whose time is over
 ROUNDING = 1e-12  # of the length of a quaternion that came out of a run
 NOTHING_READ: Mapping[str, Quantity] = MappingProxyType({})
 
@@ -72,16 +73,6 @@ def start(
     finals = {name: Final(quantity=what) for name, what in observe.items()}
     program = compile(scene, time_step=time_step, method=method, observe=finals, held=True)
     return Run(scene, program, method, tuple(observe.items()), _flat(scene, state))
-
-
-@dataclass(frozen=True, slots=True)
-class Snapshot:
-    """Where a run is, with what was set; any run of an equal scene, step, method and observation can go there."""
-
-    of: tuple[Any, ...]
-    native: Any
-    settings: Mapping[tuple[str, str], tuple[Any, ...]]
-    failure: Result | None
 
 
 class Run:
@@ -161,7 +152,8 @@ class Run:
         return self.result().final_state
 
     def _result(self, report: Mapping[str, Any] | None, time_limit: float | None) -> Result:
-        now = self._native.read()
+        over = report is not None and report["status"] == "timed_out"
+        now = self._native.read(A_LITTLE if over else 0.0)
         times = {"seconds": self._seconds, "cpu_seconds": self._cpu_seconds}
         told = ("status", "failed_step", "failed_body", "failed_joints", "reason")
         ending = {k: report[k] for k in told} if report else {}

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -72,14 +73,16 @@ def simulate(
     """Run a scene for `duration` [s] or a number of `steps`, exactly one of them, wholly in native code.
 
     A duration that is no whole number of time steps [s] is rounded to the nearest. `time_limit` is wall time
-    [s]. Raises SceneError or MethodError with one sentence; a run that diverges is a Result that says so.
+    [s], compiling included. Raises SceneError or MethodError with one sentence; a run that diverges is a Result that says so.
     """
     if isinstance(scene, ModelRun):
         return _of_model(scene, time_step, duration, method, time_limit)
+    check.wall_time(time_limit)
+    begun = time.monotonic()
     prepared = prepare(
         scene, time_step=time_step, duration=duration, steps=steps, method=method, observe=observe
     )
-    return prepared.run(time_limit, time_stages)
+    return prepared.program.run(prepared.steps, time_limit, time_stages, since=begun)
 
 
 def _of_model(

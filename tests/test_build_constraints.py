@@ -80,6 +80,14 @@ def by_make() -> str:
     return f'export {line[0]}="$PWD{line[1]}"'
 
 
+def by_the_container_of_a_release() -> str:
+    """The same of cibuildwheel's container, which has the project in a folder of its own and nothing of our environment."""
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["cibuildwheel"]
+    assert settings["build-frontend"] == "pip"  # what others install for a build, pip does not take for one
+    ((name, value),) = settings["linux"]["environment"].items()
+    return f'export {name}="{value.replace("/project", "$PWD")}"'
+
+
 def built(desk: Path, settings: str) -> subprocess.CompletedProcess[str]:
     pip = f'"{sys.executable}" -m pip wheel -q --no-index --find-links . --no-deps -w out ./project'
     own = {name: value for name, value in os.environ.items() if not name.startswith("PIP_")}
@@ -88,7 +96,9 @@ def built(desk: Path, settings: str) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.mark.parametrize("settings", [by_ci_run, by_make], ids=lambda one: one.__name__)
+@pytest.mark.parametrize(
+    "settings", [by_ci_run, by_make, by_the_container_of_a_release], ids=lambda one: one.__name__
+)
 def test_a_planted_constraint_is_obeyed_and_a_planted_archive_refused(settings, desk: Path) -> None:
     good, _ = planted(desk, "1.0"), planted(desk, "2.0")
     (desk / ".ci" / LIST.name).write_text(f"planted==1.0 --hash=sha256:{good}\n")

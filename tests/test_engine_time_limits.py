@@ -14,6 +14,7 @@ import pytest
 
 from spook_tracker.engine import (
     Box,
+    Energy,
     Load,
     Lock,
     Material,
@@ -22,9 +23,13 @@ from spook_tracker.engine import (
     Program,
     RigidBody,
     Scene,
+    SimulationFailed,
     Sphere,
+    Trace,
     TriangleMesh,
     compile,
+    simulate,
+    start,
 )
 from tests.contact_scenes import DOWN, TIME_STEP
 
@@ -116,6 +121,7 @@ SCENES: dict[str, Callable[[], Made]] = {
     "box friction": lambda: wedged(400, Method(friction="box")),
     "rows to spare": lambda: sheet(30),
     "a mesh": lambda: landscape(60),
+    "contacts before the first step": lambda: wedged(400, Method(half_step_velocities=True)),
     "another thread's island": lambda: islands((20, 600), Method(threads=2)),
     "an island beside another thread's": lambda: islands((600, 20), Method(threads=2)),
 }
@@ -132,6 +138,47 @@ def test_a_time_limit_holds_inside_a_step(name: str) -> None:
     assert result.cpu_seconds < LIMIT + LATE
     assert result.failed_step == result.steps + 1
     assert program.run(min(result.steps, 2)).steps == min(result.steps, 2)
+
+
+ENERGY = {"energy": Trace(quantity=Energy())}
+
+
+@pytest.mark.parametrize("observe", [{}, ENERGY], ids=["unobserved", "observed"])
+def test_a_time_limit_holds_before_the_first_step(observe: dict[str, Trace]) -> None:
+    """Velocities at mid-step are found before the first step, those at the start are asked for, and those at the end."""
+    scene, method = wedged(400, Method(half_step_velocities=True))
+    began = time.process_time()
+    result = simulate(
+        scene, time_step=TIME_STEP, steps=10**6, method=method, observe=observe, time_limit=LIMIT
+    )
+
+    assert time.process_time() - began < LIMIT + LATE
+    assert (result.status, result.steps, result.failed_step) == ("timed_out", 0, 1)
+    assert "before step 1" in result.failure
+    assert all(values.shape == (0,) for values in result.partial.values())
+    for body in scene.bodies:
+        state = result.final_state[body.name]
+        assert tuple(state[:3]) == body.position
+        assert np.isnan(state[7:]).all()  # not found
+
+
+def test_the_clock_runs_while_a_scene_is_compiled() -> None:
+    scene, method = sheet(30)
+    result = simulate(scene, time_step=TIME_STEP, steps=1, method=method, time_limit=0.005)
+
+    assert (result.status, result.steps, result.seconds < LATE) == ("timed_out", 0, True)
+
+
+def test_a_held_run_tells_in_time_how_far_it_came() -> None:
+    scene, method = wedged(400, Method(half_step_velocities=True))
+    with start(scene, time_step=TIME_STEP, method=method, observe={"energy": Energy()}) as run:
+        began = time.process_time()
+        with pytest.raises(SimulationFailed) as failed:
+            run.step(time_limit=LIMIT)
+        assert time.process_time() - began < LIMIT + LATE
+        told = failed.value.result
+        assert told.status == "timed_out" and np.isnan(told.partial["energy"])
+        assert tuple(told.final_state["ball 3"][:3]) == scene.body("ball 3").position
 
 
 def test_steps_done_before_the_limit_are_kept() -> None:

@@ -355,15 +355,21 @@ def test_the_manual_pages_are_installed(installed: Path) -> None:
 def test_what_is_released_is_named_as_it_is() -> None:
     """The tools of the release are pinned, and the index is told who made this and under what licences."""
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    pinned = {
-        line.partition("==")[0].lower()
-        for line in (ROOT / ".ci" / "constraints.txt").read_text().splitlines()
-    }
+    lines = (ROOT / ".ci" / "constraints.txt").read_text().lower().replace("_", "-").splitlines()
+    pinned = {line.partition("==")[0] for line in lines}
     release = (ROOT / ".github" / "workflows" / "release.yml").read_text()
 
     assert {"build", "cibuildwheel", "auditwheel", "abi3audit"} <= pinned
-    for name in re.findall(r"pip install --quiet (\S+)", release):
-        assert name in pinned, name
+    tools = ROOT / ".ci" / "release-tools.txt"
+    installs = re.findall(r"pip install (.*)", release)
+    assert installs
+    assert {*installs} == {f"--quiet --require-hashes -r {tools.relative_to(ROOT)}"}
+    versions = [line for line in tools.read_text().splitlines() if not line.startswith("#")]
+    assert {"build", "cibuildwheel"} <= {line.partition("==")[0] for line in versions}
+    for line in versions:
+        name = line.split()[0]
+        assert "--hash=sha256:" in line, name
+        assert name in lines, f"{name} is not the one that is tested"
     assert {"authors", "keywords", "classifiers"} <= set(settings["project"])
     script = settings["tool"]["cibuildwheel"]["test-command"].partition("{project}/")[2]
     assert (ROOT / script).is_file()

@@ -27,7 +27,8 @@ RunReport run(Counting system) {
     Recorder nothing({}, {});
     nothing.prepare(1000);
     RunReport report;
-    run_loop(system, nothing, 1000, 0.0, report);
+    Watch watch(0.0);
+    run_loop(system, nothing, 1000, watch, report);
     return report;
 }
 

@@ -11,6 +11,7 @@
 
 #include "linear/vec.hpp"
 #include "run/program.hpp"
+#include "run/state_bytes.hpp"
 
 namespace spook {
 
@@ -59,13 +60,30 @@ template <class System>
 void bind_held(nb::module_& m, nb::class_<Program<System>>& program, const char* snapshot) {
     using Compiled = Program<System>;
     nb::class_<typename Compiled::Snapshot>(m, snapshot, "Where a held run is; only a run can make one.")
-        .def_ro("steps", &Compiled::Snapshot::steps, "steps from the start");
+        .def_ro("steps", &Compiled::Snapshot::steps, "steps from the start")
+        .def(
+            "bytes",
+            [](const typename Compiled::Snapshot& kept) {
+                const std::string bytes = to_bytes(kept);
+                return nb::bytes(bytes.data(), bytes.size());
+            },
+            "The same for another process of this build.")
+        .def_static(
+            "of_bytes",
+            [](const nb::bytes& bytes) {
+                return from_bytes<typename Compiled::Snapshot>({bytes.c_str(), bytes.size()});
+            },
+            nb::arg("bytes"), "Raises ValueError for what bytes() of this build has not made.");
     program
         .def(
             "start",
             [](Compiled& held, const std::vector<double>& state) {
-                nb::gil_scoped_release release;
-                held.start(state);
+                try {
+                    nb::gil_scoped_release release;
+                    held.start(state);
+                } catch (const Stopped&) {
+                    throw nb::python_error();  // interrupted from the keyboard
+                }
             },
             nb::arg("state"), "Back to the start, or to a flat (bodies, 13) state; empty: the scene's own.")
         .def(
@@ -82,11 +100,15 @@ void bind_held(nb::module_& m, nb::class_<Program<System>>& program, const char*
             "So many steps on, the GIL released; a dict as of run().")
         .def(
             "read",
-            [](Compiled& held) {
+            [](Compiled& held, double time_limit) {
                 RunReport report;
-                held.read(report);
+                {
+                    nb::gil_scoped_release release;
+                    held.read(report, time_limit);
+                }
                 return to_dict(report);
             },
+            nb::arg("time_limit"),
             "The observables, final_state and counters as they are now; changes nothing.")
         .def("keep", &Compiled::keep, "Where the run is, to go back to.")
         .def("go_back", &Compiled::go_back, nb::arg("snapshot"), "Go on from there, with the same bits.")

@@ -56,28 +56,26 @@ struct MeetingOf {
 };
 
 /// A depth [m] by pair of colliders, in one array.
-class DepthOfPair {
-public:
+struct DepthOfPair {
     using Item = std::pair<std::uint64_t, double>;
     using Iterator = std::vector<Item>::const_iterator;
-    bool empty() const noexcept { return items_.empty(); }
-    void clear() noexcept { items_.clear(); }
-    Iterator end() const noexcept { return items_.end(); }
+    bool empty() const noexcept { return items.empty(); }
+    void clear() noexcept { items.clear(); }
+    Iterator end() const noexcept { return items.end(); }
     Iterator find(std::uint64_t pair) const noexcept {
-        const auto at = std::lower_bound(items_.begin(), items_.end(), pair, before);
-        return at != items_.end() && at->first == pair ? at : items_.end();
+        const auto at = std::lower_bound(items.begin(), items.end(), pair, before);
+        return at != items.end() && at->first == pair ? at : items.end();
     }
     bool contains(std::uint64_t pair) const noexcept { return find(pair) != end(); }
     double at(std::uint64_t pair) const noexcept { return find(pair)->second; }
     double& operator[](std::uint64_t pair) {
-        auto at = std::lower_bound(items_.begin(), items_.end(), pair, before);
-        if (at == items_.end() || at->first != pair) at = items_.insert(at, {pair, 0.0});
+        auto at = std::lower_bound(items.begin(), items.end(), pair, before);
+        if (at == items.end() || at->first != pair) at = items.insert(at, {pair, 0.0});
         return at->second;
     }
 
-private:
     static bool before(const Item& item, std::uint64_t pair) noexcept { return item.first < pair; }
-    std::vector<Item> items_;
+    std::vector<Item> items;  // in order of pairs
 };
 
 /// A point where the step ends, of bodies that may overlap.

@@ -18,6 +18,7 @@
 #include <limits>
 
 #include "run/composition.hpp"
+#include "run/watch.hpp"
 
 namespace spook {
 
@@ -80,6 +81,7 @@ void ParticleComposition::advance(std::int64_t steps) {
 void ParticleComposition::constrained_step(double length, int depth) {
     const std::size_t count = rows_.size();
     if (state_.lost) return;
+    if (depth > 0) Watch::look();  // halves of halves are thousands
     std::vector<Vec3>&x = step_x_[static_cast<std::size_t>(depth)],
     &v = step_v_[static_cast<std::size_t>(depth)];
     x = nodes_.x;

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace spook {
@@ -119,6 +120,17 @@ void ParticleSystem::count(RunReport& report, std::int64_t steps) const {
         report.counters["block_operations"] = composition_->newton_iterations() * blocks;
     }
     report.residual = parts_.pgs.work.residual;
+}
+
+std::vector<double> ParticleSystem::places() const {
+    constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
+    std::vector<double> state;
+    for (int body = 0; body < bodies(); ++body) {
+        const Vec3 x = position(body);
+        state.insert(state.end(),
+                     {x.x, x.y, x.z, 1.0, 0.0, 0.0, 0.0, UNKNOWN, UNKNOWN, UNKNOWN, 0.0, 0.0, 0.0});
+    }
+    return state;
 }
 
 std::vector<double> ParticleSystem::final_state() {

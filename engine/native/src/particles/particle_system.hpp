@@ -39,7 +39,7 @@ public:
     Health health() const noexcept;
     void save() { keep(saved_); }
     void restore() { go_back(saved_); }
-    class Memory;
+    struct Memory;
     /// All that the coming steps depend on, loads apart; going back to it gives the bits of going on from it.
     void keep(Memory& memory) const;
     void go_back(const Memory& memory);
@@ -54,6 +54,8 @@ public:
     void reset(StageClock* clock);
     void count(RunReport& report, std::int64_t steps) const;
     std::vector<double> final_state();
+    /// The same without a solve: velocities are NaN.
+    std::vector<double> places() const;
 
     // --- what the samplers read, at the current sample ---
     Vec3 position(int body) const noexcept { return nodes_.x[nodes_.of_body[body]]; }
@@ -66,8 +68,7 @@ public:
     double kinetic_energy() const noexcept;
     double potential_energy() const noexcept;
 
-    class Memory {
-        friend class ParticleSystem;
+    struct Memory {
         std::vector<Vec3> x, v;
         std::vector<double> lambda;
         bool velocity_ready = false;

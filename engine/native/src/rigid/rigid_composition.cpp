@@ -85,6 +85,7 @@ void RigidSystem::judge_energy(RunReport& report) const {
 /// and so on; the order stays, `halved_steps` counts it. When the smallest part has none either, the state is lost.
 void RigidSystem::composed_step(double h, int depth) {
     if (live_.lost >= 0) return;
+    if (depth > 0) Watch::look();  // halves of halves are thousands
     const std::span<const double> stages = composition_stages(method_.composition);
     LargeArray<BodyState>& start = step_start_[depth];
     start = live_.bodies;

@@ -14,6 +14,8 @@ void RigidSystem::keep(Snapshot& kept) const {
     kept.state = live_;
     kept.joints = joints_;
     kept.warm.mixed = mixed_;
+    for (RowBlock& rows : kept.warm.mixed.rows)
+        rows.further = {};  // of this system; every step shows them anew
     kept.warm.redundancy = redundant_.memory();
     if (contacts_) contacts_->keep(kept.contacts);
     if (!stiff_) return;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <stdexcept>
 
 namespace spook {
@@ -113,7 +114,6 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     if (may_lie_in_plane(scene))
         plane_.analyse(constants_, joints_, constrained_,
                        {h_, method_.refinements, method_.corrections, method_.correction_cap});
-    reset(nullptr);
 }
 
 /// Which stages run here; what the scene has and no stage handles is refused.
@@ -296,6 +296,17 @@ double RigidSystem::potential_energy() const noexcept {
         if (drive.kind == DriveKind::rest)
             sum += joints_.spring_energy(drive.index, drive.function.at(now), live_.bodies);
     return sum;
+}
+
+std::vector<double> RigidSystem::places() const {
+    std::vector<double> out;
+    for (int i = 0; i < bodies(); ++i) {
+        const Vec3 x = position_of(i);
+        const Quat q = orientation_of(i);
+        out.insert(out.end(), {x.x, x.y, x.z, q.w, q.x, q.y, q.z});
+        out.insert(out.end(), 6, std::numeric_limits<double>::quiet_NaN());
+    }
+    return out;
 }
 
 std::vector<double> RigidSystem::final_state() {

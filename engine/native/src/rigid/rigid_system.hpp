@@ -40,6 +40,7 @@ enum class RigidSolver { none, block, pivot, iterative };
 class RigidSystem {
 public:
     /// Built from the stages; throws std::invalid_argument for those it cannot run, or joints that no stage solves.
+    /// It has a state once it was reset.
     RigidSystem(const RigidScene& scene, StageList stages);
 
     const StageList& stages() const noexcept { return stages_; }
@@ -89,6 +90,8 @@ public:
     using Unsettled = spook::Unsettled;
     const Unsettled& unsettled() const noexcept { return live_.unsettled; }
     std::vector<double> final_state();
+    /// The same without a solve: velocities are NaN.
+    std::vector<double> places() const;
     void judge_energy(RunReport& report) const;
 
     // What can be observed:

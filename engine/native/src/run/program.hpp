@@ -51,11 +51,26 @@ public:
     RunReport run(std::int64_t steps, double time_limit, bool timed) {
         RunReport report;
         StageClock clock;
-        system_.reset(timed ? &clock : nullptr);
+        Watch watch(time_limit);
         recorder_.prepare(steps);
-        run_loop(system_, recorder_, steps, time_limit, report);
+        bool begun = true;
+        try {
+            system_.reset(timed ? &clock : nullptr);
+            run_loop(system_, recorder_, steps, watch, report);
+        } catch (const Stopped&) {
+            begun = false;
+            report.seconds = watch.elapsed();
+            report.cpu_seconds = watch.processor();
+            report.recordings = recorder_.recordings();
+            report.counters["samples"] = recorder_.samples_read();
+        }
         system_.count(report, report.steps);
-        report.final_state = system_.final_state();
+        watch.extend();
+        if (!begun) report.final_state = system_.places();
+        if (!(begun && read_state(report)) && report.status == Status::completed) {
+            report.status = Status::timed_out;
+            report.failed_step = report.steps + 1;
+        }
         if constexpr (requires { system_.judge_energy(report); }) system_.judge_energy(report);
         report.state_hash = state_hash(report.final_state);
         for (std::size_t k = 0; k < STAGES; ++k) {
@@ -74,9 +89,10 @@ public:
         std::int64_t steps = 0;
     };
 
-    /// Back to the start, or to 13 numbers per body as a report's final_state gives them.
+    /// Back to the start, or to 13 numbers per body as a report's final_state gives them. Throws Stopped when interrupted.
     void start(std::span<const double> state) {
         if (!state.empty()) system_.place(state);
+        const Watch watch(0.0);
         system_.reset(nullptr);
         steps_ = 0;
     }
@@ -86,20 +102,27 @@ public:
         RunReport report;
         Recorder nothing;
         nothing.prepare(steps);
-        run_loop(system_, nothing, steps, time_limit, report);
+        Watch watch(time_limit);
+        run_loop(system_, nothing, steps, watch, report);
         if (report.failed_step >= 0) report.failed_step += steps_;
         done_ += report.steps;
         steps_ += report.steps;
         return report;
     }
-    /// Counters, final state and the observables as they are now, each as its last sample; changes nothing.
-    void read(RunReport& report) {
+    /// Counters, final state and the observables as they are now, each as its last sample; changes nothing. What needs a
+    /// solve that is not done within the time limit [s, 0 for none] is NaN.
+    void read(RunReport& report, double time_limit) {
         const Snapshot here = keep();
+        const Watch watch(time_limit);
         recorder_.prepare(steps_);
-        system_.observe(recorder_, steps_);
+        try {
+            system_.observe(recorder_, steps_);
+        } catch (const Stopped&) {
+            report.status = Status::timed_out;
+        }
         report.recordings = recorder_.recordings();
         go_back(here);
-        report.final_state = system_.final_state();
+        if (!read_state(report)) report.status = Status::timed_out;
         go_back(here);
         report.state_hash = state_hash(report.final_state);
         system_.count(report, done_);
@@ -118,6 +141,16 @@ public:
     System& system() noexcept { return system_; }
 
 private:
+    /// False if the time is over, and only the places are known.
+    bool read_state(RunReport& report) {
+        try {
+            report.final_state = system_.final_state();
+            return true;
+        } catch (const Stopped&) {
+            report.final_state = system_.places();
+            return false;
+        }
+    }
     static bool reads_while_running(const std::vector<Observation>& observations) noexcept {
         return std::any_of(observations.begin(), observations.end(),
                            [](const Observation& o) { return o.reduction != Reduction::final; });

@@ -29,10 +29,11 @@ struct Health {
 /// The check costs nothing inside a step: a block that ends unfit is replayed step by step to find the step. Blocks
 /// begin with one step, and grow as long as they are short, or keeping what a replay needs is a fiftieth of them. Long
 /// steps look at the clock themselves (Watch); a block they leave unfinished is taken back: a few hundredths of a second
-/// of whole steps, or a hundred times what keeping the state of a large scene costs.
+/// of whole steps, or a hundred times what keeping the state of a large scene costs. Throws Stopped when the time is over
+/// before the sample at the start is read.
 template <class System>
-void run_loop(System& system, Recorder& recorder, std::int64_t steps, double time_limit, RunReport& report) {
-    Watch watch(time_limit);
+void run_loop(System& system, Recorder& recorder, std::int64_t steps, Watch& watch, RunReport& report) {
+    const double begun = watch.elapsed(), worked = watch.processor();
     const auto stop = [&](std::int64_t done) {
         report.status = Status::timed_out;
         report.failed_step = done + 1;
@@ -76,7 +77,7 @@ void run_loop(System& system, Recorder& recorder, std::int64_t steps, double tim
         }
     };
     std::int64_t length = 1;
-    double now = watch.elapsed();
+    double now = begun;
     bool weighed =
         true;  // whether keeping is timed apart: of short blocks even a look at the clock would be felt
     while (done < steps && health.status == Status::completed) {
@@ -113,8 +114,8 @@ void run_loop(System& system, Recorder& recorder, std::int64_t steps, double tim
         report.failed_joints = health.joints;
     }
     report.steps = done;
-    report.seconds = watch.elapsed();
-    report.cpu_seconds = watch.processor();
+    report.seconds = watch.elapsed() - begun;
+    report.cpu_seconds = watch.processor() - worked;
     report.recordings = recorder.recordings();
     report.counters["samples"] = recorder.samples_read();
 }

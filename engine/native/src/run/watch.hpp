@@ -1,6 +1,7 @@
 // The end of a run from inside a long step: wall time and Ctrl-C.
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <ctime>
@@ -22,7 +23,8 @@ inline double processor_seconds() noexcept {
 /// Asked at most ten times a second; true ends the run. Python's Ctrl-C comes in here.
 inline bool (*interrupted)() = nullptr;
 
-/// Thrown by Watch::look(); the loop that runs the system catches it and takes back the unfinished block of steps.
+/// Thrown by Watch::look(). The loop that runs the system catches it and takes back the unfinished block of steps; before the
+/// first of them and behind the last it is caught where the watch was made.
 struct Stopped {};
 
 /// One run's clock. While it lives, look() may be called anywhere in the thread that runs; without one it does
@@ -43,6 +45,11 @@ public:
 
     /// Processor time since the run began; what the machine spent elsewhere is not in it.
     double processor() const noexcept { return processor_seconds() - processor_begin_; }
+
+    /// For what is left to be told when the time is over: a little more of it.
+    void extend() noexcept {
+        if (limit_ > 0.0) limit_ = std::max(limit_, elapsed() + 2.0 * patience);
+    }
 
     /// Whether the run is to end.
     bool over() { return over(elapsed()); }
