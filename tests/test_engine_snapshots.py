@@ -5,14 +5,17 @@ from __future__ import annotations
 import hashlib
 import pickle
 import random
+import struct
 import subprocess
 import sys
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from spook_tracker.engine import Method, MethodError, Run, Scene, SimulationFailed, Snapshot, start
+from spook_tracker.engine import Method, MethodError, Run, Scene, SimulationFailed, Snapshot, _core, start
 from spook_tracker.engine import snapshot as form
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from tests import coupling_scenes, particle_scenes, rigid_scenes, sleep_scenes
@@ -71,6 +74,8 @@ STATES = (
     "newton_iterations",
     "halved_steps",
     "redundancy_looks",
+    "contacts",
+    "impacts",
 )  # the state's own counters
 
 CHILD = """
@@ -198,3 +203,96 @@ def test_no_corruption_of_its_pickle_is_taken_for_another_state(whole: bytes) ->
             continue
         if isinstance(again, Snapshot):
             assert again.to_bytes() == whole
+
+
+# --- nothing is left out ---------------------------------------------------------------------------------
+
+
+Path_ = tuple[int, ...]
+PLAIN, PLAINS, ITEMS, RECORD = 1, 2, 3, 4
+HEAD = struct.Struct("<BQ")
+
+
+def parts(state: bytes, at: int = 0, path: Path_ = ()) -> Iterator[tuple[Path_, int, int]]:
+    """Each field of a state that is no record itself: its place among the fields, where it begins and ends."""
+    kind, count = HEAD.unpack_from(state, at)
+    end = at + HEAD.size
+    if kind == RECORD:
+        for place in range(count):
+            for found in parts(state, end, (*path, place)):
+                yield found
+                end = found[2]
+        return
+    if kind == ITEMS:
+        for _ in range(count):
+            end = list(parts(state, end))[-1][2]
+    else:
+        end += count if kind == PLAIN else 8 + count * struct.unpack_from("<Q", state, end)[0]
+    yield path, at, end
+
+
+# Fields that no scene here misses, by their places in the records: of ParticleSystem::Memory, and of
+# RigidSystem::Snapshot with its RigidState, JointStates, WarmStart and ContactStage::Snapshot.
+FAILED = "tells of a run that failed: the snapshot's half in Python keeps why"
+ANEW = "filled anew in each step, and copied with what is not"
+SAMPLE = "of a sample looked ahead for, which ends with its reading"
+ENERGY = "read at the end of a whole run alone"
+ASLEEP = "asked for when sleepers are woken: tests/test_engine_sleeping_driven.py saves and restores those"
+WORK = "counts work and the residual of the last solve, from which nothing goes on"
+GAVE_UP = "after a solver has given up and is not asked again at once; no scene here has that"
+NOT_READ: dict[str, dict[Path_, str]] = {
+    "particles": {(0, 3): SAMPLE, (0, 4): WORK, (0, 5): GAVE_UP, (0, 6, 4): FAILED},
+    "rigid": {
+        **dict.fromkeys([(0, 0, place) for place in (1, 2, 6, 15, 16, 19)], FAILED),
+        **dict.fromkeys([(0, 0, 7), (0, 3, 0, 6), (0, 3, 2), (0, 3, 3)], GAVE_UP),
+        **dict.fromkeys([(0, 0, 9), (0, 0, 10)], SAMPLE),
+        **dict.fromkeys([(0, 0, 13), (0, 0, 14)], ENERGY),
+        **dict.fromkeys([(0, 2, 0, 0), (0, 2, 0, 1), (0, 2, 0, 3)], ANEW),
+        **dict.fromkeys([(0, 3, 0, 1), (0, 3, 0, 2)], ASLEEP),
+    },
+}
+
+
+def left_out(name: str) -> dict[Path_, bool]:
+    """Whether a run goes on otherwise, by the field that was forgotten: it is as it was at the start."""
+    needed = {}
+    with held(name) as run:
+        fresh = run.save().native.bytes()
+        run.step(BEFORE)
+        saved = run.save()
+        once = told(run)
+    state = saved.native.bytes()
+    kind = type(saved.native)
+    for (path, begin, end), (_, fresh_begin, fresh_end) in zip(parts(state), parts(fresh), strict=True):
+        other = state[:begin] + fresh[fresh_begin:fresh_end] + state[end:]
+        if other == state:
+            continue
+        with held(name) as run:
+            run.restore(replace(saved, native=kind.of_bytes(other)))
+            try:
+                needed[path] = told(run) != once or run.steps != BEFORE + AFTER
+            except Exception:
+                needed[path] = True
+    return needed
+
+
+def test_no_field_of_a_state_can_be_left_out() -> None:
+    """Each is either needed by some scene here to go on with the same bits, or listed with why none asks for it.
+
+    Writing a state lists no fields, so none can be forgotten there; here it is shown that a run would tell if one were.
+    """
+    needed: dict[tuple[str, Path_], set[str]] = {}
+    every: set[tuple[str, Path_]] = set()
+    for name in CORPUS:
+        with held(name) as run:
+            native = run.save().native
+        kind = "rigid" if isinstance(native, _core.RigidSnapshot) else "particles"
+        every |= {(kind, path) for path, _, _ in parts(native.bytes())}
+        for path, is_needed in left_out(name).items():
+            if is_needed:
+                needed.setdefault((kind, path), set()).add(name)
+
+    listed = {(kind, path) for kind, paths in NOT_READ.items() for path in paths}
+    assert every - set(needed) - listed == set(), "fields that no scene here would miss"
+    assert listed & set(needed) == set(), "fields that are listed as not missed, and are"
+    assert listed <= every, "fields that are listed and are none"
