@@ -20,6 +20,7 @@ from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.forces import CentralGravity, Load, Spring
 from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, Universal, frictions
 from spook_tracker.engine.observe import ConstraintForce, ContactCount, ContactForce, Penetration
+from spook_tracker.engine.peers.dart_file import READS, run_model
 from spook_tracker.engine.peers.joint_tree import (
     Node,
     alone,
@@ -53,6 +54,8 @@ class Dart:
     """The adapter."""
 
     name = "dart"
+    reads = READS
+    run_model = staticmethod(run_model)
     capabilities = Capabilities(
         shapes=frozenset({Sphere, Box, Capsule, Plane}),
         joints=frozenset({Distance, Lock, Ball, Hinge, Prismatic, Universal}),

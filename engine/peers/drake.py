@@ -20,6 +20,7 @@ from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.forces import CentralGravity, Load, Spring
 from spook_tracker.engine.joints import Ball, Distance, Hinge, Lock, Prismatic, Universal
 from spook_tracker.engine.observe import ConstraintForce, ContactForce
+from spook_tracker.engine.peers.drake_file import READS, run_model
 from spook_tracker.engine.peers.drake_model import Model
 from spook_tracker.engine.peers.stepped import Kept, stepped
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
@@ -35,6 +36,8 @@ class Drake:
     """The adapter."""
 
     name = "drake"
+    reads = READS
+    run_model = staticmethod(run_model)
     capabilities = Capabilities(
         shapes=frozenset({Sphere, Box, Capsule, Plane}),
         joints=frozenset({Distance, Lock, Ball, Hinge, Prismatic, Universal}),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import os
 import pickle
+import re
 import signal
 import subprocess
 import sys
@@ -21,6 +22,7 @@ import numpy.typing as npt
 
 from spook_tracker.engine.errors import EngineError
 from spook_tracker.engine.model_file import ModelRun
+from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result
 
 Array = npt.NDArray[np.float64]
@@ -37,11 +39,41 @@ def elsewhere(
     """What `run_model` of that module gives in a process of its own."""
     asked = pickle.dumps((replace(run, elsewhere=False), time_step, duration, time_limit))
     command = [sys.executable, "-m", __name__, module]
-    done = subprocess.run(command, input=asked, capture_output=True, timeout=ELSEWHERE_LIMIT)
+    try:
+        done = subprocess.run(command, input=asked, capture_output=True, timeout=ELSEWHERE_LIMIT)
+    except subprocess.TimeoutExpired:
+        raise EngineError(f"the model's run gave no answer within {ELSEWHERE_LIMIT:g} s") from None
     if done.returncode:
         last = done.stderr.decode(errors="replace").strip()[-200:]
-        raise EngineError(f"the model's run died in a process of its own: {last}")
-    found: Result = pickle.loads(done.stdout)
+        why = f"signal {-done.returncode}" if done.returncode < 0 else last
+        raise EngineError(f"the model's run died in a process of its own: {why}")
+    found: Result | EngineError = pickle.loads(done.stdout)
+    if isinstance(found, EngineError):
+        raise found
+    return found
+
+
+def refuse_settings(engine: str, run: ModelRun) -> None:
+    """What is asked of an engine's file loader beyond running the file as it is."""
+    if (
+        run.model.drive.kind != "zero"
+        or run.model.keyframe
+        or run.conservative
+        or run.swing
+        or run.accurate
+        or run.gain != 1.0
+    ):
+        raise NotSupported(f"{engine} is asked without controls, keyframes and other settings than its own")
+
+
+def packages(run: ModelRun) -> dict[str, str]:
+    """Folders of the packages that a file's meshes are named by: package://NAME/meshes/a.stl."""
+    text = Path(run.model.path).read_text(encoding="utf-8", errors="replace")
+    found = {}
+    for name, rest in re.findall(r"""package://([^/"']+)/([^"'<]+)""", text):
+        file = run.model.assets.get(rest.rpartition("/")[2], "")
+        if file.endswith(f"/{rest}"):
+            found[name] = file[: -len(rest) - 1]
     return found
 
 
@@ -249,8 +281,12 @@ def _answer(module: str) -> None:
     answers = os.dup(1)
     os.dup2(2, 1)
     asked = pickle.loads(sys.stdin.buffer.read())
+    try:
+        found = import_module(module).run_model(*asked)
+    except EngineError as refused:
+        found = refused
     with os.fdopen(answers, "wb") as pipe:
-        pipe.write(pickle.dumps(import_module(module).run_model(*asked)))
+        pipe.write(pickle.dumps(found))
 
 
 def _end_with_parent() -> None:

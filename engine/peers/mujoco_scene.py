@@ -301,7 +301,11 @@ class _Translation:
         form = Hinge if kind == HINGE else Prismatic
         limit = None
         if m.jnt_limited[number] and self.has("LIMIT"):
-            limit = Limit(lower=m.jnt_range[number, 0] - here, upper=m.jnt_range[number, 1] - here)
+            limit = Limit(
+                lower=m.jnt_range[number, 0] - here,
+                upper=m.jnt_range[number, 1] - here,
+                damping=_relaxation(m.jnt_solref[number]),
+            )
         self.constraints.append(
             form(
                 name=name,
@@ -439,9 +443,16 @@ class _Translation:
             Relation(
                 name=f"equality {self.name('equality', tie)}",
                 terms=((self.joints[one], 1.0), (self.joints[two], -float(c[1]))),
+                damping=_relaxation(m.eq_solref[tie]),
             )
         )
         return None
+
+
+def _relaxation(solref: Any) -> float:
+    """In what time [s] a violation goes: the time constant, or damping over stiffness where these are given (below zero)."""
+    first, second = float(solref[0]), float(solref[1])
+    return first if first > 0.0 else second / first if first else 0.0
 
 
 def _word(value: Any) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 import pybullet as bullet
 
 from spook_tracker.engine.model_file import ModelRun, Watched
-from spook_tracker.engine.peers.model_loop import Array, LoadedModel, elsewhere, resident
+from spook_tracker.engine.peers.model_loop import Array, LoadedModel, elsewhere, refuse_settings, resident
 from spook_tracker.engine.peers.stepped import quiet
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result
@@ -25,15 +25,7 @@ SWEEPS = 500  # in place of 50, as in this engine's other questions
 
 def run_model(run: ModelRun, time_step: float, duration: float, time_limit: float | None) -> Result:
     """Load the file in a world of its own, and run it."""
-    if (
-        run.model.drive.kind != "zero"
-        or run.model.keyframe
-        or run.conservative
-        or run.swing
-        or run.accurate
-        or run.gain != 1.0
-    ):
-        raise NotSupported("pybullet is asked without controls, keyframes and other settings than its own")
+    refuse_settings("pybullet", run)
     if run.elsewhere:
         return elsewhere(__name__, run, time_step, duration, time_limit)
     with quiet():

@@ -1,0 +1,90 @@
+"""Model files in Drake and DART, by their own parsers: what is read is what a hand calculation gives."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine.find import EngineMissing, find
+from spook_tracker.engine.model_file import Drive, ModelFile, ModelRun
+from spook_tracker.engine.model_reading import read
+from spook_tracker.engine.protocol import NotSupported
+
+BAR = '<inertial><origin xyz="{x} 0 0"/><mass value="1"/><inertia ixx=".001" iyy=".001" izz=".001" ixy="0" ixz="0" iyz="0"/></inertial>'
+ARM = (
+    f'<robot name="arm"><link name="base"/><link name="bar">{BAR.format(x=0.5)}</link>'
+    '<joint name="axle" type="continuous"><parent link="base"/><child link="bar"/><axis xyz="0 1 0"/></joint></robot>'
+)
+BOX = """<robot name="r"><link name="floor"><collision><origin xyz="0 0 -.5"/><geometry><box size="4 4 1"/></geometry></collision>
+<inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="carrier"><inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="ball"><collision><geometry><sphere radius=".1"/></geometry></collision>
+<inertial><mass value="1"/><inertia ixx=".1" iyy=".1" izz=".1" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="a" type="prismatic"><parent link="floor"/><child link="carrier"/><origin xyz="0 0 2"/><axis xyz="1 0 0"/>
+<limit lower="-9" upper="9" effort="1" velocity="9"/></joint>
+<joint name="b" type="prismatic"><parent link="carrier"/><child link="ball"/><origin xyz="0 0 -1.85"/><axis xyz="0 0 1"/>
+<limit lower="-9" upper="9" effort="1" velocity="9"/></joint></robot>"""
+
+
+@pytest.fixture(params=["drake", "dart"])
+def engine(request: pytest.FixtureRequest) -> Any:
+    try:
+        return find(request.param)
+    except EngineMissing as missing:
+        pytest.skip(str(missing))
+
+
+def _model(folder: Path, text: str, **facts: Any) -> ModelFile:
+    file = folder / "model.urdf"
+    file.write_text(text)
+    found = read(file)
+    return ModelFile(
+        path=str(file), format=found.format, digest=found.digest, time_step=found.time_step, watched=found.watched,
+        gravity=found.gravity, **facts,
+    )  # fmt: skip
+
+
+def test_a_pendulum_swings_with_its_period(tmp_path: Path, engine: Any) -> None:
+    """1 kg at .5 m with .001 kg m², let go level: a quarter of 2 π √(I/(m g l)) times 1.18034 for 90 degrees."""
+    quarter = 1.18034 * 0.5 * np.pi * np.sqrt((0.25 + 0.001) / (0.5 * 9.81))
+    asked = ModelRun(model=_model(tmp_path, ARM), samples=(quarter,))
+    turn = engine.simulate(asked, time_step=0.001, duration=quarter)["orientation"][-1, 0]
+
+    assert 2.0 * np.arctan2(abs(turn[2]), abs(turn[0])) == pytest.approx(0.5 * np.pi, abs=0.01)
+
+
+def test_a_ball_comes_to_lie_on_the_floor_and_is_carried_by_it(tmp_path: Path, engine: Any) -> None:
+    model = _model(tmp_path, BOX)
+    end = engine.simulate(ModelRun(model=model, samples=(2.0,)), time_step=0.001, duration=2.0)
+
+    assert end["position"][-1][0][2] == pytest.approx(0.1, abs=2e-3)
+    assert float(end["load"]) == pytest.approx(0.5, abs=0.02)  # the carrier's half is carried by its rail
+    assert float(end["size"]) > 1.85
+
+
+def test_the_same_bits_come_twice_and_pushes_move_it(tmp_path: Path, engine: Any) -> None:
+    model = _model(tmp_path, ARM)
+    runs = [
+        engine.simulate(
+            ModelRun(model=model, samples=(0.2,), push=push, seed=1), time_step=0.001, duration=0.2
+        )
+        for push in (0.0, 0.0, 1e-3)
+    ]
+
+    assert runs[0].state_hash == runs[1].state_hash != runs[2].state_hash
+
+
+def test_what_it_cannot_be_asked_is_said(tmp_path: Path, engine: Any) -> None:
+    driven = _model(tmp_path, ARM, drive=Drive(kind="hold"))
+    broken = _model(tmp_path, ARM)
+    Path(broken.path).write_text(ARM.replace("<robot", "<robot><link/>", 1))
+
+    for elsewhere in (False, True):
+        asked = ModelRun(model=broken, elsewhere=elsewhere)
+        with pytest.raises(NotSupported, match=r"model.urdf"):
+            engine.simulate(asked, time_step=0.001, duration=0.1)
+    with pytest.raises(NotSupported, match="without controls"):
+        engine.simulate(ModelRun(model=driven), time_step=0.001, duration=0.1)
