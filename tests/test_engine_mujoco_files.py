@@ -105,6 +105,25 @@ def test_a_double_pendulum_can_be_predicted_for_some_time_only(tmp_path: Path) -
     assert 1.0 < found["predictable_time"] < 20.0
     assert found["lower.place@1s"].rounding < 1e-9
     assert math.isinf(found["lower.place@20s"].rounding)
+    assert 0.05 < found["lower.mean_place"].rounding < 2.0  # of a distribution: by chance, and by no more
+    assert found["lower.mean_place"].unsettled == ""
+
+
+def test_means_of_chaotic_runs_differ_by_chance_alone_and_a_shift_is_seen() -> None:
+    """Draws from one distribution, flat, normal or of two heaps, never look changed; six spreads further they always do."""
+    random = np.random.default_rng(1)
+    draws = {
+        "flat": lambda: random.uniform(0.0, 1.0, 16),
+        "normal": lambda: random.normal(2.0, 0.3, 16),
+        "two heaps": lambda: random.choice([0.0, 1.0], 16) + random.normal(0.0, 0.01, 16),
+    }
+    for draw in draws.values():
+        spread = float(np.std([draw() for _ in range(100)]))
+        for _ in range(2000):
+            before, after = motion.mean_of(draw(), 1.0, True), motion.mean_of(draw(), 1.0, True)
+            allowed = max(before.rounding, after.rounding)
+            assert abs(after - before) <= allowed
+            assert abs(after + 6.0 * spread - before) > allowed
 
 
 def test_pushes_move_it_and_the_same_seed_moves_it_the_same(tmp_path: Path) -> None:

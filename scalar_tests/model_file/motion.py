@@ -22,6 +22,11 @@ from spook_tracker.scalar_tests.model_file.facts import (
     turns,
 )
 
+DRAWN = 16  # runs with pushes of their own, where these grow to the size
+BY_CHANCE = (
+    6.0  # standard errors of a difference of two means: beyond them once in some hundred thousand series
+)
+
 
 def metrics(asked: Asked) -> tuple[Metric, ...]:
     """Place and turn of each watched body at each checkpoint, and the time that can be predicted."""
@@ -45,6 +50,16 @@ def metrics(asked: Asked) -> tuple[Metric, ...]:
                     better="inside",
                 ),
             ]
+    found += [
+        Metric(
+            name=f"{body.label}.mean_place",
+            description=f"how far {body.label} is from where it started at the end, in the mean over runs with small pushes",
+            unit="m",
+            role="reported",
+            better="inside",
+        )
+        for body in asked.model.watched
+    ]
     return (
         *found,
         Metric(
@@ -87,7 +102,27 @@ def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
                     step_error=_apart(read(halved), row, column, value),
                     scale=unit,
                 )
+    chaotic = len(lost) > 0
+    if chaotic:  # of the end only a distribution says anything: more of it
+        pushed += [
+            simulated(simulate, asked, end, samples=(end,), push=PUSH, seed=seed)
+            for seed in range(PUSHED + 1, DRAWN + 1)
+        ]
+    ends = np.array([_read(other)[-1] for other in pushed if other.completed])
+    for column, body in enumerate(asked.model.watched):
+        drawn = ends[:, column] if len(ends) else np.zeros(0)
+        found[f"{body.label}.mean_place"] = mean_of(drawn, size, chaotic)
     return found
+
+
+def mean_of(drawn: Array, size: float, chaotic: bool) -> Estimate:
+    """The mean [m] of runs with small pushes. Two such means differ by rounding; of a chaotic model by chance, as their
+    standard errors say."""
+    if len(drawn) < 2:
+        return Estimate(0.0, rounding=math.inf, scale=size, unsettled="runs with small pushes broke off")
+    least = BEYOND * max(float(np.ptp(drawn)), PUSH * size)
+    by_chance = BY_CHANCE * float(np.std(drawn, ddof=1)) * math.sqrt(2.0 / len(drawn))
+    return Estimate(float(np.mean(drawn)), rounding=by_chance if chaotic else least, scale=size)
 
 
 def _read(run: Result) -> Array:

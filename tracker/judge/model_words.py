@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 AT_REST = re.compile(r"(?P<body>.+)\.rest_(?P<what>x|y|z|turn)")
 ON_THE_WAY = re.compile(r"(?P<body>.+)\.(?P<what>place|turn)@(?P<time>[0-9.e+-]+)s")
+IN_THE_MEAN = re.compile(r"(?P<body>.+)\.mean_place")
 NAMED = 3  # bodies in a sentence
 WHOLE = {  # of a model as a whole
     "settled": "settles at {after} s, not at {before} s",
@@ -47,7 +48,7 @@ def words(moves: Iterable[Moved]) -> list[str]:
     became = {one.became: one.metric for one in moves if one.became}
     values = [one for one in moves if not one.became]
     found = [f"{metric} and its like: {how}" for how, metric in became.items()]
-    return [*found, *_at_rest(values), *_on_the_way(values), *_whole(values)]
+    return [*found, *_at_rest(values), *_on_the_way(values), *_in_the_mean(values), *_whole(values)]
 
 
 def _at_rest(moves: Sequence[Moved]) -> list[str]:
@@ -91,6 +92,17 @@ def _on_the_way(moves: Sequence[Moved]) -> list[str]:
         much = f" ({one.severity})" if one.severity else ""
         told.append(f"{body} by {abs(one.after - one.before):.3g} {one.unit} at {at:g} s{much}")
     return [f"moves otherwise from {min(times):g} s on: {'; '.join(told)}"]
+
+
+def _in_the_mean(moves: Sequence[Moved]) -> list[str]:
+    """Of bodies that only a distribution tells of, the one whose mean has moved most."""
+    told = {read["body"]: one for one in moves if (read := IN_THE_MEAN.fullmatch(one.metric))}
+    if not told:
+        return []
+    body, one = max(told.items(), key=lambda item: abs(item[1].after - item[1].before))
+    return [
+        f"{body} ends {one.after:.3g} m from its start in the mean over small pushes, not {one.before:.3g} m"
+    ]
 
 
 def _whole(moves: Sequence[Moved]) -> list[str]:
