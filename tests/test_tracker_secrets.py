@@ -15,6 +15,8 @@ SECRET = "s3cr3t"
 REFUSED = [
     f"host=localhost password={SECRET} dbname=nights",
     f"dbname=nights user=u password = {SECRET}",
+    f"Server=localhost;Database=nights;Password={SECRET}",
+    f"Data Source=nights;uid=u;pwd={SECRET}",
     f"service=x passfile={SECRET}",
     f"postgresql:/u:{SECRET}@localhost/nights",
     f"postgresql:u:{SECRET}@localhost/nights",

@@ -56,7 +56,11 @@ def mark(tmp_path: Path):
 
 def start(folder: Path, mark: str, then: str, *options: str) -> subprocess.Popen[str]:
     (folder / "starting.py").write_text(STARTS.format(mark=mark, then=then))
-    command = [sys.executable, "-m", "spook_tracker", "run", "fall", "--engine", "starting"]
+    return begun(folder, *options)
+
+
+def begun(folder: Path, *options: str, tests: tuple[str, ...] = ("fall",)) -> subprocess.Popen[str]:
+    command = [sys.executable, "-m", "spook_tracker", "run", *tests, "--engine", "starting"]
     command += ["--catalogue", "toy_questions", "--no-record", "--workers", "1", *options]
     return subprocess.Popen(
         command, cwd=folder, env={**os.environ, "PYTHONPATH": str(HERE)}, text=True,
@@ -81,6 +85,42 @@ def test_a_command_ends_with_all_that_an_engine_has_started(how: str, tmp_path: 
     assert (tmp_path / "started").exists(), told
     assert process.returncode == code, told
     assert gone(mark)
+
+
+HANGS_FIRST = """
+    first = not os.path.exists("seen")
+    with open("seen", "a") as seen:
+        seen.write(f"{{alive()}}\\n")
+    subprocess.Popen(MARK)
+    if first: time.sleep(300)
+"""
+ALIVE = """
+def alive():
+    from pathlib import Path
+    found = 0
+    for place in Path("/proc").glob("[0-9]*/cmdline"):
+        try: found += b"{mark}" in place.read_bytes().split(b"\\0")
+        except OSError: pass
+    return found
+"""
+
+
+def test_what_a_piece_has_started_ends_with_its_time_limit_while_the_others_go_on(
+    tmp_path: Path, mark: str
+) -> None:
+    starts = STARTS.replace(
+        "    subprocess.Popen(MARK)  # as the peers for Node do: it has the streams of whoever started it\n",
+        "",
+    )
+    (tmp_path / "starting.py").write_text(
+        ALIVE.format(mark=mark) + starts.format(mark=mark, then=HANGS_FIRST.format().strip())
+    )
+
+    told, _ = begun(tmp_path, "--time-limit", "1", tests=("fall", "stand")).communicate(timeout=60)
+
+    seen = (tmp_path / "seen").read_text().split()
+    assert len(seen) > 1, told
+    assert seen[1] == "0", "the next piece saw what the ended one had started"
 
 
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])

@@ -63,8 +63,9 @@ def database_url(given: str | None = None) -> URL:
     return url
 
 
-CONNECTS = re.compile(  # what PostgreSQL's own programs take where we want a URL
-    r"(?:^|\s)(?:host|hostaddr|port|dbname|user|password|passfile|service|ssl\w+)\s*=|^\s*postgres\w*[:+]",
+CONNECTS = re.compile(  # what the programs of PostgreSQL, ODBC and others take where we want a URL
+    r"(?:^|[\s;,&?])(?:host|hostaddr|port|dbname|user|user ?id|uid|pass\w*|pwd|service|server|ssl\w+)\s*="
+    r"|^\s*postgres\w*[:+]",
     re.IGNORECASE,
 )
 
