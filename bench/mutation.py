@@ -60,7 +60,7 @@ MUTANTS = (
     mutant("a-visit-may-last", "run_times", "LONGER = 2 ", "LONGER = 200 "),
     mutant("no-memory", "shifts", "return min(strongest, 0.98)", "return 0.0"),
     mutant("no-permutations", "shifts", "if probability < enough else None", "if probability < 1.0 else None"),
-    mutant("no-t-test", "shifts", "rise <= standard_error(base, len(last))", "False"),
+    mutant("no-t-test", "shifts", "rise <= standard_error(base, len(last), memory)", "False"),
     mutant(
         "small-shifts-count", "shifts", "from spook_tracker.tracker.judge.slower import LEAST", "LEAST = 0.0"
     ),

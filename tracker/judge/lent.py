@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from datetime import date
 
 from spook_tracker.tracker.judge.accepted import Accepted
-from spook_tracker.tracker.judge.run_times import Noisy
+from spook_tracker.tracker.judge.noisy import Noisy
 from spook_tracker.tracker.judge.segments import Segment
 
 Walk = Callable[..., tuple[list[Noisy], list[Segment]]]

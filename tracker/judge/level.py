@@ -75,7 +75,7 @@ class PresentLevel:
     )  # the same of its own when they joined it; worse is positive
     until: int = 0  # nights seen
     start: int = 0  # the first night there is, or the last that was accepted
-    _told: tuple[int, tuple[float, float, float]] | None = None
+    _told: tuple[float, float, float] | None = None  # what `_level` said, until a night joins or leaves
     _outer: float | None = None  # the second largest of what its own nights reached, while it is known
 
     def _costs(self, places: Sequence[int]) -> list[float]:
@@ -86,17 +86,18 @@ class PresentLevel:
 
     def _level(self) -> tuple[float, float, float]:
         """Level, noise and threshold of the present segment, by its last nights."""
-        if self._told is not None and self._told[0] == len(self.now.places):
-            return self._told[1]
-        own = [self.values[i] for i in self.now.places[-WINDOW:]]
-        level = median(own)
+        if self._told is not None:
+            return self._told
+        own = sorted(
+            [self.values[i] for i in self.now.places[-WINDOW:]]
+        )  # so that their distances come nearly sorted
+        level = median_of_sorted(own)
         off = [abs(value / level - 1.0) for value in own] if level else [0.0]
         if len(own) < ENOUGH:
             off += map(abs, self.remembers[len(own) - WINDOW :])
         noise = NORMAL * median(off)
-        told = level, noise, self._threshold(level, noise, len(own), len(off))
-        self._told = len(self.now.places), told
-        return told
+        self._told = level, noise, self._threshold(level, noise, len(own), len(off))
+        return self._told
 
     def _threshold(self, level: float, noise: float, own: int, count: int) -> float:
         """The relative change that stands clear: of the noise, of what nights reached, of what is tolerated."""

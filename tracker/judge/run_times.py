@@ -9,11 +9,9 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import islice
-from typing import NamedTuple
 
 from msgspec.structs import replace
 
@@ -31,37 +29,18 @@ from spook_tracker.tracker.judge.level import (
     exponent_of,
     times_two_to,
 )
+from spook_tracker.tracker.judge.noisy import Noisy
 from spook_tracker.tracker.judge.segments import Segment, boundary, inner_split, spread_of
 from spook_tracker.tracker.judge.shifts import BASE, FEWEST_BASE, RARE, SPANS, Shift, remembered, shift
 from spook_tracker.tracker.judge.slower import LEAST, Usual, change_in_words, slower
 from spook_tracker.tracker.judge.verdict import Verdict
-from spook_tracker.tracker.judge.vocabulary import State, with_recoveries
+from spook_tracker.tracker.judge.vocabulary import with_recoveries
 
 MENDED = 0.25  # of its size: a red level that is left of it is none
 SETTLED = 30  # nights of a segment after which its boundary is known
 BACK, WEIGHT = 9.0, 6.0  # log likelihoods: to believe that a red level was left; of one night at most
 OFTEN = 2  # times left before: such a level is flaky,
 LONGER = 2  # until it lasts so many times its longest
-
-
-class Noisy(NamedTuple):
-    """One night's verdict; `against`, `first_bad`, `last_good`, `worse_at` and `accused` are places in the sequence."""
-
-    verdict: Verdict
-    state: State
-    against: int | None = None
-    first_bad: int | None = None
-    last_good: int | None = None
-    worse_at: int | None = None  # where it last became worse: the first bad night, or a later segment's
-    news: bool = False  # red for a segment that is told tonight
-    accused: tuple[int, int] | None = None  # last surely good, first surely bad
-    probability: float | None = None  # that `worse_at` is right
-    levels: tuple[float, float] | None = None  # what the percentage is of: before, now
-    usual: Usual | None = None  # after this night: the level that is held to, and what stands clear of it
-
-    def scaled(self, back: Callable[[float], float]) -> Noisy:
-        usual = self.usual and (back(self.usual[0]), self.usual[1])
-        return self._replace(levels=self.levels and (back(self.levels[0]), back(self.levels[1])), usual=usual)
 
 
 def judge_noisy(values: Sequence[float], **options: object) -> list[Noisy]:
@@ -93,9 +72,12 @@ def judged_and_segments(
     told = []
     for place in range(len(values)):
         night = walk.night(place, bool(releases and releases[place]), bool(accepted and accepted[place]))
-        told.append(night._replace(usual=walk.held_to()))
-    states = with_recoveries(night.state for night in told)
-    return [night._replace(state=state) for night, state in zip(told, states, strict=True)], walk.segments()
+        told.append(Noisy(*night[:-1], walk.held_to()))
+    states = with_recoveries([night.state for night in told])
+    return [
+        night if night.state == state else night._replace(state=state)
+        for night, state in zip(told, states, strict=True)
+    ], walk.segments()
 
 
 @dataclass
@@ -216,12 +198,11 @@ class _Walk(PresentLevel):
         """Several nights above both of two clusters that nights are drawn from at random, whatever segments they made."""
         if not self.over or self.now.standing == "red" or len(self.now.places) >= BASE:
             return None
-        first = max(self.start, self.until - BASE - max(SPANS))
-        backwards = (i for i in range(self.until - 1, first - 1, -1) if self._number(i))
-        level, last = self._level()[0], list(islice(backwards, min(SPANS)))
-        if sum([self._worse_by(level, self.values[i]) for i in last]) < 0.5 * LEAST * len(last):
+        level, last = self._level()[0], [*self.now.places[-min(SPANS) :], *self.off][-min(SPANS) :]
+        if self._worse_by(level, sum([self.values[i] for i in last]) / len(last)) < 0.5 * LEAST:
             return None
-        nights = [*backwards][::-1] + last[::-1]
+        first = max(self.start, self.until - BASE - max(SPANS))
+        nights = [i for i in range(first, self.until) if self._number(i)]
         if len(nights) < FEWEST_BASE + min(SPANS):
             return None
         found = shift(self._costs(nights), True, self.ages[nights[-1]] - self.ages[self.start])
@@ -432,6 +413,8 @@ class _Walk(PresentLevel):
         count = len(self.now.places)
         if count < FEWEST_BASE or count % FEWEST:
             return
+        if inner_split(self._costs(self.now.places[-BASE:]), 1.0) is None:
+            return  # nearly always
         base = self._base()
         costs = base.tolist()
         split = inner_split(costs, 1.0)

@@ -68,35 +68,41 @@ def boundary(places: Sequence[int], costs: Sequence[float], after: int) -> Bound
     values = np.array(costs)
     split = min(max(1, count - after), count - 1)
     low, high = median_of_sorted(np.sort(values[:split])), median_of_sorted(np.sort(values[split:]))
-    off = np.concatenate([values[:split] - low, values[split:] - high])
+    off = values - low
+    off[split:] += low - high
     noise = NORMAL * median_of_sorted(np.sort(np.abs(off)))
     noise = max(noise, 1e-6 * max(abs(low), abs(high)))
     values = np.minimum(np.maximum(values, min(low, high) - FAR * noise), max(low, high) + FAR * noise)
-    before = np.arange(1, count)
-    sums, squares = np.cumsum(values), float(values @ values)
+    before, after_it, prior = _splits(count)
+    sums, squares = values.cumsum(), float(values @ values)
     sums, rest = sums[:-1], sums[-1] - sums[:-1]
-    left = squares - sums**2 / before - rest**2 / (count - before)
+    left = squares - sums * sums / before - rest * rest / after_it
     left = np.maximum(left, count * (0.1 * noise) ** 2)
-    best = int(np.argmin(left))
-    means = sums[best] / (best + 1), rest[best] / (count - best - 1)
-    memory = _memory(values - np.where(np.arange(count) <= best, *means))
+    best = int(left.argmin())
+    off = values - sums[best] / before[best]
+    off[best + 1 :] = values[best + 1 :] - rest[best] / after_it[best]
+    memory = _memory(off)
     freedom = max(1.0, (count - 2) * (1.0 - memory) / (1.0 + memory))
-    log = -0.5 * freedom * np.log(left / left[best]) - 0.5 * np.log(before * (count - before))
+    log = prior - 0.5 * freedom * np.log(left / left[best])
     weight = np.exp(log - log.max())
     weight /= weight.sum()
-    order = np.argsort(-weight)
-    needed = order[: int(np.cumsum(weight[order]).searchsorted(SURE)) + 1]
-    first, last = int(needed.min()), int(needed.max())
-    return Boundary(
-        tuple(places[i + 1] for i in range(first, last + 1)), tuple(map(float, weight[first : last + 1]))
-    )
+    order = (-weight).argsort()
+    needed = order[: int(weight[order].cumsum().searchsorted(SURE)) + 1]
+    first, last = int(needed.min()), int(needed.max()) + 1
+    return Boundary(tuple(places[first + 1 : last + 1]), tuple(weight[first:last].tolist()))
 
 
-def _memory(off: object) -> float:
-    """Autocorrelation of deviations from one night to the next where it is told from chance, else none."""
+@lru_cache(maxsize=256)
+def _splits(count: int) -> tuple[Values, Values, Values]:
+    """Of so many nights: how many lie before each split and after it, and the logarithm of its prior."""
     import numpy as np
 
-    values = np.asarray(off)
+    before = np.arange(1.0, count)
+    return before, count - before, -0.5 * np.log(before * (count - before))
+
+
+def _memory(values: Values) -> float:
+    """Autocorrelation of deviations from one night to the next where it is told from chance, else none."""
     total = float(values @ values)
     found = float(values[1:] @ values[:-1]) / total if total else 0.0
     return min(found, 0.9) if found > 2.6 / math.sqrt(len(values)) else 0.0

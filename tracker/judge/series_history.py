@@ -27,7 +27,8 @@ from spook_tracker.tracker.judge.explaining import calm_nights
 from spook_tracker.tracker.judge.judged import Judged, is_release, night_of, red_class
 from spook_tracker.tracker.judge.lane import looked_at_again
 from spook_tracker.tracker.judge.lent import walk_with
-from spook_tracker.tracker.judge.run_times import Noisy, judged_and_segments
+from spook_tracker.tracker.judge.noisy import Noisy
+from spook_tracker.tracker.judge.run_times import judged_and_segments
 from spook_tracker.tracker.judge.slower import by_outcome, only_followed
 from spook_tracker.tracker.judge.standing import standing
 from spook_tracker.tracker.judge.verdict import Verdict
@@ -178,8 +179,9 @@ def _judge_times(
         verdicts, segments = walk_with(walk, taken, [night_of(night.run) for night in lane])
         level_of = {i: segment for segment in segments for i in range(segment.first, segment.last + 1)}
         verdicts = [
-            noisy._replace(verdict=by_outcome(noisy.verdict, night.sample))
+            noisy if told is noisy.verdict else noisy._replace(verdict=told)
             for noisy, night in zip(verdicts, lane, strict=True)
+            for told in (by_outcome(noisy.verdict, night.sample),)
         ]
         if is_read_off(definition):
             verdicts = list(map(_only_followed, verdicts))

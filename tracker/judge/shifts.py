@@ -2,7 +2,7 @@
 
 Under "nothing happened" every choice of m nights among all is as likely to be the last m as any other, whatever
 the distribution: clusters, spikes and tails included (Pitman 1937). The share of choices whose sum is at least
-as large as that of the last m is counted exactly, by sums over choices of a fixed size on a grid. Nights that
+as large as that of the last m is counted exactly on a grid, by the elementary symmetric polynomial of all. Nights that
 remember each other are not exchangeable: the shift must also stand clear of a t test whose standard error and
 degrees of freedom follow their autocorrelation. Of nights that look independent and normal the fewest nights, and
 those off two clusters, need no permutation: Student's test decides (tracker/judge/normal_nights.py).
@@ -13,7 +13,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, TypeAlias
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 from spook_tracker.tracker.document.middle import median_of_sorted
 from spook_tracker.tracker.judge.normal_nights import MEMORY, chance, student
@@ -118,7 +119,8 @@ def clusters(base: Values) -> tuple[float, float] | None:
     fewest = max(FEWEST_CLUSTER, math.ceil(SMALLEST_CLUSTER * len(ordered)))
     if len(ordered) < 2 * fewest:
         return None
-    split = fewest + int(np.argmax(np.diff(ordered[fewest - 1 : len(ordered) - fewest + 1])))
+    gaps = ordered[fewest : len(ordered) - fewest + 1] - ordered[fewest - 1 : len(ordered) - fewest]
+    split = fewest + int(gaps.argmax())
     low, high = ordered[:split], ordered[split:]
     inside = math.sqrt((_scatter(low) + _scatter(high)) / len(ordered))
     middles = median_of_sorted(low), median_of_sorted(high)
@@ -140,10 +142,10 @@ def _tried(base: Values, last: Values, rare: float) -> Shift | None:
     noise = NORMAL * median_of_sorted(np.sort(np.abs(base - middle)))
     if noise > 0.0:
         far = max(CLIP * noise, 2.0 * LEAST * middle)
-        pooled = np.clip(pooled, middle - far, middle + far)
+        pooled = np.minimum(np.maximum(pooled, middle - far), middle + far)
     near, off = pooled[: len(base)], pooled[len(base) :]
-    level = float(np.mean(near))
-    rise = float(np.mean(off)) - level
+    level = float(near.sum()) / len(near)
+    rise = float(off.sum()) / len(off) - level
     if rise <= LEAST * level:
         return None
     probability = _permuted(near, off, rise)
@@ -154,29 +156,29 @@ def _tried(base: Values, last: Values, rare: float) -> Shift | None:
 
 def _permuted(base: Values, last: Values, rise: float) -> float | None:
     """The probability of such a rise whatever the noise is, None if it is not rare or nights remember each other."""
-    at_random = not remembered(base) and clusters(base) is not None  # in two clusters: exchangeable indeed
-    if not at_random and rise <= standard_error(base, len(last)):
+    memory = remembered(base)
+    at_random = not memory and clusters(base) is not None  # in two clusters: exchangeable indeed
+    if not at_random and rise <= standard_error(base, len(last), memory):
         return None
     probability = permutation_probability(base, last)
     enough = RAREST if at_random else RARE
     return probability if probability < enough else None
 
 
-def standard_error(base: Values, span: int) -> float:
+def standard_error(base: Values, span: int, memory: float | None = None) -> float:
     """What the mean of `span` more nights may lie above that of these by rare chance.
 
     For nights that remember each other as a first-order process does; the spread of few such nights is too small
     by what their mean takes up.
     """
-    import numpy as np
 
-    count, memory = len(base), remembered(base)
+    count, memory = len(base), remembered(base) if memory is None else memory
     together = (1.0 + memory) / (1.0 - memory)
     independent = count / together
     if independent <= 2.0:
         return math.inf
     own = sum((1.0 - k / span) * memory**k for k in range(1, span))
-    variance = float(np.var(base, ddof=1)) / (1.0 - together / count if memory else 1.0)
+    variance = _scatter(base) / (count - 1) / (1.0 - together / count if memory else 1.0)
     return student(independent - 1.0) * math.sqrt(variance * ((1.0 + 2.0 * own) / span + together / count))
 
 
@@ -184,9 +186,9 @@ def remembered(base: Values) -> float:
     """Autocorrelation from one night to the next, zero unless it is told from chance; at most 0.98."""
     import numpy as np
 
-    centred = base - np.mean(base)
+    centred = base - base.sum() / len(base)
     total = float(centred @ centred)
-    if total <= len(base) * (ROUNDING * float(np.max(np.abs(base)))) ** 2:
+    if total <= len(base) * (ROUNDING * float(np.abs(base).max())) ** 2:
         return 0.0
     strongest = 0.0
     for lag in MEMORY:
@@ -206,11 +208,25 @@ def permutation_probability(base: Values, last: Values) -> float:
     if high <= low:
         return 1.0
     steps = np.rint((pooled - low) * (GRID / (high - low))).astype(np.int64)
-    span = len(last)
-    ways = np.zeros((span + 1, span * GRID + 1))  # by how many were chosen and by their sum
-    ways[0, 0] = 1.0
-    for step in steps:
-        size = ways.shape[1] - step
-        ways[1:, step:] += ways[:-1, :size].copy()
-    reached = int(np.sum(steps[len(base) :]))
-    return float(np.sum(ways[span, reached:])) / math.comb(len(pooled), span)
+    span, reached = len(last), int(steps[len(base) :].sum())
+    size, powers = _turned(span)
+    turn = np.fft.fft(np.bincount(steps, minlength=size))
+    sums = [
+        turn[power] for power in powers
+    ]  # of the steps' powers, and by Newton's identities of their choices
+    chosen: list[Any] = [1.0]
+    for count in range(1, span + 1):
+        signed = (sums[i] * chosen[count - 1 - i] * (1.0 - 2.0 * (i % 2)) for i in range(count))
+        chosen.append(sum(signed) / count)
+    ways = np.rint(np.fft.irfft(chosen[span], size))  # whole numbers, of 10^9: told to a millionth of one
+    return float(ways[reached:].sum()) / math.comb(len(pooled), span)
+
+
+@lru_cache(maxsize=8)
+def _turned(span: int) -> tuple[int, list[npt.NDArray[np.int64]]]:
+    """A length that holds every sum of so many steps, and the places of a transform's first powers in itself."""
+    import numpy as np
+
+    size = span * (GRID + GRID // 15)
+    places = np.arange(size // 2 + 1)
+    return size, [places * power % size for power in range(1, span + 1)]
