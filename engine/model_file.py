@@ -48,6 +48,10 @@ class ModelFile:
     watched: tuple[Watched, ...]
     keyframe: str = ""  # its name, or its number; "": as the file describes it
     drive: Drive = Drive()
+    push: float = (
+        0.0  # of the size a second and a body: random changes of velocity in every step, part of the question
+    )
+    seed: int = 0  # of those
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)  # m/s², for engines whose loaders do not read it
     assets: Mapping[str, str] = field(default_factory=dict, metadata={"definition": False})  # name → path
 

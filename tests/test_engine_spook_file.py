@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -268,6 +269,24 @@ def test_a_bad_file_is_one_sentence(text: str, said: str, tmp_path: Path) -> Non
         find("spook").simulate(ModelRun(model=_model(tmp_path, text)), time_step=0.002, duration=0.1)
 
     assert "\n" not in str(refused.value)
+
+
+@pytest.mark.parametrize("engine", ["spook", "mujoco"])
+def test_pushes_from_a_seed_are_part_of_a_model(engine: str, tmp_path: Path) -> None:
+    """In every step up to a hundredth of the size a second: many steps later it is elsewhere, by the seed alone."""
+    still = _model(tmp_path, RESTS.format(bits=1), keyframe="high")
+
+    def end(**pushed: float) -> list[float]:
+        asked = ModelRun(model=replace(still, **pushed), samples=(0.4,))  # type: ignore[arg-type]
+        found = find(engine).simulate(asked, time_step=0.002, duration=0.4)["position"][-1]
+        return list(found[:, :2].ravel())
+
+    assert end() == [0.0, 0.0, 0.5, 0.0]
+    assert end(push=0.01, seed=1) == end(push=0.01, seed=1) != end(push=0.01, seed=2)
+    aside = np.subtract(
+        end(push=0.01, seed=1), end()
+    )  # random walks of speed, of 200 steps of .0058 sizes a second
+    assert 2e-3 < np.abs(aside).max() < 0.1
 
 
 def test_the_same_bits_come_twice_and_from_another_process(tmp_path: Path) -> None:

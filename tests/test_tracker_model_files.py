@@ -109,6 +109,8 @@ def test_controls_and_start_are_a_part_of_the_definition(ball: Path, tmp_path: P
         'control = "moves.csv"',
         'keyframe = "up"',
         "control = {amplitude=1.0, frequency=2.0}",
+        "push = 0.01",
+        "push = 0.01\nseed = 2",
     ):
         (tmp_path / "tracker.toml").write_text(f'[[model]]\nfile = "ball.xml"\n{more}\n')
         assert not any(_versions(str(tmp_path / "tracker.toml")) & other for other in seen)

@@ -95,6 +95,7 @@ class LoadedModel(ABC):
     def __init__(self, run: ModelRun, time_step: float, time_limit: float | None) -> None:
         self.run, self.step, self.limit = run, time_step, time_limit
         self.random = np.random.default_rng(run.seed)
+        self.given = np.random.default_rng([run.model.seed, 1])
         self.done = 0  # steps
         self.seconds = self.cpu = self.worst = 0.0
         self.failure = ""
@@ -174,12 +175,10 @@ class LoadedModel(ABC):
     def advance(self, to: int) -> None:
         """Step to that many steps; in one call where nothing changes on the way."""
         run = self.run
-        stepwise = bool(run.push) or run.timed or self.varies
+        stepwise = self.is_pushed or run.timed or self.varies
         while self.done < to and not self.failure:
             count = min(to - self.done, CHUNK)
-            pushes = None
-            if run.push:
-                pushes = run.push * self.size * self.random.uniform(-1.0, 1.0, (count, self.freedom))
+            pushes = self._pushes(count) if self.is_pushed else None
             began, begun = time.perf_counter(), time.process_time()
             if stepwise:
                 self.one_by_one(count, pushes)
@@ -194,6 +193,19 @@ class LoadedModel(ABC):
                 self.failure = (
                     f"stopped after {self.limit:g} s, at {self.done * self.step:.4g} s of simulated time"
                 )
+
+    @property
+    def is_pushed(self) -> bool:
+        """Whether velocities are changed at random: as the model's question says, or to see what that grows to."""
+        return bool(self.run.push or self.run.model.push)
+
+    def _pushes(self, count: int) -> Array:
+        """Of so many steps, (count, freedom)."""
+        found: Array = np.zeros((count, self.freedom))
+        for size, random in ((self.run.push, self.random), (self.run.model.push, self.given)):
+            if size:
+                found += size * self.size * random.uniform(-1.0, 1.0, found.shape)
+        return found
 
     def one_by_one(self, count: int, pushes: Array | None) -> None:
         last = time.perf_counter()

@@ -96,7 +96,7 @@ class _Simulation(LoadedModel):
 
     def _started(self, method: Method) -> Run:
         scene = self.made.scene
-        if self.run.push:
+        if self.is_pushed:
             loads = (Load(name=f"push on {name}", body=name) for name in self.made.moving)
             scene = replace(scene, forces=(*scene.forces, *loads))
         refused: MethodError | None = None

@@ -8,6 +8,8 @@
     name = "bowl"                       # of the test; else the file's
     keyframe = "home"                   # or its number; else the state the file describes
     control = "hold"                    # zero, hold, a CSV file, module:function, or { amplitude = 0.1, frequency = 2.0 }
+    push = 0.01                         # sizes a second: random changes of velocity in every step
+    seed = 1                            # of those
     duration = 5.0                      # s
     watch = ["bowl", "ramekin"]         # bodies; else what is free and the ends of chains
     tolerance = 0.001                   # m and rad: what moves further is red
@@ -42,6 +44,8 @@ KINDS: Mapping[str, tuple[type, ...]] = {
     "name": (str,),
     "keyframe": (str, int),
     "control": (str, dict),
+    "push": (float, int),
+    "seed": (int,),
     "duration": (float, int),
     "watch": (list,),
     "tolerance": (float, int),
@@ -100,7 +104,9 @@ def _understood(said: Any, origin: str) -> None:
             raise ModelFileError(f"{origin}: there is no setting {key!r}; a model knows {', '.join(KINDS)}")
         if not isinstance(value, KINDS[key]) or isinstance(value, bool):
             raise ModelFileError(f"{origin}: {key} cannot be {value!r}")
-    for key, most in (("duration", LONGEST), ("tolerance", math.inf)):
+    if said.get("seed", 0) < 0:
+        raise ModelFileError(f"{origin}: seed must not be negative")
+    for key, most in (("duration", LONGEST), ("tolerance", math.inf), ("push", math.inf)):
         if key in said and not 0.0 < said[key] <= most:
             raise ModelFileError(
                 f"{origin}: {key} must be positive{'' if most == math.inf else f' and {most:g} s at most'}"
@@ -123,6 +129,8 @@ def _test(name: str, said: Mapping[str, Any], reading: Reading, folder: Path, or
         watched=_watched(said.get("watch"), reading, origin),
         keyframe=_keyframe(said.get("keyframe", ""), reading, origin),
         drive=_drive(said.get("control", "zero"), folder, origin),
+        push=float(said.get("push", 0.0)),
+        seed=int(said.get("seed", 0)),
         assets={key: str(path) for key, path in reading.assets.items()},
     )
     return test_of(
