@@ -6,6 +6,7 @@ it has one way into the scene, or a name it is refused by: nothing is passed ove
 - Bodies without joints between them are one rigid body, in its principal axes.
 - A body with several joints gets light bodies between them, of LIGHT of its mass.
 - Armature is a carriage of that mass on a level rail of the world, which goes as the joint does.
+- A servo of bounded force drives a light carriage of its own.
 - Damping, springs and actuators that are linear in place and speed are one compliant row of their joint.
 - Contacts are rigid, as all of this engine's are, whatever solref and solimp say.
 """
@@ -26,14 +27,14 @@ from spook_tracker.engine.couplings import Relation
 from spook_tracker.engine.forces import Spring
 from spook_tracker.engine.joints import Ball, Constraint, Hinge, JointSpring, Limit, Lock, Motor, Prismatic
 from spook_tracker.engine.peers.lacking import Lacks
-from spook_tracker.engine.peers.mujoco_drives import Drives
+from spook_tracker.engine.peers.mujoco_drives import FADING, Drives
 from spook_tracker.engine.peers.mujoco_surfaces import surfaces
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.scene import Scene
 
 Array = npt.NDArray[np.float64]
-LIGHT = 1e-8  # of its mass and inertia, what stands between two joints of one body
-FADING = 1e-9  # 1/s: stiffness over damping of a joint that is damped alone
+LIGHT = 1e-7  # of its mass and inertia, what stands between two joints of one body
+PUSHES_AWAY = "an actuator that pushes away from where it stands or drives what moves"
 APART = 1e-6  # of the model's extent: how far a tie may be open at the start
 FREE, BALL, SLIDE, HINGE = (
     int(getattr(mujoco.mjtJoint, f"mjJNT_{k}")) for k in ("FREE", "BALL", "SLIDE", "HINGE")
@@ -68,6 +69,11 @@ def translate(model: Any, data: Any, *, conservative: bool = False, text: str = 
     """
     mujoco.mj_forward(model, data)
     return _Translation(model, data, conservative).done(text)
+
+
+def servo_name(actuator: int) -> str:
+    """Of the carriage that a servo of bounded force drives."""
+    return f"servo {actuator}"
 
 
 def still(model: Any) -> npt.NDArray[np.int64]:
@@ -322,12 +328,15 @@ class _Translation:
         armature = float(m.dof_armature[dof]) + self.drives.armature(number)
         stiffness, _, rest = self.passive(number) if self.conservative else (0.0, 0.0, 0.0)
         if armature or stiffness:
-            self.carriage(
-                number,
-                armature or LIGHT * float(m.dof_M0[dof]),
-                stiffness,
-                rest - here,
-            )
+            name = f"carriage of {self.name('joint', number)}"
+            self.carriage(number, name, armature or LIGHT * float(m.dof_M0[dof]), stiffness, rest - here)
+        for actuator, arm in self.drives.bounded(number):
+            stiff, pulls_to, damping, most = self.drives.servo(number, actuator, arm, here)
+            if stiff <= 0.0 or damping < 0.0:
+                self.lack(PUSHES_AWAY, "joint", number)
+                continue
+            servo = JointSpring(stiffness=stiff, rest=pulls_to, damping=damping / stiff, max_force=most)
+            self.carriage(number, servo_name(actuator), LIGHT * float(m.dof_M0[dof]), servo=servo)
 
     def passive(self, number: int) -> tuple[float, float, float]:
         """Stiffness and damping of a joint by itself, and where its spring rests [m or rad]."""
@@ -347,18 +356,23 @@ class _Translation:
         pull = stiffness * (rest - here)
         whole, damping = stiffness + further, damping + braking
         if whole < 0.0 or damping < 0.0:
-            self.lack(
-                "an actuator that pushes away from where it stands or drives what moves", "joint", number
-            )
+            self.lack(PUSHES_AWAY, "joint", number)
             return None
         if not whole and not damping:
             return None
         whole = whole or FADING * damping
         return JointSpring(stiffness=whole, rest=pull / whole, damping=damping / whole)
 
-    def carriage(self, number: int, mass: float, stiffness: float, stretched: float) -> None:
+    def carriage(
+        self,
+        number: int,
+        name: str,
+        mass: float,
+        stiffness: float = 0.0,
+        stretched: float = 0.0,
+        servo: JointSpring | None = None,
+    ) -> None:
         """What goes as the joint does, a metre a radian, on a level rail of the world: its mass is armature, its spring the joint's."""
-        name = f"carriage of {self.name('joint', number)}"
         gravity = np.asarray(self.m.opt.gravity)
         rail = np.eye(3)[int(np.argmin(np.abs(gravity)))]
         rail = rail - gravity * (rail @ gravity) / max(gravity @ gravity, 1e-300)
@@ -373,7 +387,9 @@ class _Translation:
             )
         )
         self.constraints += [
-            Prismatic(name=f"rail of {name}", between=(WORLD, name), axis=tuple(rail), compliance=0.0),
+            Prismatic(
+                name=f"rail of {name}", between=(WORLD, name), axis=tuple(rail), compliance=0.0, spring=servo
+            ),
             Relation(
                 name=f"rack of {name}",
                 terms=((self.joints[number], 1.0), (f"rail of {name}", -1.0)),

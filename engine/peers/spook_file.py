@@ -26,7 +26,7 @@ from spook_tracker.engine.observe import (
 )
 from spook_tracker.engine.peers.model_loop import Array, LoadedModel, elsewhere, resident
 from spook_tracker.engine.peers.mujoco_file import LOADS, bodies_of, driven, load, size_of, start_at, stiffen
-from spook_tracker.engine.peers.mujoco_scene import Translated, translate
+from spook_tracker.engine.peers.mujoco_scene import Translated, servo_name, translate
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result, SimulationFailed
 from spook_tracker.engine.run import Run, start
@@ -146,7 +146,11 @@ class _Simulation(LoadedModel):
         drives.control = np.array(self.data.ctrl)
         for joint in drives.driven():
             here = float(self.data.qpos[self.model.jnt_qposadr[joint]])  # the start's: the data stay there
-            self.held.set_motor(self.made.joints[joint], force=drives.force(joint, here))
+            if drives.of(joint):
+                self.held.set_motor(self.made.joints[joint], force=drives.force(joint, here))
+            for actuator, arm in drives.bounded(joint):
+                rest = drives.servo(joint, actuator, arm, here)[1]
+                self.held.set_rest(f"rail of {servo_name(actuator)}", rest)
 
     def read(self) -> None:
         self.now = self.held.state
