@@ -136,10 +136,10 @@ def test_a_step_off_two_clusters_is_seen_though_one_of_them_is_visited() -> None
         values = list(map(float, battery.step("+10 % on clusters 8 % apart", 5000 + series, 60, 6)))
         told = [night.state for night in judge_noisy(values)]
         found += "detected" in told[60:]
-        silent += "detected" not in told[30:60]
+        silent += battery.starts([state == "detected" for state in told[:60]], 30) == 0
 
     assert found >= 37
-    assert silent >= 39  # one took a run of ten nights in the slower cluster for a step
+    assert silent == 40
 
 
 @pytest.mark.parametrize("series", [20148, 20180, 20381, 20398])

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from bench.detectors import AT, MIXES, one_step
-from spook_tracker.tracker.judge.run_times import Noisy, judge_noisy, judged_and_segments
+from spook_tracker.tracker.judge.noisy import Noisy
+from spook_tracker.tracker.judge.run_times import judge_noisy, judged_and_segments
 
 
 def told_of(values: Any, **options: Any) -> list[Noisy]:

@@ -106,9 +106,10 @@ def _apart_from_clusters(base: Values, last: Values, rare: float = RAREST) -> Sh
     near = [nights / np.where(nights - low < high - nights, low, high) for nights in (base, last)]
     tried = _tried(near[0], near[1], rare)
     change = float(np.mean(last) / np.mean(base)) - 1.0
-    if tried is None or change <= LEAST:
-        return None
-    return replace(tried, change=change, apart=not remembered(base))
+    memory = remembered(base)
+    if tried is None or change <= LEAST or (memory and tried.probability >= RAREST):
+        return None  # where visits last, no second test knows of them: off the nearer cluster nothing is remembered
+    return replace(tried, change=change, apart=not memory)
 
 
 def clusters(base: Values) -> tuple[float, float] | None:
