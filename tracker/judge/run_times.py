@@ -40,6 +40,7 @@ MENDED = 0.25  # of its size: a red level that is left of it is none
 SETTLED = 30  # nights of a segment after which its boundary is known
 BACK, WEIGHT = 9.0, 6.0  # log likelihoods: to believe that a red level was left; of one night at most
 OFTEN = 2  # times left before: such a level is flaky,
+LONG = 3  # times the nights whose middle tells a drift, before it is gone
 LONGER = 2  # until it lasts so many times its longest
 
 
@@ -457,6 +458,9 @@ class _Walk(PresentLevel):
         old, recent = ends
         change, threshold = self._worse_by(old, recent), self._level()[2]
         enough = min(threshold, 0.5 * self.crept) if self.crept else threshold
+        if self.crept and change <= enough:  # a few fast nights do not end it
+            recent = median([self.values[i] for i in self.now.places[-LONG * CREEP :]])
+            change = self._worse_by(old, recent)
         if change <= enough or (not self.crept and change * abs(old) <= self._wanders()):
             self.crept = 0.0
             return None
