@@ -51,13 +51,14 @@ def agreement(model: ModelFile, engine: str) -> Agreement:
 def _resolved(model: ModelFile, engine: str, step: float) -> tuple[npt.NDArray[np.float64], float, float]:
     """Places of the watched bodies at the end, what halving the step changed of them, and the size of what moves."""
     before, size = _ran(model, engine, step)
+    last = np.inf
     while True:
         step *= 0.5
         after, _ = _ran(model, engine, step)
         changed = _apart(after, before) / size
-        if changed <= RESOLVED or step <= FINEST:
+        if changed <= RESOLVED or step <= FINEST or changed > last:  # what grows again is rounding, or chaos
             return after, changed, size
-        before = after
+        before, last = after, changed
 
 
 def _ran(model: ModelFile, engine: str, step: float) -> tuple[Any, float]:
