@@ -107,7 +107,7 @@ def test_damping_springs_and_servos_are_mujocos_as_the_step_falls(tmp_path: Path
     text = _arm(
         '<joint name="swing" axis="0 1 0" damping=".8" stiffness="5" armature=".1"/>',
         '<joint name="elbow" axis="1 0 0" damping=".3"/>',
-        '<actuator><position joint="swing" kp="30" kv="2"/><velocity joint="elbow" kv=".5"/><motor joint="elbow" gear="2"/></actuator>',
+        '<actuator><position joint="swing" kp="30" kv="2" gear="1.3"/><velocity joint="elbow" kv=".5"/><motor joint="elbow" gear="2"/></actuator>',
     )  # fmt: skip
     model = _model(tmp_path, text, drive=Drive(kind="sinusoid", amplitude=0.7, frequency=0.8))
 
