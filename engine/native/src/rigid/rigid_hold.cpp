@@ -119,7 +119,7 @@ void RigidSystem::mix(int iteration, int& kept) {
             ++kept;
         }
     }
-    std::copy(bias_.begin(), bias_.end(), last_plain_.begin());
+    std::copy_n(bias_.begin(), rows, last_plain_.begin());  // a tree has more coordinates than rows
     for (int k = 0; k < kept; ++k) {
         const double* q = mixing_.data() + 2 * rows * static_cast<std::size_t>(k);
         double share = 0.0;
