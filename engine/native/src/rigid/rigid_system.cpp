@@ -114,6 +114,8 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     if (may_lie_in_plane(scene))
         plane_.analyse(constants_, joints_, constrained_,
                        {h_, method_.refinements, method_.corrections, method_.correction_cap});
+    in_tree_ = tree_.coordinates() > 0 && tree_.holds(start_);  // for those that ask before a run
+    in_plane_ = !plane_.empty() && plane_.holds(constants_, acceleration_, start_);
 }
 
 /// Which stages run here; what the scene has and no stage handles is refused.
