@@ -41,7 +41,8 @@ class Method:
     composition        symmetric composition of half-step steps; order 2 (none), 4, 6 or 8 on smooth scenes.
                        5, 9 or 17 stages a step; rows are held rigidly and their curvature to rounding, so
                        compliance, damping and corrections play no part; forces are those at the sample's time.
-                       Small trees of rigid joints on the world are solved in joint coordinates, the rest by rows
+                       Small trees of rigid joints on the world are solved in joint coordinates, the rest by rows. Steps that are
+                       too long for the tension of light bodies are taken in parts
     solver             direct; iterative (projected Gauss-Seidel); hybrid (friction iterative, rest direct); an impact
                        among up to 24 contacts that iterations do not settle is solved directly, since what it leaves stays;
                        so are up to 24 joints (and their contacts) that would be unsettled
@@ -49,8 +50,9 @@ class Method:
                        unsettled_residual, iterations go on there and nearby, for up to sixteen times the work (joints: four)
     friction           cone (isotropic), box (bound from the step before), scaled_box (current normal force)
     impacts            simultaneous: all that touch take part in one impact (a ball on four gives −.6 and four times .4);
-                       a pair, or a joint's stop, is hit once in a step, and stops without rebound where it approaches
-                       again;
+                       free balls of which one pair meets at a time do so one after the other, as often as they meet; any
+                       other pair, or a joint's stop, is hit once in a step, and stops without rebound where it approaches
+                       again (counters["stopped_impacts"]);
                        successive: one pair after the other until none approaches, as if there were small gaps (the
                        last ball leaves, no energy is lost at restitution 1); those that are open as a step begins in
                        the order in which they close, free balls moved from one impact to the next

@@ -261,7 +261,8 @@ TEST = ScalarTest(
                     role="companion",
                     limit=1.9e-4,
                     limit_source=ORACLE
-                    + "1.854e-4; of 1/240 s it is 2.1e-4 and from there on of first order in h, 0.05 h",
+                    + "1.854e-4; of 1/240 s it is 2.1e-4 and from there on of first order in h, 0.05 h. With turns by asin(h ω) it was 1.88e-5 here "
+                    "alone, crossing zero at 1/59 s, and 1.86e-4 at 1/240",
                     set_point=_around(1.8535693e-4),
                     set_point_source=ORACLE + "1.854e-4",
                     reference=0.0,

@@ -13,18 +13,22 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import (
+    WORLD,
     Box,
     Capsule,
     Energy,
+    Limit,
     Material,
     Method,
     Plane,
     Position,
+    Prismatic,
     RigidBody,
     Scene,
     Shape,
     Sphere,
     Trace,
+    Velocity,
     simulate,
 )
 
@@ -117,3 +121,110 @@ def test_what_bounces_comes_to_rest(restitution: float, method: Method) -> None:
 
     assert np.abs(gap[-30:]).max() < 1e-12
     assert np.ptp(energy[-30:]) == 0.0
+
+
+@pytest.mark.parametrize("h", [1 / 60, 1 / 240])
+@pytest.mark.parametrize("method", SOLVERS)
+def test_a_ball_between_closing_walls_is_hit_as_often_as_it_meets_them(method: Method, h: float) -> None:
+    """Each meeting with the wall that comes on at .5 m/s makes it faster by 1 m/s; several fall into a step in the end."""
+    elastic = Material(restitution=1.0)
+    ball = RigidBody(
+        name="ball",
+        mass=1.0,
+        position=(0.51, 0.0, 0.0),
+        shape=Sphere(0.01),
+        velocity=(1.3, 0.0, 0.0),
+        material=elastic,
+    )
+    still = RigidBody(
+        name="still",
+        motion="static",
+        position=(0.0, 0.0, 0.0),
+        shape=Plane((1.0, 0.0, 0.0)),
+        material=elastic,
+    )
+    comes = RigidBody(
+        name="comes",
+        motion="kinematic",
+        position=(1.52, 0.0, 0.0),
+        shape=Box((1.0, 2.0, 2.0)),
+        velocity=(-0.5, 0.0, 0.0),
+        material=elastic,
+    )
+    place, speed, wall, left, meetings = 0.51, 1.3, 1.02, 1.9, 0  # of the middle, and how far that may come
+    while True:
+        ahead = (wall - 0.01 - place) / (speed + 0.5) if speed > 0.0 else (place - 0.01) / -speed
+        if ahead > left:
+            break
+        place, wall, left = place + ahead * speed, wall - 0.5 * ahead, left - ahead
+        meetings += speed > 0.0
+        speed = -speed - 1.0 if speed > 0.0 else -speed
+    steps = round(1.9 / h)
+    run = simulate(
+        Scene(bodies=(ball, still, comes)),
+        time_step=h,
+        steps=steps,
+        method=method,
+        observe={"v": Trace(quantity=Velocity("ball"))},
+    )
+
+    assert abs(run["v"][-1, 0]) == pytest.approx(abs(speed), abs=1e-9)
+    assert meetings == 30
+    assert run.counters["stopped_impacts"] == 0
+
+
+@pytest.mark.parametrize("method", SOLVERS)
+def test_impacts_that_are_stopped_without_a_rebound_are_counted(method: Method) -> None:
+    """A box, which is not moved to the time of an impact, between two plates 4 mm off: it is stopped, and says so."""
+    elastic = Material(restitution=1.0)
+
+    def plate(name: str, x: float) -> RigidBody:
+        return RigidBody(
+            name=name, motion="static", position=(x, 0.0, 0.0), shape=Box((1.0, 2.0, 2.0)), material=elastic
+        )
+
+    box = RigidBody(
+        name="box",
+        mass=1.0,
+        position=(0.0, 0.0, 0.0),
+        shape=Box((0.2, 0.2, 0.2)),
+        velocity=(3.0, 0.0, 0.0),
+        material=elastic,
+    )
+    run = simulate(
+        Scene(bodies=(box, plate("left", -0.602), plate("right", 0.602))),
+        time_step=1 / 60,
+        steps=60,
+        method=method,
+        observe={"v": Trace(quantity=Velocity("box"))},
+    )
+    slowed = np.abs(run["v"][-1, 0]) < 2.9
+
+    assert (run.counters["stopped_impacts"] > 0) == slowed
+
+
+def test_a_stop_whose_rebound_ends_at_the_other_end_is_counted() -> None:
+    """A slide at 3 m/s between elastic stops 8 mm apart; in parts of a step that are short enough it keeps its speed."""
+    slide = RigidBody(
+        name="slide", mass=1.0, position=(0.0, 0.0, 0.0), inertia=(0.1,) * 3, velocity=(3.0, 0.0, 0.0)
+    )
+    guide = Prismatic(
+        name="guide",
+        between=(WORLD, "slide"),
+        axis=(1.0, 0.0, 0.0),
+        limit=Limit(lower=-0.004, upper=0.004, restitution=1.0),
+    )
+    ends, counts = [], []
+    for substeps in (1, 16):
+        run = simulate(
+            Scene(bodies=(slide,), constraints=(guide,)),
+            time_step=1 / 60,
+            steps=60,
+            method=Method(substeps=substeps),
+            observe={"v": Trace(quantity=Velocity("slide"))},
+        )
+        ends.append(abs(float(run["v"][-1, 0])))
+        counts.append(run.counters["stopped_impacts"])
+
+    assert ends[0] < 1.0 < 2.99 < ends[1]
+    assert counts[0] > 0 == counts[1]

@@ -1,4 +1,4 @@
-"""A composition that makes energy out of nothing is not told as completed."""
+"""Tension that a composition's stages are too long for: it is taken in parts, and what still makes energy is not told as completed."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ LINKS = 10  # of 1 kg and 1 m
 DOWN = (0.0, 0.0, -9.81)  # m/s²
 
 
-def thrown(load: float, steps_a_second: int) -> tuple[Result, float]:
-    """A load [kg] at the end of a chain, thrown at 1 m/s for 5 s; and how the energy errs, over the throw's."""
+def thrown(load: float, steps_a_second: int, seconds: float = 5.0) -> tuple[Result, float]:
+    """A load [kg] at the end of a chain, thrown at 1 m/s; and how the energy errs, over the throw's."""
     links = [
         RigidBody(name=f"{k}", mass=1.0, position=(0.0, 0.0, -k - 0.5), inertia=(1 / 12, 1 / 12, 0.01))
         for k in range(LINKS)
@@ -46,7 +46,7 @@ def thrown(load: float, steps_a_second: int) -> tuple[Result, float]:
     result = simulate(
         Scene(bodies=(*links, weight), constraints=tuple(joints), gravity=DOWN),
         time_step=1.0 / steps_a_second,
-        duration=5.0,
+        duration=seconds,
         method=ORDER_4,
         observe={"energy": Trace(quantity=Energy())},
     )
@@ -54,9 +54,19 @@ def thrown(load: float, steps_a_second: int) -> tuple[Result, float]:
     return result, float(abs(energy - energy[0]).max()) / (0.5 * load)
 
 
-@pytest.mark.parametrize(("load", "steps"), [(300.0, 60), (1e4, 60), (1e4, 240)])
-def test_what_tension_makes_ends_unsettled(load: float, steps: int) -> None:
+@pytest.mark.parametrize(("load", "steps"), [(300.0, 60), (1e4, 60), (1e4, 240), (1e6, 240)])
+def test_steps_that_are_too_long_for_the_tension_are_taken_in_parts(load: float, steps: int) -> None:
+    """In whole steps light links won 29 % of the throw under 300 kg, and 176 % under 10 t."""
     result, error = thrown(load, steps)
+
+    assert result.completed
+    assert error < 1e-5
+    assert result.counters["halved_steps"] >= 5 * steps
+
+
+def test_what_tension_makes_ends_unsettled() -> None:
+    """Beyond a thousand parts a step is left as it is."""
+    result, error = thrown(1e10, 60, seconds=0.2)
 
     assert error > 0.1
     assert result.status == "unsettled"

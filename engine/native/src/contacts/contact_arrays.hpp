@@ -90,9 +90,15 @@ struct PenetrationRecord {
 struct EventSearch {
     std::vector<std::size_t> members;
     std::vector<std::uint64_t> impact_pair;  // the pair of the island's impact, plus one
-    std::vector<char> plain, bouncy, rests;
+    std::vector<char> plain, bouncy;
     std::vector<double> when, speed;
     std::vector<std::size_t> moving_along, may_move_along;  // how many move along the forces, and may
+};
+
+/// Of a closed point: which body the forces press on the other.
+struct SupportPair {
+    int first, second;
+    bool first_presses, second_presses, both;  // on each other, supported or not
 };
 
 /// Of one impact; energies, shares and flags by island.
@@ -105,7 +111,9 @@ struct ImpactArrays {
     std::vector<Vec6> before, mixed, next;
     std::vector<std::array<double, 2>> returned;  // of the slip of each point, m/s
     std::vector<double> limit, energy, share, low, high, asked, first, closing;
-    std::vector<char> rises, answered, touched, taking_part, balls, is_hit, rests;  // the last two by body
+    std::vector<char> rises, answered, touched, taking_part, balls, orderly;
+    std::vector<char> is_hit;  // by body
+    std::vector<std::uint64_t> island_pair;
 };
 
 struct EnergySums {

@@ -87,7 +87,8 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     impact_needed_ = plastic_first_ = false;
     iterating_ = ran_away_ = false;  // of a step that was taken back, or is over
     impact_rounds_ = 0;
-    if (options_.impacts == ImpactOrder::successive) clock_.assign(bodies, 0.0), path_.assign(bodies, Vec6{});
+    if (rebounds_ || options_.impacts == ImpactOrder::successive)
+        clock_.assign(bodies, 0.0), path_.assign(bodies, Vec6{}), in_order_.assign(bodies, 0);
 
     for (std::size_t b = 0; b < bodies; ++b) margin_[b] = margin_of(b, velocity, free_velocity);
     search_ = margin_;

@@ -19,9 +19,9 @@ inline Vec3 linear(const Vec6& v) noexcept { return {v[0], v[1], v[2]}; }
 inline Vec3 angular(const Vec6& v) noexcept { return {v[3], v[4], v[5]}; }
 
 /// How much of a step's forces has acted on a free body when this part of the step has passed. v at the start of a step is
-/// that of a body half a step before: what flies on from an impact has its true velocity there with half a kick more.
-inline double part_of_forces(double passed, bool flies_on) noexcept {
-    return flies_on ? 0.5 + passed : passed;
+/// that of the middle of the step before: where bodies rebound, what they meet with has half a kick more.
+inline double part_of_forces(double passed, bool rebounds) noexcept {
+    return rebounds ? 0.5 + passed : passed;
 }
 
 /// The Jacobian of a body's velocity at `arm` from its centre, along `direction`.

@@ -287,12 +287,11 @@ void ContactStage::impact(MixedSystem& system) {
     residual_ = unsettled_by_ = 0.0;
     unsettled_body_ = -1;
     sunk_ = false;
-    const bool successive =
-        options_.impacts == ImpactOrder::successive && impact_rounds_ <= most_rounds(points_.size());
+    const bool in_order = !clock_.empty() && impact_rounds_ <= most_rounds(points_.size());
     ImpactArrays& work = arrays_.impact;
     std::vector<std::size_t>& hit_points = filled(work.hit_points, 0);
-    if (successive) find_earliest_impacts(system, hit_points);
-    for (std::size_t k = 0; !successive && k < points_.size(); ++k)
+    if (in_order) find_earliest_impacts(system, hit_points);
+    for (std::size_t k = 0; !in_order && k < points_.size(); ++k)
         if (points_[k].bounce >= 0.0) hit_points.push_back(k);
     MixedSystem& hit = work.hit;
     hit.mass = system.mass;
@@ -390,25 +389,22 @@ void ContactStage::after_impact(const MixedSystem& system) {
     const std::size_t known = points_.size();
     const bool found = find_impacts(next, false) > 0;
     if (found) {
-        if (!clock_.empty())
-            std::for_each(points_.begin() + known, points_.end(),
-                          [this](Point& p) { move_to_last_impact(p); });
+        for (std::size_t k = known; k < points_.size(); ++k)
+            if (come_in_order(points_[k])) move_to_last_impact(points_[k]);
         move_impacts_to_start(known, next);
         state_.counters.contacts += points_.size() - known;
         order_points();
     }
-    const bool successive = options_.impacts == ImpactOrder::successive;
     measure_points();
-    if (!successive) {  // what was hit already is not hit again
-        impact_needed_ = false;
-        for (const Point& point : points_)
-            impact_needed_ = impact_needed_ || (point.impact == 0.0 && point.toi >= 0.0 && is_impact(point));
-        if (impact_rounds_ >= simultaneous_rounds) impact_needed_ = false;
-    } else {
-        for (const Point& point : points_)
-            impact_needed_ = impact_needed_ || (point.bounce >= 0.0 && point.approach < -point.rounding);
-        if (impact_rounds_ > most_rounds(points_.size())) impact_needed_ = false;
+    impact_needed_ = false;
+    const bool again = impact_rounds_ <= most_rounds(points_.size());
+    for (const Point& point : points_) {
+        const bool in_order = come_in_order(point);
+        if (in_order) impact_needed_ |= again && point.bounce >= 0.0 && point.approach < -point.rounding;
+        else if (impact_rounds_ < simultaneous_rounds)  // what was hit already is not hit again
+            impact_needed_ |= point.impact == 0.0 && point.toi >= 0.0 && is_impact(point);
     }
+    if (!impact_needed_) lay_down();
 }
 
 }  // namespace spook

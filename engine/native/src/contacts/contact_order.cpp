@@ -11,6 +11,8 @@ namespace spook {
 
 namespace {
 
+constexpr char rebounds = 1,
+               held = 2;  // of an island: some impact in it has a restitution; not all in it is free
 constexpr std::size_t event_bodies = 8;  // a larger island is not moved to the time of one impact in it
 
 }  // namespace
@@ -35,12 +37,10 @@ void ContactStage::find_events() {
     for (const auto& [a, b] : joints_)
         if (a >= 0 && b >= 0) join(a, b);
 
-    auto& [members, impact_pair, plain, bouncy, rests, when, speed, moving_along, may_move_along] =
-        arrays_.events;
+    auto& [members, impact_pair, plain, bouncy, when, speed, moving_along, may_move_along] = arrays_.events;
     members.assign(solver_index_.size(), 0);
     impact_pair.assign(solver_index_.size(), 0);
     plain.assign(solver_index_.size(), 1), bouncy.assign(solver_index_.size(), 0);
-    rests.assign(solver_index_.size(), 0);
     moving_along.assign(solver_index_.size(), 0), may_move_along.assign(solver_index_.size(), 0);
     when.assign(solver_index_.size(), -1.0);
     for (std::size_t b = 0; b < solver_index_.size(); ++b)
@@ -48,6 +48,7 @@ void ContactStage::find_events() {
             const int island = root(static_cast<int>(b));
             ++members[island];
             plain[island] = plain[island] && ball_[b];
+            if (!is_free(b)) bouncy[island] |= held;
             moving_along[island] += moves_along_forces(static_cast<int>(b));
         }
     for (const Point& point : points_) {
@@ -66,12 +67,11 @@ void ContactStage::find_events() {
         if (impact_pair[island] != 0 && impact_pair[island] != pair) plain[island] = 0;
         impact_pair[island] = pair;
         when[island] = point.toi;
-        bouncy[island] = bouncy[island] || material(point.contact).restitution > 0.0;
-        rests[island] = rests[island] || comes_to_rest(point, point.toi / options_.time_step);
+        if (material(point.contact).restitution > 0.0) bouncy[island] |= rebounds;
     }
     // A plastic impact among bodies that may meet others after it acts at the start of the step, as the rows of those
-    // others will: bodies moved to an event's time would not be where such rows expect them. Nor are successive impacts among
-    // such bodies moved here: another may come first.
+    // others will: bodies moved to an event's time would not be where such rows expect them. Nor are impacts that come in order,
+    // successive ones and those of free balls, moved here: another may come first.
     const bool successive = options_.impacts == ImpactOrder::successive;
     speed.assign(solver_index_.size(), 0.0);
     for (std::size_t b = 0; b < solver_index_.size(); ++b) {
@@ -83,8 +83,8 @@ void ContactStage::find_events() {
         if (open.has_met()) continue;
         const int a = island(open.first), b = island(open.second);
         if (open.apart.gap > options_.time_step * (speed[a] + speed[b])) continue;
-        plain[a] = plain[a] && bouncy[a] && !successive;
-        plain[b] = plain[b] && bouncy[b] && !successive;
+        plain[a] = plain[a] && bouncy[a] == (rebounds | held) && !successive;
+        plain[b] = plain[b] && bouncy[b] == (rebounds | held) && !successive;
     }
     for (std::size_t b = 0; b < solver_index_.size(); ++b) {
         if (solver_index_[b] < 0) continue;
@@ -92,9 +92,7 @@ void ContactStage::find_events() {
         if (impact_pair[island] == 0 || !plain[island] || members[island] > event_bodies) continue;
         if (moving_along[island] > may_move_along[island]) continue;
         event_time_[b] = when[island];
-        if (is_free(b))
-            apply_forces_until(
-                b, part_of_forces(when[island] / options_.time_step, rebounds_ && !rests[island]));
+        if (is_free(b)) apply_forces_until(b, part_of_forces(when[island] / options_.time_step, rebounds_));
     }
     for (Point& point : points_) {
         if (point.toi < 0.0) continue;
@@ -115,21 +113,21 @@ void ContactStage::apply_forces_until(std::size_t b, double part) {
 void ContactStage::apply_half_of_forces() {
     for (std::size_t b = 0; rebounds_ && b < solver_index_.size(); ++b)
         if (solver_index_[b] >= 0 && is_free(b) && event_time_[b] < 0.0)
-            apply_forces_until(b, part_of_forces(0.0, true));
+            apply_forces_until(b, part_of_forces(0.0, rebounds_));
 }
 
-/// Whether forces bring the bodies of a point together again within a step of which this part has passed when they meet.
-bool ContactStage::comes_to_rest(const Point& point, double part) const {
-    double approach = relative(point, point.contact.point.normal, velocity_, false), push = 0.0;
-    const auto follow = [&](int b, Vec6 row) {
-        if (solver_index_[b] < 0 || !is_free(b)) return;
-        const double own = dot(row, whole_dv_ext_[b]);
-        push += own, approach += (part_of_forces(part, true) - toi_fraction_[b]) * own;
-    };
-    const Vec3 n = point.contact.point.normal;
-    follow(point.contact.first, contact_row(n, point.first_arm));
-    follow(point.contact.second, contact_row(-n, point.second_arm));
-    return material(point.contact).restitution * -approach < 0.5 * (1.0 - part) * -push;
+/// Bodies that forces would bring together again in the rest of the step, so soon after their impact, lie on each other: what is
+/// left of their forces, which would lift them off where more than the half of the step has passed, is taken by the contact.
+void ContactStage::lay_down() {
+    for (const Point& point : points_) {
+        if (!point.event) continue;
+        const double apart = relative(point, point.contact.point.normal, velocity_, false),
+                     push = relative(point, point.contact.point.normal, whole_dv_ext_, false);
+        const double left = 1.0 - point.toi / options_.time_step;
+        if (!(std::abs(apart) < 0.5 * left * -push)) continue;
+        for (const int b : {point.contact.first, point.contact.second})
+            if (solver_index_[b] >= 0 && toi_fraction_[b] > 1.0) dv_ext_[b] = Vec6{}, toi_fraction_[b] = 1.0;
+    }
 }
 
 /// Sorts the points by key and finds each one's predecessor in the step before.

@@ -396,6 +396,13 @@ Vec3 ContactStage::store_solution(const RowBlock& block, Point& point) {
     return along;
 }
 
+/// Whether a point that is to rebound was stopped instead, faster than a fall in a step.
+bool ContactStage::is_stopped(const Point& point, double normal) const {
+    const double fall = std::abs(relative(point, point.contact.point.normal, whole_dv_ext_, false));
+    return normal > 0.0 && point.approach < -(point.rounding + fall) &&
+           material(point.contact).restitution > 0.0;
+}
+
 /// Takes down what a point did: its normal impulse, and that along the surface.
 ContactStage::CachedContact& ContactStage::cache_contact(const MixedSystem& system, const Point& point,
                                                          double normal, Vec3 along) {
@@ -405,6 +412,7 @@ ContactStage::CachedContact& ContactStage::cache_contact(const MixedSystem& syst
     cached.normal = normal;
     cached.compression = compression(system, point);
     cached.impact = point.impact;
+    state_.counters.stopped += is_stopped(point, normal);
     cached.impulse = normal * n + along + extras(point).impact_impulse;
     cached.tangent[0] = dot(along, point.tangent);
     cached.tangent[1] = dot(along, cross(n, point.tangent));

@@ -84,7 +84,8 @@ struct ContactOptions {
 struct ContactCounters {  // exact, equal on every machine
     std::uint64_t contacts = 0, impacts = 0, corrections = 0, friction_rounds = 0, pivots = 0,
                   pgs_iterations = 0,
-                  unsettled = 0;  // solves that stopped at a limit of rounds
+                  unsettled = 0,  // solves that stopped at a limit of rounds
+        stopped = 0;              // impacts that were to rebound and did not
 };
 
 /// All state from one step to the next is in plain members: copy the stage to save it.
@@ -292,7 +293,7 @@ private:
     bool is_free(std::size_t b) const noexcept { return !supported_[b] && !jointed_[b]; }
     void apply_forces_until(std::size_t body, double part);
     void apply_half_of_forces();
-    bool comes_to_rest(const Point& point, double part) const;
+    void lay_down();
     // supported_bodies.cpp
     void note_supports(Point& point);
     void find_supported();
@@ -322,6 +323,10 @@ private:
     bool needs_stop_impact(const MixedSystem& system, std::size_t known, const std::vector<Vec6>& next);
     bool pass_other_ends(const MixedSystem& system, std::size_t joints);
     void find_earliest_impacts(MixedSystem& system, std::vector<std::size_t>& hit_points);
+    void find_orderly(const Islands& islands, const std::vector<double>& first,
+                      const std::vector<double>& closing);
+    bool come_in_order(const Point& point) const;
+    bool is_stopped(const Point& point, double normal) const;
     void apply_forces_before(std::size_t body, double part, MixedSystem& system);
     Vec6 path_until(std::size_t body, double time) const;
     double gap_at(const Point& point, double time) const;
@@ -453,17 +458,12 @@ private:
     int met_ = 0;                         // of them
     std::vector<IndexPair> open_bodies_;  // of each, to look through many that did not move; empty: not yet
     std::vector<Separation> apart_;       // of pairs, found on several threads
-    std::vector<std::vector<Meeting>> meetings_;  // found by each thread
-    std::vector<MeetingOf> meetings_of_;          // by body and time
-    std::vector<IndexPair> neighbours_,
-        initial_overlaps_;         // pairs without points, where others part; those let in
-    std::vector<IndexPair> near_;  // where the search was widened
-    std::vector<int> grown_;       // the bodies it was widened for
-    std::vector<char> supported_;  // bodies that closed contacts carry
-    struct SupportPair {           // of a closed point: which body the forces press on the other
-        int first, second;
-        bool first_presses, second_presses, both;  // on each other, supported or not
-    };
+    std::vector<std::vector<Meeting>> meetings_;            // found by each thread
+    std::vector<MeetingOf> meetings_of_;                    // by body and time
+    std::vector<IndexPair> neighbours_, initial_overlaps_;  // pairs without points, where others part; let in
+    std::vector<IndexPair> near_;                           // where the search was widened
+    std::vector<int> grown_;                                // the bodies it was widened for
+    std::vector<char> supported_;                           // bodies that closed contacts carry
     std::vector<SupportPair> support_pairs_;
     std::vector<Vec6> support_impulse_dv_;   // what supports took of a body's kick until they let it go
     std::vector<double> depth_;              // of a body's closed contacts, m
@@ -475,6 +475,7 @@ private:
     std::vector<double> toi_fraction_, event_time_;
     std::vector<double> clock_;  // of successive impacts: up to when a body's way in the step is known, s
     std::vector<Vec6> path_;     // and that way, m and rad
+    std::vector<signed char> in_order_;  // bodies: 1 if impacts come one by one in this step, −1 if not
     LargeArray<Point> points_, toi_points_;
     std::vector<ContactExtras> extras_;                                             // of points, in no order
     std::vector<std::pair<std::uint64_t, std::size_t>> places_, projected_places_;  // of points, by key
@@ -489,11 +490,10 @@ private:
     bool late_impact_ = false;    // an impact found after the solve needs an impact
     bool plastic_first_ = false;  // plastic impacts are met in the impact as well
     bool ends_passed_ = false;    // by the last solve
-    int impact_rounds_ = 0;
+    int impact_rounds_ = 0, unsettled_body_ = -1;
     double residual_ = 0.0, unsettled_by_ = 0.0;
     bool sunk_ = false;
     bool joint_is_worst_ = false;  // of what the last iterations have left
-    int unsettled_body_ = -1;
 };
 
 }  // namespace spook

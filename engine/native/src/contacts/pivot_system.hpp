@@ -43,6 +43,7 @@ struct StopRow {
     double other = 0.0;       // right side of a row for the other end
     double given = 0.0;       // what bodies that move as they are told give to its rate, m/s or rad/s
     bool both = false;        // the other end has its row, too
+    bool cut = false;         // its rebound is slower than its restitution says, to end at the other end
 };
 
 /// Up to six rows between two moving bodies (or one: `second` or `first` is −1), or one row over any number.

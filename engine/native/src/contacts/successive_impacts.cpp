@@ -57,8 +57,48 @@ void ContactStage::apply_forces_before(std::size_t b, double part, MixedSystem& 
         for (int j = 0; j < 6; ++j) system.momentum[solver_index_[b]][i] += mass[6 * i + j] * more[j];
 }
 
-/// Of successive impacts those to be answered next: of what may meet in this step the points that are approached, and closed
-/// when the first of them is. Free balls are moved there, as to the time of a single impact.
+/// Whether impacts come one after the other between the bodies of a point.
+bool ContactStage::come_in_order(const Point& point) const {
+    if (options_.impacts == ImpactOrder::successive) return true;
+    if (clock_.empty()) return false;
+    for (const int b : {point.contact.first, point.contact.second})
+        if (solver_index_[b] >= 0 && in_order_[b] <= 0) return false;
+    return true;
+}
+
+/// Which islands meet one impact after the other: all, where impacts are successive; else those of free balls of which one pair
+/// alone touches when the next impact comes. Then there is nothing that all of them could take part in.
+void ContactStage::find_orderly(const Islands& islands, const std::vector<double>& first,
+                                const std::vector<double>& closing) {
+    std::vector<char>& orderly = arrays_.impact.orderly;
+    orderly.assign(islands.count, 1);
+    if (options_.impacts == ImpactOrder::successive) return;
+    std::vector<std::uint64_t>& pairs = arrays_.impact.island_pair;
+    pairs.assign(islands.count, 0);
+    const auto island = [&](std::size_t b) {
+        return solver_index_[b] >= 0 ? islands.of_body[solver_index_[b]] : -1;
+    };
+    for (std::size_t b = 0; b < solver_index_.size(); ++b)
+        if (island(b) >= 0)
+            orderly[island(b)] = orderly[island(b)] && ball_[b] && is_free(b) && in_order_[b] >= 0;
+    for (std::size_t k = 0; k < points_.size(); ++k) {
+        const Point& point = points_[k];
+        const int own = island_of(islands, point);
+        const double now = first[own];
+        if (now == unbounded || (closing[k] > now && !is_closed(point.contact, gap_at(point, now)))) continue;
+        const std::uint64_t pair = (point.contact.key >> feature_bits) + 1;
+        const bool another = pairs[own] != 0 && pairs[own] != pair;
+        if (another || !(material(point.contact).restitution > 0.0)) orderly[own] = 0;
+        pairs[own] = pair;
+    }
+    for (std::size_t b = 0; b < solver_index_.size(); ++b)
+        if (island(b) >= 0 && first[island(b)] < unbounded)
+            in_order_[b] =
+                orderly[island(b)] ? 1 : -1;  // where they are is not followed after another impact
+}
+
+/// Of impacts that come in order those to be answered next, of the others all: of what may meet in this step the points that are
+/// approached, and closed when the first of them is. Free balls are moved there, as to the time of a single impact.
 void ContactStage::find_earliest_impacts(MixedSystem& system, std::vector<std::size_t>& hit_points) {
     arrays_.connected.begin(static_cast<int>(system.mass.size()));
     for (const RowBlock& block : system.rows) arrays_.connected.tie(block);
@@ -78,18 +118,22 @@ void ContactStage::find_earliest_impacts(MixedSystem& system, std::vector<std::s
         double& earliest = first[island_of(islands, points_[k])];
         earliest = std::min(earliest, closing[k]);
     }
-    std::vector<char>&hit = arrays_.impact.is_hit, &balls = arrays_.impact.balls,
-    &rests = arrays_.impact.rests;
-    hit.assign(solver_index_.size(), 0), balls.assign(islands.count, 1), rests = hit;
+    find_orderly(islands, first, closing);
+    const std::vector<char>& orderly = arrays_.impact.orderly;
+    std::vector<char>&hit = arrays_.impact.is_hit, &balls = arrays_.impact.balls;
+    hit.assign(solver_index_.size(), 0), balls.assign(islands.count, 1);
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
-        const double now = first[island_of(islands, point)];
+        const int own = island_of(islands, point);
+        const double now = first[own];
+        if (!orderly[own]) {
+            if (point.bounce >= 0.0) hit_points.push_back(k);
+            continue;
+        }
         if (!is_impact(point) || (closing[k] > now && !is_closed(point.contact, gap_at(point, now))))
             continue;
         hit_points.push_back(k);
-        const bool stays = comes_to_rest(point, std::min(1.0, now / options_.time_step));
-        for (const int b : {point.contact.first, point.contact.second})
-            hit[b] = 1, rests[b] = rests[b] || stays;
+        hit[point.contact.first] = hit[point.contact.second] = 1;
     }
     const auto island = [&](std::size_t b) {
         return solver_index_[b] >= 0 ? islands.of_body[solver_index_[b]] : -1;
@@ -98,22 +142,23 @@ void ContactStage::find_earliest_impacts(MixedSystem& system, std::vector<std::s
         if (island(b) >= 0) balls[island(b)] = balls[island(b)] && ball_[b] && !jointed_[b];
     for (std::size_t b = 0; b < solver_index_.size(); ++b) {
         const int own = island(b);
-        if (own < 0 || first[own] == unbounded) continue;
+        if (own < 0 || first[own] == unbounded || !orderly[own]) continue;
         if (const double time = std::min(first[own], options_.time_step); hit[b] && time > clock_[b]) {
             path_[b] = path_until(b, time);
             clock_[b] = time;
             if (balls[own])
-                apply_forces_before(b, part_of_forces(time / options_.time_step, !rests[b]), system);
+                apply_forces_before(b, part_of_forces(time / options_.time_step, rebounds_), system);
         }
         if (!balls[own] || moves_along_forces(static_cast<int>(b))) continue;
         event_time_[b] = clock_[b];
         if (clock_[b] > 0.0) predicted_[b] = sum(Vec6{}, path_[b], 1.0 / clock_[b]);
     }
-    for (Point& point : points_) move_to_last_impact(point);
+    for (Point& point : points_)
+        if (come_in_order(point)) move_to_last_impact(point);
     for (const std::size_t k : hit_points) {
         Point& point = points_[k];
         point.approach = relative(point, point.contact.point.normal, velocity_, false);
-        if (point.event) point.bounce = material(point.contact).restitution;
+        if (point.event && come_in_order(point)) point.bounce = material(point.contact).restitution;
     }
 }
 

@@ -209,6 +209,7 @@ double JointSet::one_sided(double inwards, double violation, double rate, const 
     stop.touching = !open || state.met * inwards > 0.0;
     stop.rebound = 0.0;
     stop.hit = approach > state.rebounds && (open ? time_step_ * approach > gap : hit);
+    stop.cut = restitution > 0.0 && stop.hit && restitution * approach > room / time_step_;
     if (restitution > 0.0 && stop.hit)
         value = stop.rebound = inwards * std::min(restitution * approach, std::max(0.0, room) / time_step_);
     else if (!open && hit)  // plastic: the SPOOK row would let a part of the speed in and send it back

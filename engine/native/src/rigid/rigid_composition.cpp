@@ -26,6 +26,10 @@ namespace {
 constexpr int DIFFERENCES = 8;        // of a stage's forces from step to step, the zeroth included
 constexpr double MOST_GAINED = 0.05;  // of the largest kinetic energy
 constexpr double ROUNDING = 1e-9;     // of the energy, which counts heights from anywhere
+constexpr double MOST_OF_RATE = 2.0;  // of τ² times the tension's rate: a stage τ is unstable above 4
+constexpr int MOST_PARTS = 1024;
+constexpr double NEAR = 1.0 / 64.0;              // of that: nearer than this tension is looked at often
+constexpr std::int64_t OFTEN = 8, SELDOM = 256;  // steps
 
 }  // namespace
 
@@ -49,10 +53,62 @@ void RigidSystem::start_composition() {
 void RigidSystem::compose(std::int64_t steps) {
     if (clock_) clock_->start();
     for (; steps > 0; --steps) {
-        composed_step(h_, 0);
+        if (solver_ == RigidSolver::block && live_.tension_look-- <= 0) look_at_tension();
+        for (int part = 0; part < live_.parts; ++part) composed_step(h_ / live_.parts, 0);
+        live_.halved_steps += live_.parts - 1;
         joints_.follow(live_.bodies);
         live_.most_kinetic = std::max(live_.most_kinetic, kinetic_energy());
     }
+}
+
+/// The square of the rate at which tension turns a body back, of the fastest one, 1/s²: a force F that pulls at its arm r does so with
+/// F r/I, and shakes it sideways with F/(m r). A light link under a heavy load does so at many times the rate of its swing.
+double RigidSystem::tension_rate() {
+    LargeArray<BodyState>& going = step_start_[0];
+    going = live_.bodies;
+    read_composition();
+    live_.bodies.swap(going);
+    std::vector<double>& rates = scratch_.rates;
+    rates.assign(constants_.size(), 0.0);
+    const auto blocks = joints_.blocks();
+    for (std::size_t k = 0; k < blocks.size(); ++k) {
+        if (blocks[k].axial) continue;
+        const JointSet::State& state = joints_.states[blocks[k].joint];
+        const double* rows = jacobian(static_cast<int>(k), true);
+        Vec3 force;  // on the second body
+        for (int i = 0; i < blocks[k].size; ++i, rows += 6)
+            force += (state.multiplier[i] / h_) * Vec3{rows[0], rows[1], rows[2]};
+        for (const bool second : {false, true}) {
+            const int b = second ? blocks[k].second : blocks[k].first;
+            if (b < 0 || !constants_[b].moves() || constants_[b].particle) continue;
+            const Vec3 arm = second ? state.second_reach : state.first_reach;
+            const double pull = (second ? 1.0 : -1.0) * dot(arm, force), length2 = dot(arm, arm);
+            if (!(pull > 0.0) || length2 == 0.0) continue;
+            const Vec3 inertia = constants_[b].inertia;
+            // Of the two axes across the arm the easier one; the third, along a slender body, turns freely.
+            const double across = inertia.x + inertia.y + inertia.z -
+                                  std::max({inertia.x, inertia.y, inertia.z}) -
+                                  std::min({inertia.x, inertia.y, inertia.z});
+            rates[b] += pull * (1.0 / across + 1.0 / (constants_[b].mass * length2));
+        }
+    }
+    return *std::max_element(rates.begin(), rates.end());
+}
+
+/// Steps whose longest stage is too long for the tension are taken in parts, in halves of halves; once parted they remain so.
+void RigidSystem::look_at_tension() {
+    double longest = 0.0;
+    for (const double stage : composition_stages(method_.composition))
+        longest = std::max(longest, h_ * std::abs(stage));
+    const double turned = longest * longest * tension_rate();
+    int parts = live_.parts;
+    while (turned > MOST_OF_RATE * parts * parts && parts < MOST_PARTS) parts *= 2;
+    live_.tension_look = turned > NEAR * MOST_OF_RATE * parts * parts ? OFTEN : SELDOM;
+    if (parts == live_.parts) return;
+    live_.parts = parts;
+    live_.stage_steps = 0;
+    std::fill(live_.history.begin(), live_.history.end(), 0.0);
+    std::fill(live_.guess_order.begin(), live_.guess_order.end(), 0);
 }
 
 /// Whether a composition has made energy out of nothing, as where light bodies carry more tension than its steps can take: rows hold,

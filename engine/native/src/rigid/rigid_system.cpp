@@ -387,6 +387,7 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
         report.counters["asleep"] = static_cast<std::int64_t>(live_.sleep.sleepers);
         report.counters["slept_steps"] = live_.sleep.slept;
     }
+    put("stopped_impacts", live_.stopped);
     put("contacts", 0);  // the same names with and without a collision stage, so that runs can be compared
     std::int64_t moving = 0;
     for (const BodyConstants& body : constants_) moving += body.moves() ? 1 : 0;
@@ -410,6 +411,7 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     const ContactCounters contact = contacts_->counters();
     put("contacts", contact.contacts);
     put("impacts", contact.impacts);
+    put("stopped_impacts", contact.stopped + live_.stopped);
     put("corrections", contact.corrections);
     put("friction_rounds", contact.friction_rounds);
     put("pivots", contact.pivots);

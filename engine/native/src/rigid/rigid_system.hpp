@@ -230,6 +230,8 @@ private:
     void start_composition();
     void compose(std::int64_t steps);
     void composed_step(double h, int depth);
+    double tension_rate();
+    void look_at_tension();
     bool composed_stage(double tau, std::size_t stage);
     bool hold_stage(double tau, double span, std::size_t stage);
     void guess(std::size_t stage, double span);

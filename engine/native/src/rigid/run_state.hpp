@@ -36,6 +36,7 @@ struct RigidState {
     int whirling = -1;     // a body that tension has made turn by a radian a step
     bool by_rows = false;  // PGS over joints alone has failed: few are solved directly
     Sleep sleep;
+    std::uint64_t stopped = 0;  // stops of joints whose rebound ended at their other end
     // Velocities at mid-step:
     bool velocity_ready = false;         // the velocities of the coming step are found already
     LargeArray<BodyMomenta> before;      // those of the step before
@@ -59,6 +60,8 @@ struct RigidState {
     // to step; per stage: how many of them tell the next.
     std::vector<double> history;
     std::vector<int> guess_order;
+    int parts = 1;                  // of a step, each of which tension allows
+    std::int64_t tension_look = 0;  // steps until the next look at it
 };
 
 }  // namespace spook

@@ -67,6 +67,7 @@ void RigidSystem::solve_mixed(bool touching) {
         JointSet::State& state = joints_.states[blocks[k].joint];
         double* multiplier = blocks[k].axial ? state.axial_multiplier.data() : state.multiplier.data();
         std::copy_n(mixed_.rows[k].multiplier.data(), blocks[k].size, multiplier);
+        live_.stopped += mixed_.rows[k].stop.cut;
         if (breaks_ && !blocks[k].axial) joints_.break_overloaded(blocks[k].joint, live_.step);
     }
     if (touching) take_velocities(false, [this](int k) { return !contacts_->has_rows(k); });
