@@ -395,11 +395,15 @@ def gas(seed: int, across: int) -> list[RigidBody]:
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("across", [0, 1, 2])
 @pytest.mark.parametrize("rate", [60, 240])
-def test_elastic_balls_between_walls_keep_their_energy(
+def test_elastic_balls_between_walls_never_gain_energy(
     rate: int, across: int, solver: str, impacts: Impacts
 ) -> None:
-    """Free balls of which one pair meets at a time keep all of it, in the order in which they meet."""
+    """All of it in successive impacts. Where several at once stop a ball, what they take stays away, and no more than half a kick is won."""
     for seed in range(4):
         bodies, h = gas(seed, across), 1 / rate
         change, energy = changes(bodies, 2 * rate, h, solver, impacts)
-        assert np.abs(change).max() <= 1e-9 * energy, seed
+        rounding = 1e-9 * energy
+        won = (GRAVITY / rate) ** 2 / 8.0 * sum(body.mass or 0.0 for body in gas(seed, across))
+        assert np.cumsum(change).max() <= rounding + (won if impacts == "simultaneous" else 0.0), seed
+        if impacts == "successive":
+            assert np.abs(change).max() <= rounding, seed
