@@ -243,10 +243,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     if (half().status == Status::timed_out) return 0;
     const auto here = program.keep();
     RunReport first = half();
-    program.read(first);
+    program.read(first, 0.0);
     program.go_back(here);
     RunReport second = half();
-    program.read(second);
+    program.read(second, 0.0);
     if (first.status == Status::timed_out || second.status == Status::timed_out) return 0;
     PROMISE(first.status == second.status && first.state_hash == second.state_hash);
     if (report.status == Status::completed) PROMISE(first.state_hash == report.state_hash);

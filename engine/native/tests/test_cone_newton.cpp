@@ -31,6 +31,7 @@ void add_point(Problem& problem, int first, int second, Vec3 n, Vec3 first_arm, 
         if (second >= 0) block.second_jacobian[i] = {-a.x, -a.y, -a.z, -two.x, -two.y, -two.z};
     }
     block.lower[0] = 0.0;
+    block.is_contact = true;
     block.softness[0] = softness;
     block.softness[1] = block.softness[2] = slip_softness;
     problem.points.push_back({static_cast<int>(problem.system.rows.size()), mu, slip_softness, -1.0});

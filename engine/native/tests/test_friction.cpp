@@ -155,6 +155,7 @@ void the_law_holds_in_random_systems() {
                 block.first_jacobian[i] = {axes[i].x, axes[i].y, axes[i].z, moment.x, moment.y, moment.z};
             }
             block.lower[0] = 0.0;
+            block.is_contact = true;
             block.softness[0] = 1e-6;
             points.push_back({k, 0.1 + 0.4 * std::abs(unit(random)), 0.0, -1.0});
             system.rows.push_back(block);

@@ -88,7 +88,8 @@ SPOOK_ALWAYS Number natural_point(const ConeFour& f, int i, const Number* z, con
     const double blur = aid.blur, hold = aid.hold;
     const Number root = get(f.root, i), mu = get(f.friction, i), along = get(f.along, i);
     const Number w1 = root * mu * u[1], w2 = root * mu * u[2], rounded = kink(f, i, blur);
-    const Number slide = root_of(w1 * w1 + w2 * w2 + rounded * rounded) - rounded;
+    const Number slide =
+        aid.frozen ? get(f.slide, i) : root_of(w1 * w1 + w2 * w2 + rounded * rounded) - rounded;
     const Number y0 = z[0] * get(f.over, i), y1 = z[1] * along, y2 = z[2] * along;
     const Number a0 = y0 - (root * u[0] + slide) - hold * (y0 - get(f.held[0], i));
     const Number a1 = y1 - w1 - hold * (y1 - get(f.held[1], i)),
@@ -126,14 +127,14 @@ double merit(const ConeLaws::Fours& fours, ConeAid aid, double length, double al
     return sum;
 }
 
-ConeLaws::Left worst(const ConeLaws::Fours& fours) {
+ConeLaws::Left worst(const ConeLaws::Fours& fours, bool frozen) {
     ConeLaws::Left largest;
     for (const ConeFour& f : fours) {
         Each map, speed;
         for (int i = 0; i < f.count; i += lanes) {
             Number z[3], u[3];
             for (int k = 0; k < f.size; ++k) z[k] = get(f.z[k], i), u[k] = get(f.u[k], i);
-            const Number size = root_of(natural(f, i, z, u, {}));
+            const Number size = root_of(natural(f, i, z, u, {0.0, 0.0, frozen}));
             put(map, i, size);
             put(speed, i, size / get(f.root, i));
         }
@@ -174,11 +175,12 @@ SPOOK_ALWAYS void linearise_points(ConeFour& f, int i, ConeAid aid) {
     const Number none{}, root = get(f.root, i), mu = get(f.friction, i), along = get(f.along, i);
     const Number w1 = root * mu * get(f.u[1], i), w2 = root * mu * get(f.u[2], i), rounded = kink(f, i, blur);
     const Number sliding = root_of(w1 * w1 + w2 * w2 + rounded * rounded);
-    const auto slides = sliding > 0.0;
+    const auto slides = aid.frozen ? sliding < 0.0 : sliding > 0.0;
+    const Number slide = aid.frozen ? get(f.slide, i) : sliding - rounded;
     const Number s1 = slides ? w1 / sliding : none, s2 = slides ? w2 / sliding : none;
     const Number y0 = get(f.z[0], i) * get(f.over, i), y1 = get(f.z[1], i) * along,
                  y2 = get(f.z[2], i) * along;
-    const Number a0 = y0 - (root * get(f.u[0], i) + sliding - rounded) - hold * (y0 - get(f.held[0], i));
+    const Number a0 = y0 - (root * get(f.u[0], i) + slide) - hold * (y0 - get(f.held[0], i));
     const Number a1 = y1 - w1 - hold * (y1 - get(f.held[1], i)),
                  a2 = y2 - w2 - hold * (y2 - get(f.held[2], i));
 

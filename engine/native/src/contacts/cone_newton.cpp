@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "linear/elementary.hpp"
 #include "run/watch.hpp"
 
 namespace spook {
@@ -23,9 +24,9 @@ constexpr double behind = 10.0, slow = 0.1;     // of the blur, and of itself: w
 constexpr double far = 1e-3;                    // a residual, of the speeds, from which the path may crawl
 constexpr int backoff = 3, long_patience = 12;  // iterations without half the residual, or much less blur
 constexpr int max_jumps = 3;                    // without half the least they met
-constexpr int max_losses = 3;                   // of the path, sought again,
-constexpr double back = 10.0;                   //   so many blurs away
-constexpr double nearer = 0.1;                  //   and kept so much nearer to
+// The path is sought again
+constexpr double back = 10.0;   //   so many blurs away,
+constexpr double nearer = 0.1;  //   and kept so much nearer to
 
 /// M⁻¹ from its factor: good enough for directions, which are refined.
 Mat6 inverse_six(const Mat6& factor) noexcept {
@@ -93,6 +94,7 @@ void ConeNewton::prepare(MixedSystem& system, const std::vector<FrictionPoint>& 
         }
         const int size = rough ? 3 : 1;
         for (int row = 0; row < rows; row += size) {
+            if (BilateralRows::is_bilateral(given, row)) continue;
             if (fours_.empty() || fours_.back().count == ConeFour::most || fours_.back().size != size) {
                 fours_.emplace_back().clear(size);
                 fours_.back().begin = static_cast<int>(units_.size());
@@ -104,6 +106,7 @@ void ConeNewton::prepare(MixedSystem& system, const std::vector<FrictionPoint>& 
             read(given, friction[k], unit, fours_.back(), fours_.back().count++);
         }
     }
+    joints_.read(system, mass_);
 }
 
 /// Finds which pairs of bodies are coupled; a pattern analysed before that contains them is used again.
@@ -111,18 +114,24 @@ void ConeNewton::connect() {
     needed_.clear();
     for (const ConeUnit& unit : units_)
         if (unit.first >= 0 && unit.second >= 0) needed_.emplace_back(std::minmax(unit.first, unit.second));
+    const int bodies = static_cast<int>(mass_inverse_.size());
+    joints_.couple(bodies, needed_);
     std::sort(needed_.begin(), needed_.end());
     needed_.erase(std::unique(needed_.begin(), needed_.end()), needed_.end());
-    const int bodies = static_cast<int>(mass_inverse_.size());
     // The order of elimination follows from this system alone: a run that goes back must round as it did.
     if (bodies != bodies_ || pairs_ != needed_) {
+        sizes_.assign(bodies, 6);
+        is_constraint_.assign(bodies, 0);
+        for (int k = 0; k < joints_.nodes(); ++k)
+            sizes_.push_back(joints_.size(k)), is_constraint_.push_back(1);
         edges_.clear();
         for (const auto& [a, b] : needed_) edges_.push_back({a, b});
         bodies_ = -1;  // until the analysis is whole
-        matrix_.analyse(bodies, edges_);
+        matrix_.analyse(sizes_, edges_, is_constraint_);
         pairs_ = needed_;
         bodies_ = bodies;
     }
+    joints_.place(bodies, pairs_);
     for (ConeUnit& unit : units_) {
         if (unit.first >= 0) unit.matrix[1][1] = matrix_.diagonal(unit.first);
         if (unit.second >= 0) unit.matrix[0][0] = matrix_.diagonal(unit.second);
@@ -138,15 +147,18 @@ void ConeNewton::connect() {
 
 /// The square of the smoothed map a part of the way along Newton's direction and the path; past `enough` a part of it.
 double ConeNewton::merit(double blur, double length, double along, double enough) const {
-    return laws_->merit(fours_, {blur, hold_}, length, along, enough);
+    const double joints = joints_.merit(length, along);
+    if (joints > enough) return joints;
+    return joints + laws_->merit(fours_, {blur, hold_, frozen_}, length, along, enough - joints);
 }
 
 /// Newton's direction, by a factor of M + Σ Gᵀ K G.
 bool ConeNewton::step(const MixedSystem& system, double blur) {
     matrix_.clear();
     for (int b = 0; b < bodies_; ++b) std::copy_n(system.mass[b].data(), 36, matrix_.diagonal(b));
-    laws_->linearise(fours_, {blur, hold_});
+    laws_->linearise(fours_, {blur, hold_, frozen_});
     laws_->add(fours_, units_);
+    joints_.fill(bodies_, matrix_);
     ++factorisations_;
     block_operations_ += static_cast<std::uint64_t>(matrix_.operations());
     if (!matrix_.factor()) return false;
@@ -162,19 +174,23 @@ void ConeNewton::scale(double share, const ConeFour::Each* from, ConeFour::Each*
 /// Newton's direction, and the path's for the whole blur. False if nothing finite was found.
 bool ConeNewton::find_directions(double blur) {
     for (ConeFour& four : fours_) scale(-1.0, four.map, four.lack);
-    if (!answer(&ConeFour::dz, &ConeFour::du, refined)) return false;
+    joints_.ask(true);
+    if (!answer(&ConeFour::dz, &ConeFour::du, true, refined)) return false;
     if (blur == 0.0) {  // a jump: there is no path
         for (ConeFour& four : fours_)
             for (int k = 0; k < 3; ++k) std::fill_n(four.tz[k], 4, 0.0), std::fill_n(four.tu[k], 4, 0.0);
+        joints_.forget_path();
         return true;
     }
     for (ConeFour& four : fours_) scale(blur, four.bend, four.lack);
-    return answer(&ConeFour::tz, &ConeFour::tu, roughly);
+    joints_.ask(false);
+    return answer(&ConeFour::tz, &ConeFour::tu, false, roughly);
 }
 
 /// The dz and du that answer what the units' laws lack, refined while that helps and more than `enough` is left.
-bool ConeNewton::answer(ConeFour::Each (ConeFour::*dz)[3], ConeFour::Each (ConeFour::*du)[3], double enough) {
-    double asked = 0.0;
+bool ConeNewton::answer(ConeFour::Each (ConeFour::*dz)[3], ConeFour::Each (ConeFour::*du)[3], bool newton,
+                        double enough) {
+    double asked = joints_.asked();
     for (const ConeFour& four : fours_)
         for (int i = 0; i < four.count; ++i) {
             const double a = four.lack[0][i], b = four.lack[1][i], c = four.lack[2][i];
@@ -182,13 +198,15 @@ bool ConeNewton::answer(ConeFour::Each (ConeFour::*dz)[3], ConeFour::Each (ConeF
         }
     double before = asked;
     for (int round = 0; round < 3; ++round) {
-        image_.assign(mass_inverse_.size(), Vec6{});
+        image_.assign(mass_inverse_.size() + joints_.nodes(), Vec6{});
         laws_->respond(fours_, units_, image_.data());
+        joints_.respond(image_.data() + bodies_);
         matrix_.solve(image_[0].data());
         change_.assign(mass_inverse_.size(), Vec6{});
         laws_->turn(fours_, units_, image_.data(), change_.data());
+        joints_.turn(image_.data() + bodies_, change_.data());
         laws_->map_bodies(mass_inverse_, change_.data());
-        const double left = laws_->remain(fours_, units_, change_.data());
+        const double left = joints_.remain(change_.data()) + laws_->remain(fours_, units_, change_.data());
         if (!std::isfinite(left)) return false;
         if (round > 0 && !(left < before)) break;
         for (ConeFour& four : fours_)
@@ -198,6 +216,7 @@ bool ConeNewton::answer(ConeFour::Each (ConeFour::*dz)[3], ConeFour::Each (ConeF
                     z = (round == 0 ? 0.0 : z) + four.c[k][i];
                     u = (round == 0 ? 0.0 : u) + four.turn[k][i];
                 }
+        joints_.take(newton, round == 0);
         if (left <= enough * asked) break;
         before = left;
     }
@@ -208,8 +227,17 @@ bool ConeNewton::answer(ConeFour::Each (ConeFour::*dz)[3], ConeFour::Each (ConeF
 void ConeNewton::measure(const MixedSystem& system) {
     velocity_ = system.momentum;
     laws_->push(fours_, units_, velocity_.data());
+    joints_.push(velocity_.data());
     for (std::size_t b = 0; b < velocity_.size(); ++b) solve_six(mass_[b], velocity_[b]);
     laws_->measure(fours_, units_, velocity_.data());
+    joints_.measure(velocity_.data());
+}
+
+ConeNewton::Left ConeNewton::worst() const {
+    const Left laws = laws_->worst(fours_, frozen_);
+    const BilateralRows::Left joints = joints_.worst();
+    return {laws.map <= joints.map ? joints.map : laws.map,
+            laws.speed <= joints.speed ? joints.speed : laws.speed};
 }
 
 /// What is lost of a speed beside the largest impulse: bodies squeezed without a way out push ever harder.
@@ -223,7 +251,7 @@ double ConeNewton::rounding() const {
 
 /// The speeds there are without contacts, and those that rows ask for.
 double ConeNewton::speed_of(const MixedSystem& system) const {
-    double speed = 0.0;
+    double speed = joints_.largest_right();
     for (std::size_t b = 0; b < system.momentum.size(); ++b) {
         Vec6 v = system.momentum[b];
         solve_six(mass_[b], v);
@@ -237,7 +265,7 @@ double ConeNewton::speed_of(const MixedSystem& system) const {
 
 /// The next point: on along the path as far as it stays near, else towards it.
 ConeNewton::Search ConeNewton::search(double blur) const {
-    const double wide = near_ * near_ * static_cast<double>(units_.size());
+    const double wide = near_ * near_ * static_cast<double>(units_.size() + joints_.rows());
     for (const double share : {1e-3, 1e-2, 0.1, 0.3, 0.6, 0.9}) {
         const double next = share * blur, room = wide * next * next;
         if (merit(next, 1.0, 1.0 - share, room) <= room) return {next, 1.0, 1.0 - share};
@@ -270,6 +298,7 @@ void ConeNewton::move(const MixedSystem& system, const Search& found) {
         for (int k = 0; k < four.size; ++k)
             for (int i = 0; i < ConeFour::most; ++i)
                 four.z[k][i] += found.length * four.dz[k][i] + found.along * four.tz[k][i];
+    joints_.move(found.length, found.along);
     measure(system);
 }
 
@@ -279,7 +308,7 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
     connect();
     speed_ = speed_of(system);
     measure(system);
-    Left best = laws_->worst(fours_);
+    Left best = worst();
     keep();
     double blur = start_blur * best.map, met = -1.0;  // the blur where the path was met last
     int stalled = 0, jumps = -1, losses = 0;          // jumps made, negative on the path; times it was lost
@@ -297,7 +326,7 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
         ++report.iterations;
         const Search found = jumps >= 0 ? Search{0.0, 1.0, 0.0} : search(blur);
         move(system, found);
-        const Left left = laws_->worst(fours_);
+        const Left left = worst();
         stalled = left.speed < 0.5 * best.speed || found.along > 0.3 ? 0 : stalled + 1;
         if (left.speed < best.speed) {
             best = left;
@@ -310,6 +339,7 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
         if (found.along > 0.0) {
             met = found.blur;
             for (ConeFour& four : fours_) scale(1.0, four.z, four.met);
+            joints_.keep_met();
         }
         blur = found.blur;
         const bool lost =
@@ -333,11 +363,13 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
             near_ *= nearer;
             blur = back * met;
             for (ConeFour& four : fours_) scale(1.0, four.met, four.z);
+            joints_.back_to_met();
             measure(system);
         } else {
             blur *= back;
         }
     }
+    if (max_frozen > 0 && !(best.speed <= near_enough * speed_)) best = follow_frozen(system, report, best);
     for (std::size_t k = 0; k < fours_.size(); ++k) {
         ConeFour& four = fours_[k];
         scale(1.0, best_[k].z, four.z);
@@ -349,15 +381,66 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
                 system.rows[unit.block].multiplier[unit.row + row] = four.z[row][i];
         }
     }
+    joints_.deliver(system);
     measure(system);  // what is handed over, not what led to it
     system.velocity = velocity_;
-    const double speed = std::max(laws_->worst(fours_).speed, rounding());
+    const double speed = std::max(worst().speed, rounding());
     report.residual = speed_ > 0.0 ? speed / speed_ : speed;
     report.converged = report.residual <= loosest;
     return report;
 }
 
+/// Where the path ends for Coulomb's law, which may have several answers, De Saxcé's term is frozen: what is left is convex
+/// and has one path. Its end gives the next term; a fixed point is an answer. Between, a few of Newton's steps on the law
+/// itself, which finish.
+ConeNewton::Left ConeNewton::follow_frozen(MixedSystem& system, ConeReport& report, Left best) {
+    for (std::size_t k = 0; k < fours_.size(); ++k) scale(1.0, best_[k].z, fours_[k].z);
+    joints_.back_to_best();
+    measure(system);
+    for (int outer = 0; outer < max_frozen && !(best.speed <= near_enough * speed_); ++outer) {
+        Watch::look();
+        for (ConeFour& four : fours_)
+            for (int i = 0; i < ConeFour::most; ++i)
+                four.slide[i] = four.size < 3
+                                    ? 0.0
+                                    : four.root[i] * four.friction[i] * length(four.u[1][i], four.u[2][i]);
+        const double off = worst().map, met = best.speed;  // of the law itself
+        for (const bool frozen : {true, false}) {
+            frozen_ = frozen;
+            hold_ = loosest_hold;
+            double blur = (frozen ? start_blur : 1e-3 * start_blur) * std::max(worst().map, off);
+            const double goal = frozen ? 1e-3 * off : tightest;
+            Left before = worst();
+            for (int k = 0; k < (frozen ? 15 : 6) && before.map > goal; ++k) {
+                hold();
+                if (!step(system, blur)) break;
+                ++report.iterations;
+                const Search found = search(blur);
+                if (!(found.length > 0.0)) break;
+                move(system, found);
+                const Left left = worst();
+                if (left.map > behind * found.blur && left.map > slow * before.map)
+                    hold_ = std::max(0.1 * hold_, tightest_hold);
+                before = left;
+                blur = found.blur;
+                if (!frozen && left.speed < best.speed) best = left, keep();
+            }
+            frozen_ = false;
+            const Left left = worst();
+            if (left.speed < best.speed) best = left, keep();
+            if (!frozen && !(left.map < off)) {
+                for (std::size_t k = 0; k < fours_.size(); ++k) scale(1.0, best_[k].z, fours_[k].z);
+                joints_.back_to_best();
+                measure(system);
+            }
+        }
+        if (!(best.speed < 0.5 * met)) break;
+    }
+    return best;
+}
+
 void ConeNewton::keep() {
+    joints_.keep_best();
     best_.resize(fours_.size());
     for (std::size_t k = 0; k < fours_.size(); ++k) {
         scale(1.0, fours_[k].z, best_[k].z);

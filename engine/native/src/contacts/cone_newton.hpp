@@ -29,6 +29,7 @@
 #include <utility>
 #include <vector>
 
+#include "contacts/bilateral_rows.hpp"
 #include "contacts/cone_unit.hpp"
 #include "contacts/friction_point.hpp"
 #include "contacts/mass_factors.hpp"
@@ -45,6 +46,8 @@ struct ConeReport {
 class ConeNewton {
 public:
     int max_iterations = 100;
+    int max_losses = 3;  // of the path, sought again
+    int max_frozen = 0;  // paths with De Saxcé's term frozen, where that has no answer
     double near_enough =
         1e-6;  // a residual, relative to the speeds, that is not worth jumps, nor beginning anew
 
@@ -67,12 +70,15 @@ private:
     void connect();
     void measure(const MixedSystem& system);
     double merit(double blur, double length, double along, double enough) const;
+    Left worst() const;
+    Left follow_frozen(MixedSystem& system, ConeReport& report, Left best);
     double rounding() const;
     Search search(double blur) const;
     void hold();
     void move(const MixedSystem& system, const Search& found);
     bool find_directions(double blur);
-    bool answer(ConeFour::Each (ConeFour::*dz)[3], ConeFour::Each (ConeFour::*du)[3], double enough);
+    bool answer(ConeFour::Each (ConeFour::*dz)[3], ConeFour::Each (ConeFour::*du)[3], bool newton,
+                double enough);
     static void scale(double share, const ConeFour::Each* from, ConeFour::Each* to) noexcept;
     double speed_of(const MixedSystem& system) const;
     void keep();
@@ -83,6 +89,9 @@ private:
     std::vector<BlockEdge> edges_;                     // those needed
     int bodies_ = -1;
     std::vector<const FrictionPoint*> friction_;  // of each block, while units are read
+    std::vector<int> sizes_;                      // of the blocks of matrix_, and which are joints
+    std::vector<std::uint8_t> is_constraint_;
+    BilateralRows joints_;
     std::vector<ConeUnit> units_;
     std::vector<ConeFour> fours_;  // their laws
     const ConeLaws* laws_ = nullptr;
@@ -93,6 +102,7 @@ private:
         ConeFour::Each z[3], u[3];
     };
     std::vector<Best> best_;  // of every four
+    bool frozen_ = false;
     double speed_ = 0.0, hold_ = 0.0, near_ = 1.0;
     std::uint64_t factorisations_ = 0, block_operations_ = 0;
 };

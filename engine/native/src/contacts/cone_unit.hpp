@@ -30,6 +30,7 @@ struct alignas(32) ConeFour {
     Each softness[3], right[3];   // Sig, r
     Each z[3], u[3];              // where it stands
     Each held[3];                 // y, what the proximal term holds on to
+    Each slide;                   // mu |u_t|, scaled, where it is frozen
     Each load;                    // of the normal, scaled: the kink of |u_t| is rounded by b²/(b + load)
     Each dz[3], du[3];            // Newton's direction
     Each tz[3], tu[3];            // along the path, for the whole blur
@@ -59,8 +60,9 @@ struct alignas(32) ConeFour {
 
 /// How the map is changed on the way to its root.
 struct ConeAid {
-    double blur = 0.0;  // b
-    double hold = 0.0;  // on to y
+    double blur = 0.0;    // b
+    double hold = 0.0;    // on to y
+    bool frozen = false;  // De Saxcé's term is what ConeFour::slide says: the rest is convex, with one path
 };
 
 /// What is done to all laws of a system, for one instruction set: the bits are the same.
@@ -75,7 +77,7 @@ struct ConeLaws {
     /// the path; past `enough` a part of it.
     double (*merit)(const Fours& fours, ConeAid aid, double length, double along, double enough);
     /// The largest natural map, and as a velocity.
-    Left (*worst)(const Fours& fours);
+    Left (*worst)(const Fours& fours, bool frozen);
     /// What the laws say to first order: (1 − D + hold D) dy + D dw = −map.
     void (*linearise)(Fours& fours, ConeAid aid);
     /// What they add to the matrix: Gᵀ K G.

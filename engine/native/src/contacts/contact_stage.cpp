@@ -134,6 +134,7 @@ double ContactStage::surface_speed(const Point& point, Vec3 direction) const noe
 RowBlock ContactStage::row_block(const Point& point, int rows) const {
     const Contact& contact = point.contact;
     RowBlock block;
+    block.is_contact = true;
     block.first = solver_index_[contact.first];
     block.second = solver_index_[contact.second];
     block.size = std::min(rows, 3);

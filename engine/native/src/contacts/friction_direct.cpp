@@ -24,6 +24,8 @@ constexpr double poor = 1e-4;           // a residual, of the speeds: beyond it 
 constexpr double fair = 1e-9;           // one that is an answer
 // One that is not worth another try; where points are redundant, tries rarely settle and about halve it.
 constexpr double near = 1e-6, redundant_near = 3e-5;
+// Beside joints: iterations, four times as many each turn, and paths of the convex part.
+constexpr int joint_turns = 3, first_iterations = 8, max_frozen = 8;
 constexpr int pgs_turns = 1, iterations_per_turn = 100;  // where Newton's path ends without an answer
 
 /// How much is spent on rounds of pivoting.
@@ -163,16 +165,19 @@ bool is_for_newton(const MixedSystem& system, const std::vector<FrictionPoint>& 
     if (points.empty() && system.rows.size() <= few_blocks) return false;
     if (std::any_of(points.begin(), points.end(), [](const FrictionPoint& p) { return p.row != 1; }))
         return false;  // it knows no friction of turning
-    // Rigid joints need the factor of the whole, not a relief; and its units tie two bodies.
-    return std::all_of(system.rows.begin(), system.rows.end(),
-                       [](const RowBlock& block) { return block.lower[0] == 0.0 && block.further.empty(); });
+    // Its units tie two bodies; bilateral rows may tie more.
+    return std::all_of(system.rows.begin(), system.rows.end(), [&](const RowBlock& block) {
+        if (points.empty()) return block.lower[0] == 0.0 && block.further.empty();
+        return block.further.empty() || BilateralRows::is_bilateral(block, 0);
+    });
 }
 
 /// Whether some pair of bodies has several points, which may share a load in many ways.
 bool is_redundant(const MixedSystem& system) {
     std::vector<std::pair<int, int>>& pairs = work().pairs;
     pairs.clear();
-    for (const RowBlock& block : system.rows) pairs.emplace_back(std::minmax(block.first, block.second));
+    for (const RowBlock& block : system.rows)
+        if (block.lower[0] == 0.0) pairs.emplace_back(std::minmax(block.first, block.second));
     std::sort(pairs.begin(), pairs.end());
     return std::adjacent_find(pairs.begin(), pairs.end()) != pairs.end();
 }
@@ -306,14 +311,16 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
 /// asked first unless they failed lately. True when they settled; else the system is as it was; `kept`: and work() has
 /// a copy of it.
 bool settle_quickly(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
-                    DirectSolver& direct, bool redundant, bool& kept, FrictionReport& report) {
+                    DirectSolver& direct, bool joints, bool redundant, bool& kept, FrictionReport& report) {
     if (direct.backoff.waits()) return false;
     kept = true;
     MixedSystem& start = work().start;
     std::vector<FrictionPoint>& start_points = work().start_points;
     start = system, start_points = points;
     const FrictionReport before = report;
-    const IterationBudget& effort = system.rows.size() > few_blocks ? quick : redundant ? brief : small;
+    const IterationBudget& effort = joints || system.rows.size() > few_blocks ? quick
+                                    : redundant                               ? brief
+                                                                              : small;
     if (settle_by_rounds(system, points, model, direct.pivot, effort, report)) {
         direct.backoff.succeeded();
         return true;
@@ -375,6 +382,45 @@ bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, Fr
     return false;
 }
 
+/// Joints and contacts: Newton's method on the whole, at the cost of its pattern; where its path ends, the joints are
+/// eliminated, and iterations and Newton's method go on over contacts alone; in turns, each from the best so far, which is
+/// the answer.
+void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points, DirectSolver& direct,
+                         FrictionReport& report) {
+    MixedSystem& best = work().best;
+    best = system;
+    report.residual = unbounded;
+    const auto take = [&](double residual) {
+        if (!(residual < report.residual)) {
+            if (!(report.residual <= fair)) system = best;
+            return;
+        }
+        report.residual = residual;
+        if (!(residual <= fair)) best = system;
+    };
+    const bool newton = is_for_newton(system, points, FrictionModel::cone);
+    direct.newton.near_enough = fair;
+    direct.newton.max_losses = 1;
+    direct.newton.max_frozen = max_frozen;
+    for (int turn = 0; turn < joint_turns && !(report.residual <= (turn == 0 ? fair : near)); ++turn) {
+        if (newton && turn == 0) {
+            const ConeReport found = direct.newton.solve(system, points);
+            report.rounds += found.iterations;
+            take(found.residual);
+            if (report.residual <= fair) break;
+        }
+        const ReducedContacts::Report found =
+            direct.reduced.solve(system, points, first_iterations << (2 * turn));
+        report.rounds += found.newton_steps, report.pgs_iterations += found.iterations;
+        take(found.residual);
+    }
+    direct.newton.max_losses = ConeNewton{}.max_losses;
+    direct.newton.max_frozen = 0;
+    report.converged = report.residual <= fair;
+    report.finite = std::isfinite(report.residual);
+    for (FrictionPoint& point : points) point.normal = system.rows[point.block].multiplier[0];
+}
+
 }  // namespace
 
 bool still_right(const MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model) {
@@ -418,13 +464,19 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
     if (system.velocity.size() == system.mass.size() && still_right(system, points, model)) return report;
     MixedSystem& start = work().start;
     const IterationBudget full_budget{max_rounds};
+    if (model == FrictionModel::cone && !points.empty() && ReducedContacts::takes(system)) {
+        bool kept = false;
+        if (!settle_quickly(system, points, model, direct, true, false, kept, report))
+            solve_beside_joints(system, points, direct, report);
+        return report;
+    }
     if (is_for_newton(system, points, model)) {
         const bool redundant = is_redundant(system);
         const bool near_none =
             (direct.warm_started || (redundant && points.empty())) && system.rows.size() > few_blocks;
         direct.newton.near_enough = redundant ? redundant_near : near;
         bool kept = false;
-        if (!near_none && settle_quickly(system, points, model, direct, redundant, kept, report))
+        if (!near_none && settle_quickly(system, points, model, direct, false, redundant, kept, report))
             return report;
         if (solve_by_newton(system, points, model, direct, kept, report)) return report;
         report.residual = unbounded;  // the system is as it was, which work() has a copy of

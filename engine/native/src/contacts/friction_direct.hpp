@@ -4,6 +4,7 @@
 #include "contacts/cone_newton.hpp"
 #include "contacts/friction_point.hpp"
 #include "contacts/pivot_solver.hpp"
+#include "contacts/reduced_contacts.hpp"
 
 namespace spook {
 
@@ -11,6 +12,7 @@ namespace spook {
 struct DirectSolver {
     PivotSolver pivot;
     ConeNewton newton;
+    ReducedContacts reduced;
     RetryBackoff backoff;
     bool warm_started = false;  // iterations have set the start: no answer that pivoting could find near
 };

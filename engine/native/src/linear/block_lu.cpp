@@ -6,23 +6,11 @@
 
 namespace spook {
 
-namespace {
-
-/// What an analysis needs besides what it gives; its memory outlives it.
-struct Analysis {
-    Ordering ordering;
-    std::vector<int> sizes;
-    std::vector<std::uint8_t> is_constraint;
-};
-
-}  // namespace
-
-void BlockLu::analyse(int blocks, std::span<const BlockEdge> edges) {
-    static thread_local Analysis analysis;
-    analysis.sizes.assign(blocks, 6);
-    analysis.is_constraint.assign(blocks, 0);
-    order_blocks(analysis.sizes, edges, analysis.is_constraint, analysis.ordering);
-    const Ordering& ordering = analysis.ordering;
+void BlockLu::analyse(std::span<const int> sizes, std::span<const BlockEdge> edges,
+                      std::span<const std::uint8_t> is_constraint) {
+    const int blocks = static_cast<int>(sizes.size());
+    static thread_local Ordering ordering;  // its memory outlives an analysis
+    order_blocks(sizes, edges, is_constraint, ordering, true);
     order_ = ordering.order;
     column_start_ = ordering.column_start;
     position_.resize(blocks);

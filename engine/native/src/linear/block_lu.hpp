@@ -15,8 +15,10 @@ namespace spook {
 /// matrix with something less added. Nothing is allocated after analyse(). Equal input gives equal bits.
 class BlockLu {
 public:
-    /// edges: the pairs of coupled blocks, first < second, each once.
-    void analyse(int blocks, std::span<const BlockEdge> edges);
+    /// edges: the pairs of coupled blocks, first < second, each once. Blocks of fewer unknowns than six are told by their
+    /// sizes, for the order; constraints are eliminated after what they tie.
+    void analyse(std::span<const int> sizes, std::span<const BlockEdge> edges,
+                 std::span<const std::uint8_t> is_constraint);
 
     void clear() noexcept;
     /// Row-major blocks of A: the diagonal's, and of an edge A(first, second) and A(second, first).

@@ -15,6 +15,7 @@ namespace {
 constexpr std::int64_t kRawPenalty = 36;
 // A few rows may be dragged along a chain so that a joint can be eliminated while its body is still free.
 constexpr std::int64_t kDraggedRows = 6;
+constexpr std::int64_t kNever = std::int64_t{1} << 40;
 constexpr std::size_t orders_a_piece = 64;  // blocks
 
 /// Short lists side by side in one array: one that outgrows its room gets another behind the rest.
@@ -68,7 +69,8 @@ private:
 class Elimination {
 public:
     void run(std::span<const int> sizes, std::span<const BlockEdge> edges,
-             std::span<const std::uint8_t> is_constraint, Ordering& result) {
+             std::span<const std::uint8_t> is_constraint, bool strict, Ordering& result) {
+        strict_ = strict;
         begin(sizes, edges, is_constraint);
         result.order.clear();
         result.column_rows.clear();
@@ -102,6 +104,8 @@ private:
         parent_.resize(sizes.size());
         budget_.assign(sizes.size(), 0);
         gone_.assign(sizes.size(), 0);
+        grounded_.assign(sizes.size(), 0);
+        live_bodies_.assign(sizes.size(), 0);
         queue_.clear();
         regions_.reset(count_);
         neighbours_.reset(count_);
@@ -112,7 +116,15 @@ private:
             neighbours_.push_back(edge.second, edge.first);
         }
         for (int i = 0; i < count_; ++i)
-            for (int j : sort_unique(neighbours_, i)) degree_[i] += sizes_[j];
+            for (int j : sort_unique(neighbours_, i)) {
+                degree_[i] += sizes_[j];
+                live_bodies_[i] += is_constraint_[j] == 0;
+            }
+        own_.reset(strict_ ? count_ : 0);
+        for (int i = 0; strict_ && i < count_; ++i)
+            for (int j : neighbours_[i])
+                if (is_constraint_[j]) own_.push_back(i, j);
+        for (int i = 0; i < count_; ++i) grounded_[i] = is_constraint_[i] && live_bodies_[i] == 1;
         for (int i = 0; i < count_; ++i) push(i);
     }
 
@@ -161,9 +173,24 @@ private:
         return worst;
     }
 
+    /// Whether the pivot of a constraint is sure to be of full rank: all it ties is gone, or it is the only constraint left
+    /// around a region that can still move as a whole.
+    bool is_held(int block) {
+        if (live_bodies_[block] == 0) return true;
+        budget_at(block);
+        if (regions_[block].empty()) return false;
+        for (int region : regions_[block])
+            if (grounded_[region]) return false;
+        for (int other : keep_live(block))
+            if (is_constraint_[other]) return false;
+        return true;
+    }
+
     void push(int block) {
         std::int64_t key = 2 * degree_[block];
-        if (is_constraint_[block]) {
+        if (strict_) {
+            key += is_constraint_[block] ? (is_held(block) ? 0 : kNever) : 1;
+        } else if (is_constraint_[block]) {
             const std::int64_t budget = budget_at(block);
             key += 2 * (budget < sizes_[block] ? kRawPenalty : spoiled(block, budget));
         } else {
@@ -183,10 +210,13 @@ private:
                                           live.size());
         result.column_start.push_back(static_cast<std::int64_t>(result.column_rows.size()));
 
+        if (strict_ && !is_constraint_[block])
+            for (int own : own_[block]) --live_bodies_[own];
         budget_at(block);
         budget_[block] = is_constraint_[block] ? -sizes_[block] : sizes_[block];
         for (int region : regions_[block]) {
             budget_[block] += budget_[region];
+            grounded_[block] |= grounded_[region];
             parent_[region] = block;
         }
 
@@ -215,7 +245,11 @@ private:
     std::vector<std::int64_t> degree_;
     std::vector<int> stamp_, parent_;
     std::vector<std::int64_t> budget_;
-    std::vector<std::uint8_t> gone_;
+    bool strict_ = false;
+    std::vector<std::uint8_t> gone_,
+        grounded_;                  // of a region: a constraint in it ties it to what does not move
+    std::vector<int> live_bodies_;  // that a constraint ties itself
+    Lists own_;                     // constraints of a body
     std::vector<int> merged_;
     std::vector<Entry> queue_;  // a heap, the least first
 };
@@ -223,9 +257,9 @@ private:
 }  // namespace
 
 void order_blocks(std::span<const int> sizes, std::span<const BlockEdge> edges,
-                  std::span<const std::uint8_t> is_constraint, Ordering& result) {
+                  std::span<const std::uint8_t> is_constraint, Ordering& result, bool strict) {
     static thread_local Elimination elimination;
-    elimination.run(sizes, edges, is_constraint, result);
+    elimination.run(sizes, edges, is_constraint, strict, result);
 }
 
 }  // namespace spook

@@ -23,8 +23,9 @@ struct Ordering {
 /// bodies eliminated next to it have degrees of freedom left to resist it (its pivot would be its compliance
 /// alone, perhaps zero), unless its body has so many constraints that eliminating the body first would couple
 /// them all. Trees and chains, child before parent, get no block fill. Linear for trees and chains; otherwise the
-/// work is that of the block pattern of one factorisation. Memory is kept, of `result` and of what leads to it.
+/// work is that of the block pattern of one factorisation. `strict`: no pivot of a constraint may be its compliance, for
+/// factors that have nothing to put in its place. Memory is kept, of `result` and of what leads to it.
 void order_blocks(std::span<const int> sizes, std::span<const BlockEdge> edges,
-                  std::span<const std::uint8_t> is_constraint, Ordering& result);
+                  std::span<const std::uint8_t> is_constraint, Ordering& result, bool strict = false);
 
 }  // namespace spook

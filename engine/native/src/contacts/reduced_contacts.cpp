@@ -1,0 +1,378 @@
+#include "contacts/reduced_contacts.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "linear/elementary.hpp"
+#include "run/watch.hpp"
+
+namespace spook {
+
+namespace {
+
+constexpr double exact = 1e-14;  // a residual, of the speeds in the system: rounding
+constexpr double good = 1e-11;   // one that is an answer
+constexpr int rounds = 3;        // of iterations and Newton's method
+constexpr double held =
+    1e-10;  // of what a row moves without joints: joints hold it, and no impulse there does anything
+constexpr int passes = 3;  // measured anew with the true equations
+constexpr double floor_of_pivots = 1e-12;
+
+}  // namespace
+
+bool ReducedContacts::takes(const MixedSystem& system) {
+    int bounded = 0;
+    bool joints = false;
+    for (const RowBlock& block : system.rows)
+        for (int i = 0; i < block.size; ++i)
+            if (BilateralRows::is_bilateral(block, i)) joints = true;
+            else ++bounded;
+    return joints && bounded > 0 && bounded <= most_rows;
+}
+
+void ReducedContacts::analyse(const MixedSystem& system) {
+    std::vector<Pattern> pattern;
+    std::vector<std::pair<int, int>> further;
+    joints_.clear();
+    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        const RowBlock& block = system.rows[k];
+        Joint joint;
+        joint.block = static_cast<int>(k);
+        for (int i = 0; i < block.size; ++i)
+            if (BilateralRows::is_bilateral(block, i)) joint.row[joint.count++] = i;
+        if (joint.count == 0) continue;
+        for (const FurtherBody& other : block.further)
+            further.emplace_back(static_cast<int>(joints_.size()), other.body);
+        joints_.push_back(joint);
+        pattern.push_back({block.first, block.second, joint.count});
+    }
+    const int bodies = static_cast<int>(system.mass.size());
+    std::vector<BlockEdge> edges;
+    std::size_t beyond = 0;
+    for (std::size_t k = 0; k < joints_.size(); ++k) {
+        const int node = bodies + static_cast<int>(k);
+        Joint& joint = joints_[k];
+        const auto tie = [&](int body) {
+            if (body < 0) return -1;
+            edges.push_back({body, node});
+            return static_cast<int>(edges.size()) - 1;
+        };
+        joint.first_edge = tie(pattern[k].first);
+        joint.second_edge = tie(pattern[k].second);
+        for (; beyond < further.size() && further[beyond].first == static_cast<int>(k); ++beyond) {
+            const int edge = tie(further[beyond].second);
+            if (joint.further_edge < 0) joint.further_edge = edge;
+        }
+    }
+    if (bodies == bodies_ && pattern == pattern_ && further == further_) return;
+    bodies_ = -1;  // until the analysis is whole
+    std::vector<int> sizes(bodies, 6);
+    std::vector<std::uint8_t> is_constraint(bodies, 0);
+    for (const Joint& joint : joints_) sizes.push_back(joint.count), is_constraint.push_back(1);
+    matrix_.analyse(sizes, edges, is_constraint);
+    pattern_ = std::move(pattern);
+    further_ = std::move(further);
+    bodies_ = bodies;
+}
+
+bool ReducedContacts::factor(const MixedSystem& system) {
+    for (int b = 0; b < bodies_; ++b) std::copy_n(system.mass[b].data(), 36, matrix_.diagonal(b));
+    for (std::size_t k = 0; k < joints_.size(); ++k) {
+        const Joint& joint = joints_[k];
+        const RowBlock& block = system.rows[joint.block];
+        const int n = joint.count;
+        double* diagonal = matrix_.diagonal(bodies_ + static_cast<int>(k));
+        std::fill_n(diagonal, n * n, 0.0);
+        for (int i = 0; i < n; ++i) diagonal[(n + 1) * i] = -block.softness[joint.row[i]];
+        const auto couple = [&](int edge, const Vec6* rows) {
+            double* coupling = matrix_.coupling(edge);
+            for (int a = 0; a < 6; ++a)
+                for (int i = 0; i < n; ++i) coupling[a * n + i] = rows[joint.row[i]][a];
+        };
+        if (joint.first_edge >= 0) couple(joint.first_edge, block.first_jacobian.data());
+        if (joint.second_edge >= 0) couple(joint.second_edge, block.second_jacobian.data());
+        for (std::size_t o = 0; o < block.further.size(); ++o)
+            couple(joint.further_edge + static_cast<int>(o), &block.further[o].jacobian);
+    }
+    return matrix_.factor(floor_of_pivots);
+}
+
+void ReducedContacts::list_units(const MixedSystem& system, const std::vector<FrictionPoint>& points) {
+    units_.clear();
+    rows_ = 0;
+    std::size_t next = 0;
+    for (std::size_t k = 0; k < system.rows.size(); ++k) {
+        const RowBlock& block = system.rows[k];
+        const bool rubs = next < points.size() && points[next].block == static_cast<int>(k);
+        const int normal = rows_;
+        for (int i = 0; i < (rubs ? 1 : block.size); ++i) {
+            if (BilateralRows::is_bilateral(block, i)) continue;
+            Unit unit;
+            unit.block = static_cast<int>(k), unit.row = i, unit.at = rows_++;
+            unit.lower = block.lower[i], unit.upper = block.upper[i];
+            units_.push_back(unit);
+        }
+        for (; next < points.size() && points[next].block == static_cast<int>(k); ++next) {
+            Unit unit;
+            unit.block = static_cast<int>(k), unit.row = points[next].row, unit.size = points[next].size;
+            unit.at = rows_;
+            unit.normal = normal, unit.coefficient = points[next].coefficient;
+            rows_ += unit.size;
+            units_.push_back(unit);
+        }
+    }
+}
+
+/// Columns of A⁻¹ Gᵀ, W and q.
+void ReducedContacts::reduce(const MixedSystem& system) {
+    const std::size_t all = static_cast<std::size_t>(matrix_.unknowns()), n = static_cast<std::size_t>(rows_);
+    const int refinements = matrix_.counters().floored_pivots > 0 ? 2 : 0;
+    right_.assign(all, 0.0);
+    free_.resize(all);
+    for (int b = 0; b < bodies_; ++b) std::copy_n(system.momentum[b].data(), 6, right_.data() + 6 * b);
+    for (std::size_t k = 0; k < joints_.size(); ++k)
+        for (int i = 0; i < joints_[k].count; ++i)
+            right_[matrix_.offset(bodies_ + static_cast<int>(k)) + i] =
+                system.rows[joints_[k].block].right[joints_[k].row[i]];
+    matrix_.solve_refined(right_.data(), free_.data(), 1);
+
+    response_.resize(all * n);
+    w_.resize(n * n);
+    q_.resize(n), z_.resize(n), u_.resize(n);
+    speed_ = 0.0;
+    for (int b = 0; b < bodies_; ++b)
+        for (int a = 0; a < 3; ++a) speed_ = std::max(speed_, std::abs(free_[6 * b + a]));
+    const auto along = [this](const RowBlock& block, int row, const double* v) {
+        const auto part = [&](int body, const Vec6& g) {
+            const double* x = v + 6 * static_cast<std::size_t>(body);
+            return g[0] * x[0] + g[1] * x[1] + g[2] * x[2] + g[3] * x[3] + g[4] * x[4] + g[5] * x[5];
+        };
+        double sum = 0.0;
+        if (block.first >= 0) sum += part(block.first, block.first_jacobian[row]);
+        if (block.second >= 0) sum += part(block.second, block.second_jacobian[row]);
+        for (const FurtherBody& other : block.further) sum += part(other.body, other.jacobian);
+        return sum;
+    };
+    for (Unit& unit : units_) {
+        const RowBlock& block = system.rows[unit.block];
+        unit.own = 0.0;
+        double apart = 0.0;
+        for (int i = 0; i < unit.size; ++i) {
+            const int row = unit.row + i;
+            const std::size_t at = static_cast<std::size_t>(unit.at) + static_cast<std::size_t>(i);
+            double* column = response_.data() + all * at;
+            std::fill_n(right_.data(), all, 0.0);
+            const auto put = [&](int body, const Vec6& g) {
+                for (int a = 0; a < 6; ++a) right_[6 * static_cast<std::size_t>(body) + a] += g[a];
+            };
+            if (block.first >= 0) put(block.first, block.first_jacobian[row]);
+            if (block.second >= 0) put(block.second, block.second_jacobian[row]);
+            for (const FurtherBody& other : block.further) put(other.body, other.jacobian);
+            if (refinements > 0) {
+                matrix_.solve_refined(right_.data(), column, refinements);
+            } else {
+                std::copy_n(right_.data(), all, column);
+                matrix_.solve(column);
+            }
+            q_[at] = along(block, row, free_.data()) - block.right[row];
+            z_[at] = block.multiplier[row];
+            speed_ = std::max(speed_, std::abs(block.right[row]));
+            for (const Unit& other : units_) {
+                if (other.at > unit.at + i) break;
+                for (int j = 0; j < other.size; ++j) {
+                    const std::size_t to = static_cast<std::size_t>(other.at) + static_cast<std::size_t>(j);
+                    if (to > at) break;
+                    const double value = along(system.rows[other.block], other.row + j, column);
+                    w_[n * at + to] = w_[n * to + at] = value;
+                }
+            }
+            w_[(n + 1) * at] += block.softness[row];
+            unit.own += w_[(n + 1) * at];
+            apart += own_inertia(system, block, row);
+        }
+        if (!(unit.own > held * apart)) unit.own = 0.0;
+    }
+}
+
+/// u = W z + q.
+void ReducedContacts::measure() {
+    const std::size_t n = static_cast<std::size_t>(rows_);
+    u_ = q_;
+    for (std::size_t j = 0; j < n; ++j) {
+        if (z_[j] == 0.0) continue;
+        const double* column = w_.data() + n * j;
+        for (std::size_t i = 0; i < n; ++i) u_[i] += column[i] * z_[j];
+    }
+}
+
+void ReducedContacts::change(int at, double by) {
+    if (by == 0.0) return;
+    z_[at] += by;
+    const std::size_t n = static_cast<std::size_t>(rows_);
+    const double* column = w_.data() + n * static_cast<std::size_t>(at);
+    double* u = u_.data();
+    for (std::size_t i = 0; i < n; ++i) u[i] += column[i] * by;
+}
+
+void ReducedContacts::find_row(const Unit& unit) {
+    const double z = z_[unit.at];
+    if (!(unit.own > 0.0)) return change(unit.at, std::clamp(0.0, unit.lower, unit.upper) - z);
+    change(unit.at, std::clamp(z - u_[unit.at] / unit.own, unit.lower, unit.upper) - z);
+}
+
+/// The two rows' own problem exactly: free within the disc, or on its edge, (W + λ) t = −b with |t| the radius.
+void ReducedContacts::find_disc(const Unit& unit) {
+    const std::size_t n = static_cast<std::size_t>(rows_), at = static_cast<std::size_t>(unit.at);
+    const double bound = unit.own > 0.0 ? unit.coefficient * std::max(0.0, z_[unit.normal]) : 0.0;
+    if (unit.size == 1) {
+        if (!(unit.own > 0.0)) return change(unit.at, -z_[unit.at]);
+        change(unit.at, std::clamp(z_[at] - u_[at] / unit.own, -bound, bound) - z_[at]);
+        return;
+    }
+    const double a = w_[(n + 1) * at], c = w_[(n + 1) * (at + 1)], b = w_[n * at + at + 1];
+    const double r1 = a * z_[at] + b * z_[at + 1] - u_[at], r2 = b * z_[at] + c * z_[at + 1] - u_[at + 1];
+    double t1 = 0.0, t2 = 0.0, more = 0.0;
+    for (int k = 0; k < 20 && bound > 0.0; ++k) {
+        const double d1 = a + more, d2 = c + more, det = d1 * d2 - b * b;
+        if (!(det > 1e-14 * (a + c) * (a + c))) {  // a row that moves nothing
+            more += 1e-7 * (a + c);
+            continue;
+        }
+        t1 = (d2 * r1 - b * r2) / det, t2 = (d1 * r2 - b * r1) / det;
+        const double size = length(t1, t2);
+        if (size <= bound * (1.0 + 1e-14)) break;
+        // Newton's step of 1/|t| = 1/bound, which is nearly linear in λ.
+        const double s1 = (d2 * t1 - b * t2) / det, s2 = (d1 * t2 - b * t1) / det;
+        more += (size / bound - 1.0) * size * size / (t1 * s1 + t2 * s2);
+    }
+    const double size = length(t1, t2);
+    if (size > bound) t1 *= bound / size, t2 *= bound / size;
+    change(unit.at, t1 - z_[at]);
+    change(unit.at + 1, t2 - z_[at + 1]);
+}
+
+void ReducedContacts::iterate() {
+    for (const Unit& unit : units_)
+        if (unit.normal < 0) find_row(unit);
+        else find_disc(unit);
+}
+
+/// How far a unit is from where a step of projection puts it, as a velocity.
+double ReducedContacts::residual_of(const Unit& unit, const double* z, const double* u) const {
+    if (!(unit.own > 0.0)) return 0.0;
+    const int at = unit.at;
+    if (unit.size == 1) {
+        const double bound = unit.normal < 0 ? 0.0 : unit.coefficient * std::max(0.0, z[unit.normal]);
+        const double lower = unit.normal < 0 ? unit.lower : -bound,
+                     upper = unit.normal < 0 ? unit.upper : bound;
+        return unit.own * std::abs(z[at] - std::clamp(z[at] - u[at] / unit.own, lower, upper));
+    }
+    const double bound = unit.coefficient * std::max(0.0, z[unit.normal]);
+    double t1 = z[at] - u[at] / unit.own, t2 = z[at + 1] - u[at + 1] / unit.own;
+    const double size = length(t1, t2);
+    if (size > bound) t1 *= bound / size, t2 *= bound / size;
+    return unit.own * length(z[at] - t1, z[at + 1] - t2);
+}
+
+double ReducedContacts::residual() const {
+    double worst = 0.0;
+    for (const Unit& unit : units_) {
+        const double own = residual_of(unit, z_.data(), u_.data());
+        if (!(own <= worst)) worst = own;
+    }
+    return worst;
+}
+
+double ReducedContacts::keep_best() {
+    const double now = residual();
+    if (now < best_residual_) best_residual_ = now, best_ = z_;
+    return now;
+}
+
+/// Iterations find which rows push and which slide, Newton's method the answer; where it does not, both again from its end.
+void ReducedContacts::settle(Report& report, double goal, int iterations) {
+    best_residual_ = unbounded;
+    best_ = z_;
+    if (!(keep_best() <= goal))
+        for (int round = 0; round < rounds; ++round) {
+            Watch::look();
+            for (int k = 0; k < iterations; ++k, ++report.iterations) iterate();
+            polish(report, goal);
+            if (best_residual_ <= std::max(goal, good * speed_)) break;
+        }
+    z_ = best_;
+    measure();
+}
+
+/// All unknowns from z; M v = p + Gᵀ z and the joints' rows hold to rounding.
+void ReducedContacts::deliver(MixedSystem& system) {
+    const std::size_t all = static_cast<std::size_t>(matrix_.unknowns());
+    whole_ = free_;
+    for (std::size_t j = 0; j < static_cast<std::size_t>(rows_); ++j) {
+        if (z_[j] == 0.0) continue;
+        const double* column = response_.data() + all * j;
+        for (std::size_t i = 0; i < all; ++i) whole_[i] += column[i] * z_[j];
+    }
+    right_.assign(all, 0.0);
+    for (int b = 0; b < bodies_; ++b) std::copy_n(system.momentum[b].data(), 6, right_.data() + 6 * b);
+    for (std::size_t k = 0; k < joints_.size(); ++k)
+        for (int i = 0; i < joints_[k].count; ++i)
+            right_[matrix_.offset(bodies_ + static_cast<int>(k)) + i] =
+                system.rows[joints_[k].block].right[joints_[k].row[i]];
+    for (const Unit& unit : units_) {
+        RowBlock& block = system.rows[unit.block];
+        for (int i = 0; i < unit.size; ++i) {
+            const int row = unit.row + i;
+            const double z = z_[unit.at + i];
+            block.multiplier[row] = z;
+            const auto put = [&](int body, const Vec6& g) {
+                for (int a = 0; a < 6; ++a) right_[6 * static_cast<std::size_t>(body) + a] += g[a] * z;
+            };
+            if (block.first >= 0) put(block.first, block.first_jacobian[row]);
+            if (block.second >= 0) put(block.second, block.second_jacobian[row]);
+            for (const FurtherBody& other : block.further) put(other.body, other.jacobian);
+        }
+    }
+    left_.resize(all);
+    for (int round = 0; round < 2; ++round) {
+        matrix_.residual(right_.data(), whole_.data(), left_.data());
+        matrix_.solve(left_.data());
+        for (std::size_t i = 0; i < all; ++i) whole_[i] += left_[i];
+    }
+    system.velocity.resize(system.mass.size());
+    for (int b = 0; b < bodies_; ++b) std::copy_n(whole_.data() + 6 * b, 6, system.velocity[b].data());
+    for (std::size_t k = 0; k < joints_.size(); ++k)
+        for (int i = 0; i < joints_[k].count; ++i)
+            system.rows[joints_[k].block].multiplier[joints_[k].row[i]] =
+                -whole_[matrix_.offset(bodies_ + static_cast<int>(k)) + i];
+}
+
+ReducedContacts::Report ReducedContacts::solve(MixedSystem& system, const std::vector<FrictionPoint>& points,
+                                               int iterations) {
+    Report report;
+    analyse(system);
+    if (!factor(system)) return report;
+    list_units(system, points);
+    reduce(system);
+    for (const Unit& unit : units_)
+        if (unit.normal < 0) z_[unit.at] = std::clamp(z_[unit.at], unit.lower, unit.upper);
+    for (int pass = 0; pass < passes; ++pass) {
+        measure();
+        settle(report, exact * speed_, iterations);
+        deliver(system);
+        // What the factor lacks shows in the true equations, and goes into q.
+        measure();
+        for (const Unit& unit : units_)
+            for (int i = 0; i < unit.size; ++i) {
+                const double u = row_residual(system.rows[unit.block], unit.row + i, system.velocity);
+                q_[unit.at + i] += u - u_[unit.at + i];
+                u_[unit.at + i] = u;
+            }
+        const double left = residual();
+        report.residual = speed_ > 0.0 ? left / speed_ : left;
+        if (!(report.residual > good) || report.iterations >= rounds * iterations) break;
+    }
+    return report;
+}
+
+}  // namespace spook

@@ -1,0 +1,96 @@
+// Joints out first, cones on the rest: contacts and bounded rows of an island whose joints are eliminated exactly.
+//
+// Bodies and bilateral rows are factored once. What is left is a dense problem in the bounded rows alone,
+//
+//     u = W z + q,    W = G A⁻¹ Gᵀ + Sig,    q = G v₀ − r,
+//
+// with A⁻¹ the velocities that impulses give to bodies held by their joints, and v₀ those without any. A trunk and its
+// feet are then as near to each other as they are stiff: projected Gauss–Seidel on W, which crawls along chains of joints,
+// settles which contacts push and which slide within tens of iterations, and Newton's method on the exact laws finishes.
+// The descent does not diverge, so that the last point is an answer wherever the limit stops it.
+//
+// Beyond `most_rows` W is too large to be dense, and Newton's method on the whole is asked (contacts/cone_newton.hpp).
+//
+// Sources: Featherstone 2008, ch. 11 (contacts by the inverse of the operational-space inertia); Alart, Curnier 1991 (the
+// laws as a root); Horak, Trinkle 2019 (how solvers of robots' contacts compare).
+#pragma once
+
+#include <vector>
+
+#include "contacts/bilateral_rows.hpp"
+#include "contacts/friction_point.hpp"
+#include "linear/block_ldlt.hpp"
+
+namespace spook {
+
+class ReducedContacts {
+public:
+    static constexpr int most_rows = 120;  // bounded: three of a contact with friction
+
+    struct Report {
+        int iterations = 0, newton_steps = 0;
+        double residual = unbounded;  // of the worst row, relative to the speeds in the system
+    };
+
+    /// Whether the system has joints to eliminate, and few enough rows besides.
+    static bool takes(const MixedSystem& system);
+
+    /// Starts from the multipliers of bounded rows in `system`; fills velocities and all multipliers. Points obey the cone.
+    /// `iterations`: between tries of Newton's method.
+    Report solve(MixedSystem& system, const std::vector<FrictionPoint>& points, int iterations);
+
+    BlockLdlt::Counters counters() const noexcept { return matrix_.counters(); }
+
+private:
+    /// Rows that are found together: one between bounds, or those of a disc (an interval, where one) of a normal's.
+    struct Unit {
+        int block = 0, row = 0, size = 1, at = 0;
+        int normal = -1;           // in z: what bounds it; −1: lower and upper
+        double coefficient = 0.0;  // times that
+        double lower = 0.0, upper = 0.0;
+        double own = 1.0;  // of W's block: its entry, or trace
+    };
+    struct Pattern {
+        int first = -1, second = -1, size = 0;
+        bool operator==(const Pattern&) const = default;
+    };
+    bool factor(const MixedSystem& system);
+    void analyse(const MixedSystem& system);
+    void list_units(const MixedSystem& system, const std::vector<FrictionPoint>& points);
+    void reduce(const MixedSystem& system);
+    void measure();
+    void change(int at, double by);
+    void iterate();
+    void find_row(const Unit& unit);
+    void find_disc(const Unit& unit);
+    double residual_of(const Unit& unit, const double* z, const double* u) const;
+    double residual() const;
+    bool find_step(double& worst);
+    bool eliminate(std::size_t m);
+    void take_step();
+    void polish(Report& report, double goal);
+    double keep_best();
+    void settle(Report& report, double goal, int iterations);
+    void deliver(MixedSystem& system);
+
+    BlockLdlt matrix_;
+    std::vector<Pattern> pattern_;
+    std::vector<std::pair<int, int>> further_;  // of joints over more bodies: node and body
+    int bodies_ = -1, rows_ = 0;
+    struct Joint {
+        int block = 0, count = 0;
+        int row[6] = {};
+        int first_edge = -1, second_edge = -1, further_edge = -1;
+    };
+    std::vector<Joint> joints_;
+    std::vector<Unit> units_;
+    std::vector<double> response_;              // columns A⁻¹ Gᵀ, of all unknowns
+    std::vector<double> w_, q_, z_, u_, best_;  // W row by row; best_: z
+    std::vector<double> right_, free_, whole_, left_;
+    std::vector<double> dense_, step_, image_;  // of Newton's method
+    std::vector<int> active_, place_;
+    std::vector<signed char> pinned_;
+    double speed_ = 0.0, best_residual_ = 0.0;
+};
+
+}  // namespace spook

@@ -1,0 +1,180 @@
+"""Bodies held by joints that touch the ground and each other: solved directly, at a cost that does not run away."""
+
+import math
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import (
+    WORLD,
+    Box,
+    Capsule,
+    Final,
+    Hinge,
+    JointSpring,
+    Limit,
+    Material,
+    Maximum,
+    Motor,
+    Penetration,
+    Plane,
+    Prismatic,
+    RigidBody,
+    Scene,
+    Velocity,
+    simulate,
+)
+
+STEP = 1 / 60
+G = 9.81
+
+
+def legged(seed: int) -> Scene:
+    """A trunk on two to five legs of two links each, stiff or slack, that falls on a floor and slides on."""
+    random = np.random.default_rng(seed)
+    mu = float(random.uniform(0.2, 1.0))
+    rough = Material(friction=mu)
+    bodies = [
+        RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough),
+        RigidBody(
+            name="trunk",
+            mass=float(10 ** random.uniform(-1, 1.5)),
+            shape=Box((0.6, 0.4, 0.1)),
+            position=(0.0, 0.0, 0.62),
+            velocity=(float(random.uniform(-2, 2)), float(random.uniform(-1, 1)), -1.0),
+            material=rough,
+        ),
+    ]
+    joints = []
+    for k in range(int(random.integers(2, 6))):
+        x, y = float(random.uniform(-0.28, 0.28)), 0.18 if k % 2 else -0.18
+        upper, lower = f"thigh{k}", f"shin{k}"
+        for name, z in ((upper, 0.44), (lower, 0.2)):
+            bodies.append(
+                RigidBody(
+                    name=name,
+                    mass=float(10 ** random.uniform(-1, 0.5)),
+                    shape=Capsule(0.03, 0.18),
+                    position=(x, y, z),
+                    material=rough,
+                )
+            )
+        drive = JointSpring(stiffness=float(10 ** random.uniform(0, 3)), damping=0.02, max_force=50.0)
+        joints += [
+            Hinge(
+                name=f"hip{k}",
+                between=("trunk", upper),
+                at=(x, y, 0.56),
+                axis=(0, 1, 0),
+                compliance=0.0,
+                spring=drive,
+            ),
+            Hinge(
+                name=f"knee{k}",
+                between=(upper, lower),
+                at=(x, y, 0.32),
+                axis=(0, 1, 0),
+                compliance=0.0,
+                limit=Limit(lower=-1.0, upper=1.0),
+            ),
+        ]
+    names = [body.name for body in bodies[1:]]
+    apart = tuple((a, b) for i, a in enumerate(names) for b in names[i + 1 :])
+    return Scene(bodies=tuple(bodies), constraints=tuple(joints), gravity=(0.0, 0.0, -G), no_contact=apart)
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_what_stands_on_legs_is_solved_at_every_step(seed):
+    run = simulate(
+        legged(seed), duration=1.5, time_step=STEP, observe={"deepest": Maximum(quantity=Penetration())}
+    )
+    steps = round(1.5 / STEP)
+    assert run.status == "completed"
+    assert run["deepest"] <= 1e-6  # m
+    assert run.residual <= 5e-3  # m/s, of the worst solve
+    assert run.counters["factorisations"] <= 60 * steps
+    assert run.counters["sweeps"] <= 100 * steps
+
+
+def frame(mu: float, half_angle: float) -> Scene:
+    """Two bars of 1 kg hinged at their tops, that stand on a floor."""
+    length, radius = 1.0, 0.02
+    rough = Material(friction=mu)
+    top = radius + length * math.cos(half_angle)
+    bars = [
+        RigidBody(
+            name=name,
+            mass=1.0,
+            shape=Capsule(radius, length),
+            position=(
+                side * length / 2 * math.sin(half_angle),
+                0.0,
+                radius + length / 2 * math.cos(half_angle),
+            ),
+            orientation=(math.cos(half_angle / 2), 0.0, -side * math.sin(half_angle / 2), 0.0),
+            material=rough,
+        )
+        for name, side in (("left", -1.0), ("right", 1.0))
+    ]
+    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
+    hinge = Hinge(name="top", between=("left", "right"), at=(0.0, 0.0, top), axis=(0, 1, 0), compliance=0.0)
+    return Scene(
+        bodies=(floor, *bars),
+        constraints=(hinge,),
+        gravity=(0.0, 0.0, -G),
+        no_contact=(("left", "right"),),
+    )
+
+
+@pytest.mark.parametrize(("share", "stands"), [(1.01, True), (0.99, False)])
+def test_two_hinged_bars_stand_while_the_floor_rubs_enough(share, stands):
+    """Moments about the hinge: friction m g (l/2) sin a / (l cos a + r) a foot, by a normal force of m g."""
+    half = 0.4
+    need = 0.5 * math.sin(half) / (math.cos(half) + 0.02)
+    run = simulate(
+        frame(share * need, half),
+        duration=1.0,
+        time_step=STEP,
+        observe={"v": Final(quantity=Velocity("left"))},
+    )
+    speed = float(np.linalg.norm(run["v"]))
+    assert run.status == "completed"
+    assert (speed < 1e-9) == stands
+
+
+def test_a_driven_slide_pushes_a_box_as_statics_say():
+    """Pusher and box go together: a = (F − mu m g) / (M + m)."""
+    force, pusher, box, mu = 30.0, 2.0, 3.0, 0.4
+    rough = Material(friction=mu)
+    smooth = Material(friction=0.0)
+    scene = Scene(
+        bodies=(
+            RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough),
+            RigidBody(
+                name="pusher",
+                mass=pusher,
+                shape=Box((0.1, 0.4, 0.1)),
+                position=(-0.25, 0.0, 0.2),
+                material=smooth,
+            ),
+            RigidBody(
+                name="box", mass=box, shape=Box((0.4, 0.4, 0.4)), position=(0.0, 0.0, 0.2), material=rough
+            ),
+        ),
+        constraints=(
+            Prismatic(
+                name="rail",
+                between=(WORLD, "pusher"),
+                at=(-0.25, 0.0, 0.2),
+                axis=(1, 0, 0),
+                compliance=0.0,
+                motor=Motor(force=force),
+            ),
+        ),
+        gravity=(0.0, 0.0, -G),
+        no_contact=(("floor", "pusher"),),
+    )
+    run = simulate(scene, duration=1.0, time_step=STEP, observe={"v": Final(quantity=Velocity("box"))})
+    speed = run["v"]
+    assert run.status == "completed"
+    assert speed[0] == pytest.approx((force - mu * box * G) / (pusher + box), rel=1e-9)
