@@ -57,7 +57,8 @@ struct RowBlock {
     Vec6 upper{unbounded, unbounded, unbounded, unbounded, unbounded, unbounded};
     Vec6 multiplier{};  // z: the start of an iteration, then the result
     std::array<RowState, 6> state{};
-    bool is_contact = false;  // rows after the normal are friction: the law bounds them, whatever is said here
+    bool is_contact =
+        false;  // rows after the normal are friction: the law bounds them, whatever is said here
     StopRow stop;
     std::span<const FurtherBody> further;  // what fills the rows keeps what it shows
 };
