@@ -106,11 +106,12 @@ def _supporting(points: Sequence[Vector], flat: float, thin: float) -> Iterator[
         away = given - given[i]
         j, k = np.triu_indices(len(given) - i - 1, 1)
         j, k = j + i + 1, k + i + 1
-        normals = np.cross(away[j], away[k])
-        length = np.linalg.norm(normals, axis=1)
-        heights = normals @ away.T
-        aside = (heights.min(axis=1) < -flat * length) & (heights.max(axis=1) > flat * length)
-        for one in np.flatnonzero(~aside & (length > thin)):
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is looked at exactly, too
+            normals = np.cross(away[j], away[k])
+            length = np.linalg.norm(normals, axis=1)
+            heights = normals @ away.T
+            aside = (heights.min(axis=1) < -flat * length) & (heights.max(axis=1) > flat * length)
+        for one in np.flatnonzero(~aside & ~(length <= thin)):
             yield i, int(j[one]), int(k[one])
 
 

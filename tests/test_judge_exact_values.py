@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from spook_tracker.tracker.document.run_document import Point
 from spook_tracker.tracker.judge.accepted import Accepted
-from spook_tracker.tracker.judge.exact_values import Series, State, judge_values, step
+from spook_tracker.tracker.judge.exact_values import KnownValue, Series, judge_values, step
 from spook_tracker.tracker.judge.judged import Judged
 from tests.test_tracker_analyse import SERIES, run, sample, series
 
@@ -52,9 +52,9 @@ DEFINITION = st.sampled_from([SERIES, series(relative_tolerance=0.02), series(li
 HISTORY = given(DEFINITION, nights(), st.lists(ENTRY, max_size=2))
 
 
-def walked(asked: Series, history: list[Point]) -> list[tuple[State, Judged, State]]:
+def walked(asked: Series, history: list[Point]) -> list[tuple[KnownValue, Judged, KnownValue]]:
     """Each night with what was known before it and after it."""
-    found, state = [], State()
+    found, state = [], KnownValue()
     for night in history:
         before = state
         state, judged = step(asked, state, night)

@@ -42,7 +42,7 @@ class Series(msgspec.Struct, frozen=True):
     accepted: Sequence[Accepted] = ()
 
 
-class State(msgspec.Struct, frozen=True, gc=False):
+class KnownValue(msgspec.Struct, frozen=True, gc=False):
     """What is known of a series after a night."""
 
     name: Literal["nothing", "calm", "held", "red"] = "nothing"
@@ -67,13 +67,13 @@ class Seen(msgspec.Struct, frozen=True):
 
 def judge_values(series: Series, history: Sequence[Point]) -> Iterator[Judged]:
     """Every night's verdict, oldest first."""
-    state = State()
+    state = KnownValue()
     for night in history:
         state, judged = step(series, state, night)
         yield judged
 
 
-def step(series: Series, state: State, night: Point) -> tuple[State, Judged]:
+def step(series: Series, state: KnownValue, night: Point) -> tuple[KnownValue, Judged]:
     """One more night."""
     if state.name == "calm" and state.level is not None and _repeats(state.level, night):
         return _again(state, night)
@@ -99,26 +99,26 @@ def step(series: Series, state: State, night: Point) -> tuple[State, Judged]:
 # Rules: what becomes of a night.
 
 
-def _again(state: State, night: Point) -> tuple[State, Judged]:
+def _again(state: KnownValue, night: Point) -> tuple[KnownValue, Judged]:
     """The same bits under the same definition: nothing to judge."""
     s, release = state, night if is_release(night.run) else state.release
-    again = State("calm", night, release, s.settled, s.stands, None, s.gone, None, s.failing)
+    again = KnownValue("calm", night, release, s.settled, s.stands, None, s.gone, None, s.failing)
     return again, Judged(night=night, verdict=IDENTICAL, state="green", stands=s.stands, against=s.level)
 
 
-def _given_back(state: State, level: Point) -> State:
+def _given_back(state: KnownValue, level: Point) -> KnownValue:
     """What was lent is due: the old level counts again."""
     name = "held" if state.red is None else state.name
     return replace(state, name=name, level=level, release=level, settled=level, lent=None)
 
 
-def _unasked(state: State, night: Point) -> tuple[State, Judged]:
+def _unasked(state: KnownValue, night: Point) -> tuple[KnownValue, Judged]:
     """An engine that cannot be asked: nothing became of the level that holds."""
     name = "held" if state.name == "calm" else state.name
     return replace(state, name=name), Judged(night=night, verdict=UNASKED, state="unjudged", stands="none")
 
 
-def _first(state: State, night: Point, own: Class) -> tuple[State, Seen]:
+def _first(state: KnownValue, night: Point, own: Class) -> tuple[KnownValue, Seen]:
     """The first value there is, or the first of another definition."""
     if state.level is None:
         verdict = Verdict(word="new", sentence="the first value")
@@ -128,13 +128,13 @@ def _first(state: State, night: Point, own: Class) -> tuple[State, Seen]:
     return begun, Seen(night, own, verdict, None)
 
 
-def _holds(state: State, seen: Seen) -> tuple[State, Judged]:
+def _holds(state: KnownValue, seen: Seen) -> tuple[KnownValue, Judged]:
     """Not worse than what holds: the night is the level from now on."""
     night, verdict = seen.night, seen.verdict
     better = verdict.word in ("improved", "fixed")
     release = night if better or is_release(night.run) else state.release
     lent = None if better else state.lent
-    held = State(
+    held = KnownValue(
         name="calm" if lent is None else "held",
         level=night,
         release=release,
@@ -148,7 +148,7 @@ def _holds(state: State, seen: Seen) -> tuple[State, Judged]:
     return held, Judged(night=night, verdict=verdict, state=said, stands=seen.own, against=seen.against)
 
 
-def _is_red(definition: SeriesDefinition, state: State, seen: Seen) -> tuple[State, Judged]:
+def _is_red(definition: SeriesDefinition, state: KnownValue, seen: Seen) -> tuple[KnownValue, Judged]:
     """Worse, and nobody accepted it: red until it is mended, and news where it is worse than it was while red."""
     night, before, level = seen.night, state.red, state.level
     good = before.last_good if before is not None else None
@@ -170,8 +170,8 @@ def _is_red(definition: SeriesDefinition, state: State, seen: Seen) -> tuple[Sta
 
 
 def _fails_as_expected(
-    definition: SeriesDefinition, state: State, seen: Seen, taken: Accepted
-) -> tuple[State, Judged]:
+    definition: SeriesDefinition, state: KnownValue, seen: Seen, taken: Accepted
+) -> tuple[KnownValue, Judged]:
     """Bad, as somebody said it would be: the level from before stays, and worse than expected is told."""
     words = f"expected to fail; {seen.verdict.sentence}"
     if state.failing is not None and (grown := _against(definition, state.failing, seen.night)).red:
@@ -186,7 +186,7 @@ def _fails_as_expected(
     )
 
 
-def _accepts(state: State, seen: Seen, taken: Accepted) -> tuple[State, Judged]:
+def _accepts(state: KnownValue, seen: Seen, taken: Accepted) -> tuple[KnownValue, Judged]:
     """Bad, and accepted: the night is the level from now on, or until the day that somebody named."""
     night, level = seen.night, state.level
     lent = None
@@ -221,12 +221,12 @@ def _taken(series: Series, night: Point) -> Accepted | None:
     return acceptance(series.accepted, series.key, night.value, night_of(night.run), removed)
 
 
-def _mended(state: State) -> frozenset[float]:
+def _mended(state: KnownValue) -> frozenset[float]:
     """The bad values that came and went, with the one that goes now."""
     return state.gone if state.red is None else state.gone | {state.red.night.value}
 
 
-def _seen(definition: SeriesDefinition, state: State, night: Point, own: Class) -> Seen:
+def _seen(definition: SeriesDefinition, state: KnownValue, night: Point, own: Class) -> Seen:
     verdict, against = _against_what_holds(definition, state, night)
     if verdict.word == "regressed" and night.value in state.gone:
         words = f"{verdict.sentence}; this value came and went before"
@@ -235,7 +235,7 @@ def _seen(definition: SeriesDefinition, state: State, night: Point, own: Class) 
 
 
 def _against_what_holds(
-    definition: SeriesDefinition, state: State, night: Point
+    definition: SeriesDefinition, state: KnownValue, night: Point
 ) -> tuple[Verdict, Point | None]:
     """Against the level that holds, then against the last release, then against the last accepted level."""
     level = state.level

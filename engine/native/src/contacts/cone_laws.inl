@@ -176,11 +176,12 @@ SPOOK_ALWAYS void linearise_points(ConeFour& f, int i, ConeAid aid) {
     const Number w1 = root * mu * get(f.u[1], i), w2 = root * mu * get(f.u[2], i), rounded = kink(f, i, blur);
     const Number sliding = root_of(w1 * w1 + w2 * w2 + rounded * rounded);
     const auto slides = aid.frozen ? sliding < 0.0 : sliding > 0.0;
-    const Number slide = aid.frozen ? get(f.slide, i) : sliding - rounded;
+    const Number normal = root * get(f.u[0], i);
+    const Number opening = aid.frozen ? normal + get(f.slide, i) : normal + sliding - rounded;
     const Number s1 = slides ? w1 / sliding : none, s2 = slides ? w2 / sliding : none;
     const Number y0 = get(f.z[0], i) * get(f.over, i), y1 = get(f.z[1], i) * along,
                  y2 = get(f.z[2], i) * along;
-    const Number a0 = y0 - (root * get(f.u[0], i) + slide) - hold * (y0 - get(f.held[0], i));
+    const Number a0 = y0 - opening - hold * (y0 - get(f.held[0], i));
     const Number a1 = y1 - w1 - hold * (y1 - get(f.held[1], i)),
                  a2 = y2 - w2 - hold * (y2 - get(f.held[2], i));
 

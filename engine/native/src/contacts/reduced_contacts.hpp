@@ -4,10 +4,10 @@
 //
 //     u = W z + q,    W = G A⁻¹ Gᵀ + Sig,    q = G v₀ − r,
 //
-// with A⁻¹ the velocities that impulses give to bodies held by their joints, and v₀ those without any. A trunk and its
-// feet are then as near to each other as they are stiff: projected Gauss–Seidel on W, which crawls along chains of joints,
-// settles which contacts push and which slide within tens of iterations, and Newton's method on the exact laws finishes.
-// The descent does not diverge, so that the last point is an answer wherever the limit stops it.
+// with A⁻¹ the velocities that impulses give to bodies held by their joints, and v₀ those without any. Projected
+// Gauss–Seidel crawls along chains of joints; on W it settles within tens of iterations which contacts push and which slide,
+// and Newton's method on the exact laws finishes. Every iteration keeps the bounds, so that wherever the limit stops it
+// there is an answer, whose residual is told.
 //
 // Beyond `most_rows` W is too large to be dense, and Newton's method on the whole is asked (contacts/cone_newton.hpp).
 //
