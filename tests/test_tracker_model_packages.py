@@ -83,14 +83,16 @@ def test_of_several_engines_it_is_told_which_stand_together(tmp_path: Path) -> N
     (tmp_path / "swing.xml").write_text(SWING)
     (tmp_path / "soft.xml").write_text(SOFT)
 
-    found = {path.name: one for path, one in stood(files_of(str(tmp_path)), ("mujoco", "spook", "nobody"))}
+    found = {
+        path.name: one for path, one in stood(files_of(str(tmp_path)), ("mujoco", "spook", "no_such_engine"))
+    }
 
     swing, soft = found["swing.xml"], found["soft.xml"]
     assert isinstance(swing, Standing) and isinstance(soft, Standing)
     assert {one.groups for one in swing.checkpoints} == {(("mujoco", "spook"),)}
     assert soft.checkpoints[-1].groups == (("mujoco",), ("spook",))  # one sinks in, the other lies on top
     assert soft.checkpoints[-1].distance["mujoco", "spook"] > 5e-4
-    assert "nobody" in swing.refused
+    assert "no_such_engine" in swing.refused
 
 
 def test_the_command_says_it_at_each_time(tmp_path: Path) -> None:

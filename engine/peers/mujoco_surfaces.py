@@ -41,7 +41,7 @@ def surfaces(
     tied: set[frozenset[str]],
     lacks: Lacks,
 ) -> tuple[dict[str, list[RigidBody]], list[RigidBody], list[tuple[str, str]]]:
-    """Moving bodies with their surfaces by name, a static body for each geom that stands still, and who never meets whom.
+    """Moving bodies with their surfaces by name, a static body for each geom that stands still, and pairs kept apart.
 
     Geoms of one body that rub differently, or meet others, are surfaces of bodies of their own at the same place, which
     share its mass and are to be locked to the first.
