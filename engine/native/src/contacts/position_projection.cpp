@@ -20,7 +20,7 @@ constexpr double min_joint_compliance =
 constexpr double over_relaxation = 1.25;  // of PGS that separates balls, not boxes
 constexpr double search_factor = 4.0;     // of the deepest overlap: gaps that the projection may close
 constexpr double min_separation_to_propagate =
-    1e-5;  // of the smaller body's radius: a body displaced by less pushes no other
+    1e-9;  // of the smaller body's radius: a body displaced by less pushes no other
 constexpr double min_separation_to_propagate_pgs =
     5e-4;                           // the same for PGS, where each extra row slows fifty iterations
 constexpr double same_place = 0.1;  // of the larger body's radius: one point, seen again
