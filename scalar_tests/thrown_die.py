@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -59,19 +60,29 @@ def moments() -> np.ndarray:
     return np.asarray(MASS / 12.0 * (squares.sum() - squares))
 
 
+def slope(_: float, state: np.ndarray) -> np.ndarray:
+    """Euler's equations: change of spin and orientation (w, x, y, z)."""
+    spin, scalar, vector = state[:3], state[3], state[4:]
+    torque = np.cross(moments() * spin, spin)
+    turn = 0.5 * (scalar * spin + np.cross(vector, spin))
+    return np.concatenate([torque / moments(), [-0.5 * vector @ spin], turn])
+
+
+def exact(times: Iterable[float]) -> np.ndarray:
+    """Orientations (w, x, y, z) at rising times [s], shape (times, 4): Euler's equations integrated to rounding."""
+    state, last, found = np.array([*SPIN, 1.0, 0.0, 0.0, 0.0]), 0.0, []
+    for end in times:
+        if end > last:
+            solved = solve_ivp(slope, (last, end), state, method="DOP853", rtol=3e-14, atol=1e-15)
+            state, last = solved.y[:, -1], end
+        found.append(state[3:] / np.linalg.norm(state[3:]))
+    return np.array(found)
+
+
 @functools.cache
-def exact(end: float) -> tuple[float, ...]:
-    """Orientation (w, x, y, z) after `end` [s]: Euler's equations integrated to rounding."""
-    inertia = moments()
-
-    def slope(_: float, state: np.ndarray) -> np.ndarray:
-        spin, scalar, vector = state[:3], state[3], state[4:]
-        change = 0.5 * (scalar * spin + np.cross(vector, spin))
-        return np.concatenate([np.cross(inertia * spin, spin) / inertia, [-0.5 * vector @ spin], change])
-
-    start = np.array([*SPIN, 1.0, 0.0, 0.0, 0.0])
-    solved = solve_ivp(slope, (0.0, end), start, method="DOP853", rtol=3e-14, atol=1e-15)
-    return tuple((solved.y[3:, -1] / np.linalg.norm(solved.y[3:, -1])).tolist())
+def landing() -> np.ndarray:
+    """Orientation at the end."""
+    return np.asarray(exact((DURATION,))[0])
 
 
 def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
@@ -81,7 +92,7 @@ def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
 
 def turn_error(simulate: Simulate, time_step: float = TIME_STEP, method: Method = PLAIN) -> float:
     """By how much it has turned wrongly at the end [rad]."""
-    right, turn = np.array(exact(DURATION)), ladder_run(simulate, time_step, method).final_state["die"][3:7]
+    right, turn = landing(), ladder_run(simulate, time_step, method).final_state["die"][3:7]
     return float(2.0 * np.linalg.norm(turn * np.sign(turn @ right) - right))
 
 
@@ -98,19 +109,20 @@ def measure(simulate: Simulate) -> dict[str, float]:
     }
 
 
+def height(q: np.ndarray) -> np.ndarray:
+    """Of the long axis' end, in half lengths, for orientations of shape (times, 4)."""
+    return np.asarray(2.0 * (q[:, 1] * q[:, 3] - q[:, 0] * q[:, 2]))
+
+
 def draw(simulate: Simulate) -> Drawing:
     """Where the die's long axis points."""
     observe = {"q": Trace(quantity=Orientation("die"))}
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=observe)
     q, times = result["q"], result.sample_times["q"]
-    up = 2.0 * (q[:, 1] * q[:, 3] - q[:, 0] * q[:, 2])
+    up = height(q)
     fine = np.linspace(0.0, DURATION, 151)
-    right = [exact(float(t)) if t > 0.0 else (1.0, 0.0, 0.0, 0.0) for t in fine]
-    curve = [2.0 * (x * z - w * y) for w, x, y, z in right]
-    off = max(
-        abs(float(u) - 2.0 * (e[1] * e[3] - e[0] * e[2]))
-        for u, e in zip(up[1:], (exact(float(t)) for t in times[1:]), strict=True)
-    )
+    curve, at_steps = height(exact(fine)), height(exact(times))
+    off = float(np.max(np.abs(up - at_steps)))
     return Drawing(
         curves=(line("simulation", times, up, "points"), line("Euler's equations", fine, curve, "reference")),
         x_label="time [s]",

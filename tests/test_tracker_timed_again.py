@@ -45,7 +45,7 @@ class ScriptedNight:
             return measure(runs, simulate, repeats, begin)
 
         patch.setattr(clock, "calibrate", lambda: 1e-3)
-        patch.setattr(clock, "stage_seconds", lambda *asked: {})
+        patch.setattr(clock, "_stages", lambda *asked: {})
         patch.setattr(clock, "_instructions", lambda *asked: None)
         patch.setattr("spook_tracker.tracker.measure.ladder.interleaved", interleaved)
 

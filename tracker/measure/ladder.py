@@ -43,6 +43,7 @@ class ErrorPoint:
     failure: str
     counters: dict[str, int]
     state_hash: str
+    seconds: float = 0.0  # that it took here; not its run time, which is taken alone on the machine
 
 
 @dataclass(frozen=True)
@@ -80,7 +81,7 @@ def _error_point(ladder: Ladder, configuration: Configuration, h: float, simulat
     if outcome in ("value", "unsettled") and not math.isfinite(error):
         outcome, failure = "not_finite", f"the error is {error}"
     counters = dict(sorted(witness.counters.items()))
-    return ErrorPoint(h, error, outcome, failure, counters, witness.state_hash)
+    return ErrorPoint(h, error, outcome, failure, counters, witness.state_hash, witness.seconds)
 
 
 Errors = Mapping[tuple[str, int, int], ErrorPoints]  # by test, ladder and configuration
@@ -96,22 +97,28 @@ def timed_series(
 ) -> list[Pair]:
     """Every ladder's series with timings, and the scalars read off them; run alone on the machine.
 
-    `prepare` is the engine's, where it compiles apart from running."""
+    `prepare` is the engine's, where it compiles apart from running. Ladders that ask two questions of the same
+    simulations share their times."""
     found: dict[Place, Timing | Outcome] = {}
     places = _to_be_timed(tests, errors)
     for name, test in tests.items():
+        same: dict[object, Place] = {}
         for i, ladder in enumerate(test.ladders):
-            here = [place for place in places if place[:2] == (name, i)]
+            mine = [place for place in places if place[:2] == (name, i)]
+            first_of = {place: same.setdefault(_simulated(ladder, place), place) for place in mine}
+            here = [place for place in mine if first_of[place] == place]
             runs = [_run_of(ladder, place) for place in here]
-            first = places.index(here[0]) if here else 0
-            timings = interleaved(runs, simulate, repeats, partial(_begin, first), prepare)
+            numbers = [places.index(place) for place in here]
+            expected = [errors[place[:3]].points[place[3]].seconds for place in here]
+            timings = interleaved(runs, simulate, repeats, partial(_begin, numbers), prepare, expected)
             at(NOWHERE)
             found |= zip(here, timings, strict=True)
+            found |= {place: found[first] for place, first in first_of.items()}
     return _all_pairs(tests, errors, found)
 
 
-def _begin(first: int, number: int) -> None:
-    at(first + number)
+def _begin(places: Sequence[int], number: int) -> None:
+    at(places[number])
 
 
 def untimed_series(tests: Mapping[str, ScalarTest], errors: Errors, lost: Lost) -> list[Pair]:
@@ -139,6 +146,12 @@ def _to_be_timed(tests: Mapping[str, ScalarTest], errors: Errors) -> list[Place]
         for k, point in enumerate(errors[name, i, j].points)
         if point.outcome == "value"
     ]
+
+
+def _simulated(ladder: Ladder, place: Place) -> object:
+    """What a rung runs."""
+    configuration = ladder.configurations[place[2]]
+    return ladder.run, ladder.steps_of(configuration)[place[3]], repr(configuration.method)
 
 
 def _run_of(ladder: Ladder, place: Place) -> Timed:

@@ -55,6 +55,7 @@ class Witness:
     time_limit: float | None = DEFAULT_TIME_LIMIT
     counters: dict[str, int] = field(default_factory=dict)
     hashes: list[str] = field(default_factory=list)
+    seconds: float = 0.0  # that the simulations took, while others may have been at work
     unsettled: Result | None = None  # the simulation whose solver left the most
 
     def __call__(self, scene: Any, **options: Any) -> Result:
@@ -64,6 +65,7 @@ class Witness:
         for name, count in result.counters.items():
             self.counters[name] = self.counters.get(name, 0) + int(count)
         self.hashes.append(result.state_hash)
+        self.seconds += result.seconds
         if result.status == "unsettled" and (
             self.unsettled is None or result.residual > self.unsettled.residual
         ):

@@ -26,7 +26,7 @@ RESOLVED = 2e-3  # s that one repeat should last, far above the clock's grain
 MOST_RUNS = 200  # in one repeat
 POINT_BUDGET = 0.2  # s for all repeats of one run: what takes longer is steadier, too
 FEWEST_REPEATS = 2
-STAGES_UP_TO = 0.2  # s: longer runs are not run again only to see their stages
+STAGES_UP_TO = 0.2  # s: of longer runs the first counts as a repeat, so it has no clock of stages
 
 Timed = Callable[[Simulate], Any]
 Prepare = Callable[..., Any]  # as `engine.prepare`: compiles, and what it gives runs again and again
@@ -60,8 +60,9 @@ class Stopwatch:
         if self.prepare is not None:
             asked = {**options, **self.options}
             how = {name: asked.pop(name) for name in ("time_limit", "time_stages") if name in asked}
-            self.programs.append(partial(self.prepare(scene, **asked).run, **how))
-            return self.take(self.programs[-1]())
+            run = self.prepare(scene, **asked).run
+            self.programs.append(partial(run, **{name: how[name] for name in how if name in options}))
+            return self.take(run(**how))
         if self.counter is None:
             result = self.simulate(scene, **{**options, **self.options})
         else:
@@ -86,6 +87,7 @@ class _Lane:
     runs: int
     repeats: int
     programs: Sequence[Callable[[], Result]] = ()  # what the run asks of the engine, compiled once
+    stage_seconds: dict[str, float] = field(default_factory=dict)  # of the run that warmed the caches
     seconds: list[float] = field(default_factory=list)
     cpu: list[float] = field(default_factory=list)
     kernel: list[float] = field(default_factory=list)
@@ -142,19 +144,23 @@ def interleaved(
     repeats: int | Repeats,
     begin: Callable[[int], None] = lambda number: None,
     prepare: Prepare | None = None,
+    expected: Sequence[float] = (),
 ) -> list[Timing | Outcome]:
     """A timing of each run, for those that fail what came of them; instructions and stages where they can be had.
 
-    `begin` is told the number of the run whose turn it is. The first run of each warms the caches and tells how often
-    it can be repeated; one that takes longer than all its repeats should has no cold caches to speak of, and counts as
-    the first of them. With `prepare` its scenes are compiled there, and only run from then on.
+    `begin` is told the number of the run whose turn it is. The first run of each warms the caches, tells how often
+    it can be repeated, and has the clock of stages on. One that is `expected` to take long [s] goes without that clock:
+    if it does, it has no cold caches to speak of and counts as the first repeat. With `prepare` its scenes are compiled
+    there, and only run from then on.
     """
     often = Repeats(repeats) if isinstance(repeats, int) else repeats
     lanes: list[_Lane] = []
+    clock = True  # until a run comes without one: an engine has it for all its stages or for none
     for number, run in enumerate(runs):
         begin(number)
         kernel = calibrate()
-        watch = Stopwatch(simulate, prepare=prepare)
+        clocked = clock and not (number < len(expected) and expected[number] > often.stages_up_to)
+        watch = Stopwatch(simulate, {"time_stages": True} if clocked else {}, prepare=prepare)
         first = _taken(run, watch)
         if isinstance(first, Outcome):
             lanes.append(_Lane(run=run, runs=0, repeats=0, failed=first))
@@ -166,9 +172,11 @@ def interleaved(
             runs=min(often.runs, max(1, math.ceil(RESOLVED / grain))),
             repeats=max(often.fewest, min(often.most, affordable)),
             programs=watch.programs,
+            stage_seconds=_stages(watch) if clocked else {},
         )
+        clock = clock and (not clocked or bool(fresh.stage_seconds))
         lanes.append(fresh)
-        if grain > often.seconds:
+        if grain > often.seconds and not fresh.stage_seconds:
             fresh.keep(kernel, [first])
     for _ in range(often.most):
         for number, lane in enumerate(lanes):
@@ -177,16 +185,10 @@ def interleaved(
                 kernel = calibrate()
                 again = _again(lane.programs) if lane.programs else lane.run
                 lane.keep(kernel, [_both(again, simulate) for _ in range(lane.runs)])
-    clock = True  # until a run comes without one: an engine has it for all its stages or for none
     timings: list[Timing | Outcome] = []
     for number, lane in enumerate(lanes):
-        if lane.failed is not None:
-            timings.append(lane.failed)
-            continue
         begin(number)
-        timing = _timing(lane, simulate, clock, often.stages_up_to)
-        timings.append(timing)
-        clock = clock and (not _short(lane, often.stages_up_to) or bool(timing.stage_seconds))
+        timings.append(_timing(lane, simulate, often.stages_up_to) if lane.failed is None else lane.failed)
     return timings
 
 
@@ -196,17 +198,13 @@ def _undisturbed(seconds: Sequence[float]) -> float:
     return sum(faster) / len(faster)
 
 
-def _short(lane: _Lane, bound: float) -> bool:
-    return min(lane.seconds) <= bound
-
-
-def _timing(lane: _Lane, simulate: Simulate, clock: bool, bound: float) -> Timing:
-    short = _short(lane, bound)
+def _timing(lane: _Lane, simulate: Simulate, bound: float) -> Timing:
+    short = min(lane.seconds) <= bound
     return Timing(
         seconds=tuple(lane.seconds),
         runs_per_repeat=lane.runs,
         instructions=_instructions(lane.run, simulate) if short and can_count() else None,
-        stage_seconds=stage_seconds(lane.run, simulate) if short and clock else {},
+        stage_seconds=lane.stage_seconds if short else {},
         cpu_seconds=tuple(lane.cpu) if len(lane.cpu) == len(lane.seconds) else (),
         calibration=tuple(lane.kernel),
     )
@@ -227,6 +225,11 @@ def stage_seconds(run: Timed, simulate: Simulate) -> dict[str, float]:
     """Time by stage; empty for an engine that has no such clock."""
     watch = Stopwatch(simulate, {"time_stages": True})
     answer = ask(partial(run, watch))
-    if answer.outcome != "value" or not watch.results:
+    return _stages(watch) if answer.outcome == "value" else {}
+
+
+def _stages(watch: Stopwatch) -> dict[str, float]:
+    """Of its last simulation."""
+    if not watch.results:
         return {}
     return {stage: float(seconds) for stage, seconds in watch.results[0].stage_seconds.items()}

@@ -1,7 +1,7 @@
 """How a test's scene moves, recorded for the replay: quantised, bounded in size, beside its exact motion.
 
 The exact motion is the test's closed form where it has one, else the same engine with a sixteenth of the time
-step, and the page says which.
+step (less of it where that is many steps), and the page says which.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ MOST_BYTES = 120_000  # of one trajectory, compressed; halving the samples gets 
 MOST_ROWS, MOST_CONTACTS = 120, 120  # constraints and bodies whose violations and forces are traced
 MOST_POINTS = 60  # contact points whose friction cones are drawn
 TIME_LIMIT = 20.0  # s of wall time; what is there until then is shown
-FINER = 16
+FINER = (16, 8, 4, 2)
+MOST_FINE_STEPS = 120_000
 CODES = 65_534  # 65535 is no value
 Array = npt.NDArray[np.float64]
 
@@ -150,13 +151,14 @@ def _exact(example: Example, simulate: Simulate, seen: dict[str, Any], every: in
         seen["exact_position"] = places
         return "the exact solution"
     steps = (count - 1) * every
-    finer = ask(lambda: _run(simulate, example, example.scene, steps, every, FINER)).value
-    if finer is None or not finer.completed or len(finer.partial["position"]) != count:
+    finer = next((n for n in FINER if n * steps <= MOST_FINE_STEPS), FINER[-1])
+    fine = ask(lambda: _run(simulate, example, example.scene, steps, every, finer)).value
+    if fine is None or not fine.completed or len(fine.partial["position"]) != count:
         return ""
-    seen["exact_position"] = finer.partial["position"]
+    seen["exact_position"] = fine.partial["position"]
     if "orientation" in seen:
-        seen["exact_orientation"] = finer.partial["orientation"]
-    return f"a time step of h/{FINER}"
+        seen["exact_orientation"] = fine.partial["orientation"]
+    return f"a time step of h/{finer}"
 
 
 def _channels(seen: Mapping[str, Any], scene: Scene, bodies: int) -> list[Channel]:
