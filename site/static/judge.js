@@ -82,7 +82,7 @@ function stands(definition, after, red) {
   if (!after) { return red ? "fail" : "none"; }
   const own = standing(definition, after);
   if (!red) { return own; }
-  return own === "fail" || NO_VALUE.includes(after.outcome) || !Number.isFinite(after.value) ? "fail" : "watch";
+  return own === "fail" || own === "none" || NO_VALUE.includes(after.outcome) || !Number.isFinite(after.value) ? "fail" : "watch";
 }
 
 // --- two values ---
@@ -137,7 +137,9 @@ function judge(definition, before, after, how) {
   if (!how.sameEnvironment) { return verdict("not_comparable", "measured in another float environment"); }
   if (before.outcome === "not_supported" || after.outcome === "not_supported") {
     if (before.outcome === after.outcome) { return verdict("same", "still not supported"); }
-    return verdict("not_comparable", after.outcome === "not_supported" ? "no longer supported" + (after.failure ? `: ${after.failure}` : "") : "supported for the first time");
+    if (after.outcome !== "not_supported") { return verdict("not_comparable", "supported for the first time"); }
+    const words = "no longer supported" + (after.failure ? `: ${after.failure}` : "");
+    return NO_VALUE.includes(honest(before).outcome) ? verdict("not_comparable", words) : verdict("removed", words, { name: "no longer supported" });
   }
   before = honest(before);
   after = honest(after);

@@ -9,8 +9,9 @@ accepted.toml holds tables like
     why = "one sentence"
     until = 2027-01-31                                 # optional: after this day it is red again
 
-and, for a gate or a stability map that is not asked for any more, `removed = true` in place of the range. A value
-inside the range is not red until that day and is the new level. What is not finite is never accepted.
+and, for a gate or a stability map that is not asked for any more or a value that the engine no longer supports,
+`removed = true` in place of the range. A value inside the range is not red until that day and is the new level. What
+is not finite is never accepted.
 
 A table [[expected]] without a range (series, who, why, until) names what is known to fail: whatever it gives is not
 red until that day, the level from before stays the one to come back to, and once it holds the entry is reported.
@@ -47,7 +48,7 @@ class Accepted:
     who: str
     why: str
     until: date | None = None
-    removed: bool = False  # that the series is not asked for any more, instead of a range
+    removed: bool = False  # that there are no values any more, instead of a range
     expected: bool = False  # that it fails, whatever its value
 
     def names(self, key: str) -> bool:

@@ -24,7 +24,7 @@ from msgspec.structs import replace
 from spook_tracker.tracker.document.run_document import Point, SeriesDefinition
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.judged import Judged, commit_of, is_release, night_of, red_class, same_commit
-from spook_tracker.tracker.judge.standing import standing
+from spook_tracker.tracker.judge.standing import NOT_SUPPORTED, standing
 from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict, judge, same_bits
 from spook_tracker.tracker.judge.vocabulary import Class
 
@@ -32,6 +32,7 @@ LONG_DRIFT = 5.0  # tolerances a series may lose over many releases before that 
 IDENTICAL = Verdict(word="identical", sentence="the same bits", ulps=0)
 UNASKED = Verdict(word="not_comparable", sentence="not supported by this engine")
 BROKEN: tuple[Class, ...] = ("fail", "watch")  # what a night is on its own, whatever was before
+NOT_GOOD: tuple[Class, ...] = (*BROKEN, "none")
 
 
 class Series(msgspec.Struct, frozen=True):
@@ -65,9 +66,11 @@ class Seen(msgspec.Struct, frozen=True):
     against: Point | None
 
 
-def judge_values(series: Series, history: Sequence[Point]) -> Iterator[Judged]:
-    """Every night's verdict, oldest first."""
+def judge_values(series: Series, history: Sequence[Point], before: Judged | None = None) -> Iterator[Judged]:
+    """Every night's verdict, oldest first; `before` is the last night of another definition of the test."""
     state = KnownValue()
+    if before is not None and (level := _last_answer(before)) is not None:
+        state = KnownValue("held", level, level, level)
     for night in history:
         state, judged = step(series, state, night)
         yield judged
@@ -81,12 +84,14 @@ def step(series: Series, state: KnownValue, night: Point) -> tuple[KnownValue, J
         state = _given_back(state, state.lent[0])
     own = standing(series.definition, night.sample)
     if own == "none":
-        return _unasked(state, night)
-    if state.level is None or not _comparable(state.level, night):
+        if not _was_asked(state):
+            return _unasked(state, night)
+        seen = Seen(night, own, *_against_what_holds(series.definition, state, night))
+    elif state.level is None or not _comparable(state.level, night):
         state, seen = _first(state, night, own)
     else:
         seen = _seen(series.definition, state, night, own)
-    if not (seen.verdict.red or own in BROKEN):
+    if not (seen.verdict.red or own in NOT_GOOD):
         return _holds(state, seen)
     taken = _taken(series, night)
     if taken is None:
@@ -113,7 +118,7 @@ def _given_back(state: KnownValue, level: Point) -> KnownValue:
 
 
 def _unasked(state: KnownValue, night: Point) -> tuple[KnownValue, Judged]:
-    """An engine that cannot be asked: nothing became of the level that holds."""
+    """An engine that never could be asked, or was accepted to be so no more: nothing became of the level that holds."""
     name = "held" if state.name == "calm" else state.name
     return replace(state, name=name), Judged(night=night, verdict=UNASKED, state="unjudged", stands="none")
 
@@ -217,8 +222,22 @@ def _accepts(state: KnownValue, seen: Seen, taken: Accepted) -> tuple[KnownValue
 
 def _taken(series: Series, night: Point) -> Accepted | None:
     """The entry that takes a bad night, if there is one."""
-    removed = night.sample.outcome == "missing" and night.sample.failure.startswith("removed")
+    removed = night.sample.outcome == NOT_SUPPORTED or (
+        night.sample.outcome == "missing" and night.sample.failure.startswith("removed")
+    )
     return acceptance(series.accepted, series.key, night.value, night_of(night.run), removed)
+
+
+def _was_asked(state: KnownValue) -> bool:
+    """Whether the engine could be asked before: that it cannot any more is a loss, and mends nothing that is red."""
+    return state.level is not None and (state.red is not None or state.level.sample.outcome != NOT_SUPPORTED)
+
+
+def _last_answer(before: Judged) -> Point | None:
+    """The last night on which the engine could be asked, unless it was accepted that it cannot."""
+    if before.night.sample.outcome != NOT_SUPPORTED:
+        return before.night
+    return before.against if before.red else None
 
 
 def _mended(state: KnownValue) -> frozenset[float]:

@@ -14,7 +14,7 @@ from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import Point, Run, Sample
 from spook_tracker.tracker.judge.segments import Segment
 from spook_tracker.tracker.judge.slower import Usual
-from spook_tracker.tracker.judge.standing import NO_VALUE
+from spook_tracker.tracker.judge.standing import NO_NUMBER
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import Class, State
 
@@ -114,7 +114,7 @@ def of_one_lineage(runs: Iterable[Run]) -> bool:
 def red_class(own: Class, sample: Sample) -> Class:
     """A limit broken or no value is FAIL; what only became worse than it was is WATCH."""
     return (
-        "fail" if own == "fail" or sample.outcome in NO_VALUE or not math.isfinite(sample.value) else "watch"
+        "fail" if own == "fail" or sample.outcome in NO_NUMBER or not math.isfinite(sample.value) else "watch"
     )
 
 

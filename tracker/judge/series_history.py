@@ -30,7 +30,7 @@ from spook_tracker.tracker.judge.lent import walk_with
 from spook_tracker.tracker.judge.noisy import Noisy
 from spook_tracker.tracker.judge.run_times import judged_and_segments
 from spook_tracker.tracker.judge.slower import by_outcome, only_followed
-from spook_tracker.tracker.judge.standing import standing
+from spook_tracker.tracker.judge.standing import NOT_SUPPORTED, standing
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import Class, with_recoveries
 from spook_tracker.tracker.judge.work import is_read_off
@@ -95,12 +95,24 @@ def judge_history(
         return list(judge_values(series, history))
     found: dict[int, Judged] = {}
     for places in lanes:
-        told = judge_values(series, [history[i] for i in places])
+        before = _under_another_definition(history, found, places[0])
+        told = judge_values(series, [history[i] for i in places], before)
         found |= zip(places, told, strict=True)
         if (start := places[0]) > 0 and found[start].verdict.word == "new":
             why = Verdict(word="not_comparable", sentence=why_not(history[start - 1], history[start]))
             found[start] = msgspec.structs.replace(found[start], verdict=why)
     return [found[place] for place in range(len(history))]
+
+
+def _under_another_definition(
+    history: Sequence[Point], found: Mapping[int, Judged], start: int
+) -> Judged | None:
+    """The night before one that cannot be asked: an engine does not get rid of a question by another definition."""
+    if history[start].sample.outcome != NOT_SUPPORTED:
+        return None
+    floats = history[start].run.machine.float_environment
+    before = (i for i in reversed(range(start)) if history[i].run.machine.float_environment == floats)
+    return found.get(next(before, -1))
 
 
 def lanes_of(history: Sequence[Point], lane: Callable[[Point], Hashable]) -> list[list[int]]:

@@ -26,7 +26,7 @@ from spook_tracker.tracker.document.run_document import (
     Sensitivity,
     SeriesDefinition,
 )
-from spook_tracker.tracker.judge.standing import honest
+from spook_tracker.tracker.judge.standing import HAVE_VALUES, honest
 from spook_tracker.tracker.judge.vocabulary import CALLED_WORSE, RED, Word
 
 RANK: dict[OutcomeClass, int] = {
@@ -114,11 +114,14 @@ def _incomparable(why: str) -> Verdict:
 
 
 def _unasked(before: Sample, after: Sample) -> Verdict:
-    """An engine that cannot be asked is neither better nor worse."""
+    """An engine that cannot be asked is neither better nor worse; one that gave a value and gives none is."""
     if before.outcome == after.outcome:
         return Verdict(word="same", sentence="still not supported")
     if after.outcome == "not_supported":
-        return _incomparable("no longer supported" + (f": {after.failure}" if after.failure else ""))
+        words = "no longer supported" + (f": {after.failure}" if after.failure else "")
+        if honest(before).outcome in HAVE_VALUES:
+            return Verdict(word="removed", sentence=words, name="no longer supported")
+        return _incomparable(words)
     return _incomparable("supported for the first time")
 
 
