@@ -68,7 +68,6 @@ def check_rigid(scene: Scene, method: Method, touching: bool) -> None:
     composed = method.composition != "none"
     asked = [f"composition {method.composition!r}"] if composed else []
     asked += ["half_step_velocities"] if method.half_step_velocities else []
-    asked += [f"corrections={method.corrections}"] if method.corrections else []
     asked += ["string_stiffness"] if method.string_stiffness else []
     if not asked:
         return

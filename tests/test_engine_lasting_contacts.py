@@ -10,8 +10,6 @@ from scipy.integrate import solve_ivp
 
 from spook_tracker.engine import (
     PLAIN,
-    WORLD,
-    Ball,
     Box,
     Final,
     Hinge,
@@ -207,7 +205,6 @@ def test_what_rests_rests_and_what_falls_lands() -> None:
     ("method", "why"),
     [
         (Method(half_step_velocities=True, solver="iterative"), "needs the direct solver"),
-        (Method(half_step_velocities=True, corrections=1), "corrections=1 needs a smooth scene"),
         (Method(composition="order4"), "half_step_velocities, of order 2 while contacts last"),
     ],
 )
@@ -215,19 +212,6 @@ def test_what_no_higher_order_can_carry_is_refused_by_name(method: Method, why: 
     body = RigidBody(name="body", mass=1.0, shape=Sphere(RADIUS), position=(0.0, 0.0, 2.0))
     with pytest.raises(MethodError, match=why):
         compile(Scene(bodies=(ground(), body)), time_step=0.01, method=method)
-
-
-def test_a_curved_joint_beside_what_may_touch_and_does_not_yet_is_refused_as_well() -> None:
-    """The first step, in which nothing touches, is that of the joint alone: it used to end the process."""
-    held = RigidBody(name="held", mass=1.0, shape=Sphere(RADIUS), position=(1.0, 0.0, 0.0))
-    other = RigidBody(name="other", mass=1.0, shape=Sphere(RADIUS), position=(9.0, 0.0, 0.0))
-    scene = Scene(
-        bodies=(held, other), constraints=(Ball(name="ball", between=(WORLD, "held"), at=(0.0, 0.0, 0.0)),)
-    )
-
-    for method in (Method(half_step_velocities=True, corrections=1), Method(corrections=2)):
-        with pytest.raises(MethodError, match="needs a smooth scene"):
-            compile(scene, time_step=0.01, method=method)
 
 
 def test_a_block_of_steps_taken_back_behind_a_look_ahead_goes_the_same_way_again() -> None:

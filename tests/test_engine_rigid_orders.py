@@ -291,7 +291,7 @@ def box(name: str, x: float) -> RigidBody:
     return RigidBody(name=name, mass=1.0, shape=Box((1.0, 1.0, 1.0)), position=(x, 0.0, 0.0))
 
 
-@pytest.mark.parametrize("method", [HALF, Method(corrections=1), Method(composition="order6")])
+@pytest.mark.parametrize("method", [HALF, Method(composition="order6")])
 def test_what_a_method_cannot_carry_is_refused_by_name(method: Method) -> None:
     hinge = Hinge(name="knee", between=(WORLD, "a"), axis=(0.0, 0.0, 1.0), limit=Limit(lower=-1.0, upper=1.0))
 

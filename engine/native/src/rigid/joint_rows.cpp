@@ -197,6 +197,38 @@ void joint_bias(const JointConstants& joint, const BodyState& first, const BodyS
     *bias++ = angle_bias(axes[0], carried(second, joint.axes[1]));
 }
 
+void joint_curvature(const JointConstants& joint, const BodyState& first, const BodyState& second,
+                     const BodyState& first_there, const BodyState& second_there, double h,
+                     double* out) noexcept {
+    JointRows rows{};
+    double spare[2][36], there[6];
+    rows.first = spare[0], rows.second = spare[1];
+    Vec3 first_reach, second_reach;
+    assemble_joint(joint, first, second, rows, first_reach, second_reach);
+    joint_violation(joint, first_there, second_there, there);
+    for (int k = 0; k < joint.rows; ++k) out[k] = there[k] - rows.violation[k] - h * rows.rate[k];
+    if (joint.kind == JointKind::distance) return;
+    const JointHolds holds = joint.holds;
+    const Vec3 spins =
+        cross(second.angular_velocity, second_reach) - cross(first.angular_velocity, first_reach);
+    Vec3 slide = second.velocity - first.velocity + spins;  // along what no row holds
+    Vec3 gap = second.displacement - first.displacement + second.turn_less_one * joint.second_arm -
+               first.turn_less_one * joint.first_arm;
+    const Vec3 bend =
+        (second_there.turn_less_one * joint.second_arm - second.turn_less_one * joint.second_arm) -
+        (first_there.turn_less_one * joint.first_arm - first.turn_less_one * joint.first_arm);
+    for (int k = holds.linear_first; k < holds.linear_end; ++k) {
+        const Vec3 axis = carried(first, joint.axes[k]);
+        slide -= dot(axis, slide) * axis;
+    }
+    // The gap goes along with the first body, and slides on.
+    const Quat turned = first_there.turn * conjugate(first.turn);
+    const Vec3 ahead = gap + h * slide;
+    const Vec3 way = ahead + rotation_less_one(turned) * ahead - gap;
+    for (int k = holds.linear_first; k < holds.linear_end; ++k)
+        *out++ = dot(carried(first, joint.axes[k]), bend - h * spins - way);
+}
+
 double axial_bias(const JointConstants& joint, const BodyState& first, const BodyState& second) noexcept {
     const Vec3 w1 = first.angular_velocity, w2 = second.angular_velocity;
     const Vec3 axis = carried(first, joint.axes[0]), turning = cross(w1, axis);

@@ -49,7 +49,13 @@ void joint_violation(const JointConstants& joint, const BodyState& first, const 
 void joint_bias(const JointConstants& joint, const BodyState& first, const BodyState& second,
                 double* bias) noexcept;
 
-/// The same for the rate of the free coordinate.
+/// Per row g(there) − g − h G v: what a linear row leaves out of the way over h, or back over −h, on which the ends turn from
+/// where they are to `there`. Centres go as the joint lets them, not as their velocities point now, which turn as well.
+void joint_curvature(const JointConstants& joint, const BodyState& first, const BodyState& second,
+                     const BodyState& first_there, const BodyState& second_there, double h,
+                     double* out) noexcept;
+
+/// What bias says for the rate of the free coordinate.
 double axial_bias(const JointConstants& joint, const BodyState& first, const BodyState& second) noexcept;
 
 /// The free coordinate of a hinge (angle within ±π) or prismatic joint [rad or m], its rate and one Jacobian row.

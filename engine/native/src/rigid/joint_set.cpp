@@ -244,6 +244,15 @@ void JointSet::bias(int index, std::span<const BodyState> bodies, double* out) c
     std::fill_n(out, block.size, axial_bias(joint.constants, first, second));
 }
 
+void JointSet::curvature(int index, std::span<const BodyState> bodies, std::span<const BodyState> there,
+                         double h, double* out) const noexcept {
+    const Joint& joint = joints_[index];
+    if (joint.general >= 0 || joint.tyre >= 0)
+        return static_cast<void>(std::fill_n(out, joint.constants.rows, 0.0));
+    joint_curvature(joint.constants, body(joint.first, bodies), body(joint.second, bodies),
+                    body(joint.first, there), body(joint.second, there), h, out);
+}
+
 void JointSet::violation(int index, std::span<const BodyState> bodies, double* out) const noexcept {
     const Joint& joint = joints_[index];
     if (joint.general >= 0) {

@@ -92,6 +92,10 @@ public:
     /// Second time derivatives of a block's rows when both ends go on with constant velocities.
     void bias(int block, std::span<const BodyState> bodies, double* out) const noexcept;
 
+    /// joint_curvature() of a joint's own rows; zero for rows over more than two bodies, and for tyres.
+    void curvature(int joint, std::span<const BodyState> bodies, std::span<const BodyState> there, double h,
+                   double* out) const noexcept;
+
     /// Violations of a joint's own rows at the given state [m or rad].
     void violation(int joint, std::span<const BodyState> bodies, double* out) const noexcept;
     /// How far the rows of a block are from where they hold; of limits and wires, how far they are overstepped; zero

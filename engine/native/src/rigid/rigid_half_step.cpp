@@ -72,7 +72,7 @@ void RigidSystem::start_half_step() {
             }
         }
     }
-    if (method_.corrections > 0 && solver_ == RigidSolver::block) {
+    if (method_.corrections > 0 && solver_ == RigidSolver::block && !curved_) {
         move_all(-h_);
         violations_at(trial_, live_.last_violation.data());
     }
@@ -138,6 +138,57 @@ double RigidSystem::row_speed(int block, int row, bool solved) const {
     return sum;
 }
 
+/// The velocities of a solve, for the k-th of the constrained bodies.
+void RigidSystem::take_solution(int k, BodyState& s) const noexcept {
+    const BodyConstants& body = constants_[constrained_[k]];
+    const double* x = mixed_values_
+                          ? mixed_.velocity[k].data()
+                          : solution_.data() + matrix_.offset(static_cast<int>(joints_.blocks().size()) + k);
+    s.velocity = {x[0], x[1], x[2]};
+    if (body.particle) return;
+    s.angular_velocity = {x[3], x[4], x[5]};
+    s.angular_momentum = s.inertia * s.angular_velocity;
+}
+
+/// bend_: the same curvature where steps keep no violations and are solved more than once: beside contacts and rows with bounds.
+/// c₋ and, before the first solve, c₊ are those of the velocities at hand, so that what spins steadily is right at once;
+/// then c₊ is that of the solution.
+void RigidSystem::curve_rows(bool solved) {
+    from_.resize(live_.bodies.size());
+    trial_.resize(live_.bodies.size());
+    behind_.resize(live_.bodies.size());
+    const auto look = [this, solved](int i) {
+        from_[i] = live_.bodies[i];
+        if (solved && solver_index_[i] >= 0) take_solution(solver_index_[i], from_[i]);
+        trial_[i] = from_[i];
+        move(constants_[i], h_, trial_[i]);
+        if (solved) return;
+        behind_[i] = live_.bodies[i];
+        move(constants_[i], -h_, behind_[i]);
+    };
+    for (int i : constrained_)
+        if (!asleep(i)) look(i);
+    for (int i : driven_) look(i);
+    bend_.resize(rows_);
+    bent_.resize(rows_);
+    std::size_t row = 0;
+    for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k) {
+        const JointBlock& block = joints_.blocks()[k];
+        double ahead[6] = {}, back[6] = {};
+        if (!block.axial && !rests(k)) {
+            joints_.curvature(block.joint, from_, trial_, h_, ahead);
+            if (!solved) joints_.curvature(block.joint, live_.bodies, behind_, -h_, back);
+        }
+        for (int i = 0; i < block.size; ++i, ++row) {
+            const JointSet::RowGain gain = joints_.gain(k, i);
+            const double cap = method_.correction_cap * gain.extent;
+            if (!solved) bent_[row] = gain.violation * 0.25 * std::clamp(back[i], -cap, cap);
+            bend_[row] =
+                bent_[row] + gain.violation * (0.25 + gain.relaxation) * std::clamp(ahead[i], -cap, cap);
+        }
+    }
+}
+
 /// The averaged law ¼(g₊ + 2g + g₋) keeps its curvature in the right side: rhs −= (4/h) Ups [(c₊ + c₋)/4 + θ c₊].
 /// c₋, from where the rows came, is known before the first solve.
 void RigidSystem::bend_rows_back() {
@@ -157,6 +208,15 @@ void RigidSystem::bend_rows_back() {
 
 /// c₊ is where the solution, then the corrected one, would take the rows.
 void RigidSystem::correct_curvature() {
+    if (curved_) {
+        for (int round = 0; round < method_.corrections; ++round) {
+            curve_rows(true);
+            for (std::size_t row = 0; row < static_cast<std::size_t>(rows_); ++row)
+                right_[row] = first_right_[row] - bend_[row];
+            solve_again();
+        }
+        return;
+    }
     const int row_blocks = static_cast<int>(joints_.blocks().size());
     std::vector<double>& ahead = bias_;
     for (int round = 0; round < method_.corrections; ++round) {

@@ -1,6 +1,7 @@
 // The rows of a step, solved: one factorisation when all are bilateral, else with bounds and contacts.
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "rigid/rigid_system.hpp"
 
@@ -166,7 +167,13 @@ void RigidSystem::solve_block() {
     assemble_blocks();
     fill_inertias();
     fill_block_momenta();
-    if (method_.corrections > 0) bend_rows_back();
+    if (curved_) {
+        first_right_.assign(right_.begin(), right_.begin() + static_cast<std::ptrdiff_t>(rows_));
+        curve_rows(false);
+        for (std::size_t row = 0; row < static_cast<std::size_t>(rows_); ++row) right_[row] -= bend_[row];
+    } else if (method_.corrections > 0) {
+        bend_rows_back();
+    }
     if (clock_) clock_->mark(Stage::assemble_rows);
 
     if (!factor_and_solve()) {
@@ -290,12 +297,16 @@ void RigidSystem::fill_further(int block, RowBlock& rows, BlockRight& numbers,
     rows.further = beyond;
 }
 
-void RigidSystem::fill_rows() {
+/// `solved`: whether the curvature of the rows is that of a solution, not of the velocities at hand.
+void RigidSystem::fill_rows(bool solved) {
+    if (curved_) curve_rows(solved);
     const auto blocks = joints_.blocks();
     mixed_.rows.resize(blocks.size());
     further_.resize(blocks.size());
+    std::size_t first_row = 0;
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         RowBlock& rows = mixed_.rows[k];
+        const std::size_t at = std::exchange(first_row, first_row + static_cast<std::size_t>(blocks[k].size));
         if (rests(static_cast<int>(k))) {
             rows.right = rows.lower = rows.upper = rows.multiplier = Vec6{};
             rows.stop = {};
@@ -315,6 +326,7 @@ void RigidSystem::fill_rows() {
             for (int i = 0; i < rows.size; ++i) numbers.right[i] -= dot(jacobian[i], given);
             if (const int i = numbers.stop.row; i >= 0) numbers.stop.given += dot(jacobian[i], given);
         }
+        for (int i = 0; i < rows.size; ++i) numbers.right[i] -= bend(at + static_cast<std::size_t>(i));
         rows.right = numbers.right;
         rows.lower = numbers.lower;
         rows.upper = numbers.upper;

@@ -183,7 +183,10 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
                     composed ? "iteration keeps the curvature of the rows to rounding"
                              : std::to_string(method.corrections) +
                                    " extra back-substitutions keep the curvature of the rows",
-                    is.joints ? "the method linearises the rows" : "no joints, so nothing is curved");
+                    is.joints
+                        ? "the method linearises the rows, so that what spins off its joint slows down; "
+                          "corrections=2 keep its energy"
+                        : "no joints, so nothing is curved");
             case Stage::half_step:
                 return choose_if(composed || method.half_step_velocities,
                                  composed ? "a symmetric composition of half-step steps, order" +

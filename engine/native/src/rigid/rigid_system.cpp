@@ -101,6 +101,8 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     composed_ = method_.composition > 2;
     half_step_ = stages_.runs(Stage::half_step) && !composed_;
     stiff_ = stages_.runs(Stage::string_stiffness) && solver_ == RigidSolver::block;
+    curved_ = method_.corrections > 0 && !composed_ && rows_ > 0 &&
+              (solver_ != RigidSolver::block || (fresh_contacts_ && fresh_contacts_->possible()));
     if (solver_ == RigidSolver::block && !composed_ && !half_step_ && !stiff_ && method_.corrections == 0 &&
         !(method_.sleep_speed > 0.0))
         locked_.analyse(constants_, joints_, constrained_);

@@ -193,6 +193,9 @@ private:
     void move_all(double h);
     void violations_at(const LargeArray<BodyState>& at, double* out) const;
     double row_speed(int block, int row, bool solved) const;
+    void curve_rows(bool solved);
+    void take_solution(int k, BodyState& s) const noexcept;
+    double bend(std::size_t row) const noexcept { return bend_.empty() ? 0.0 : bend_[row]; }
     void bend_rows_back();
     void correct_curvature();
 
@@ -258,7 +261,7 @@ private:
     bool meet_late();
     void fill_masses();
     void fill_momenta(bool forces);
-    void fill_rows();
+    void fill_rows(bool solved = false);
     static RowBlock other_end(const RowBlock& block);
     bool find_other_ends();
     bool solve_joints();
@@ -414,7 +417,11 @@ private:
     double residual_ = 0.0, residual_before_waking_ = 0.0;  // largest an iterative solve stopped at, m/s
     // Beyond plain SPOOK; all per row of matrix_ unless said otherwise.
     bool composed_ = false, half_step_ = false, stiff_ = false, velocities_seen_ = false;
-    LargeArray<BodyState> trial_;  // per body
+    LargeArray<BodyState> trial_;          // per body
+    bool curved_ = false;                  // whether curve_rows() does the corrections
+    LargeArray<BodyState> from_, behind_;  // per body
+    std::vector<double> bent_,
+        bend_;  // what curve_rows() takes from the right sides: for the way here, and in all
     std::vector<double> first_right_, violation_, bias_, multiplier_;
     LockedTree locked_;          // of plain steps in which all joints are locks that make trees; else empty
     bool undelivered_ = false;   // its multipliers are not in joints_.states yet

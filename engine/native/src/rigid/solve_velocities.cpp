@@ -37,15 +37,16 @@ void RigidSystem::solve_mixed(bool touching) {
     };
     bool finite = true;
     scratch_.other_ends.clear();
+    int corrected = 0;
+    const auto to_correct = [&] { return curved_ && corrected++ < method_.corrections; };
     do {
-        fill_rows();
-        while (impact_needed()) impact();
+        fill_rows(corrected > 0);
+        while (impact_needed()) impact(), corrected = 0;
         fill_momenta(true);
         if (clock_) clock_->mark(Stage::assemble_rows);
         finite = touching ? contacts_->solve(mixed_, scratch_.velocities) : solve_joints();
-    } while (finite &&
-             (impact_needed() || ((!touching || contacts_->ends_passed()) &&
-                                  find_other_ends())));  // the solve may find some that is to come first
+    } while (finite && (impact_needed() || ((!touching || contacts_->ends_passed()) && find_other_ends()) ||
+                        to_correct()));  // the solve may find some that is to come first
     if (touching) judge_contacts();
     else if (solver_ == RigidSolver::iterative) judge_pgs();
     if (!finite) {
