@@ -1,13 +1,14 @@
 """What can be said of a model file without any engine: its files, their hash, its bodies, its time step.
 
-Only XML is read, and with care, for the file may come from anywhere: no entities, bounded size, depth and number of
-files, and nothing outside the folder the model belongs to. Includes, attached models, meshes, height fields and
+Only XML is read, and with care, for the file may come from anywhere: no entities, bounded size, depth, copies and number
+of files, and nothing outside the folder the model belongs to. Includes, attached models, meshes, height fields and
 textures are followed; together they are the model, and their hash is its definition.
 """
 
 from __future__ import annotations
 
 import hashlib
+import math
 import os
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -21,6 +22,9 @@ MOST_BYTES = 64_000_000  # of one file; the largest mesh of the robots people sh
 MOST_XML = 16_000_000  # bytes of a file that is read as text: elements take ten times their text in memory
 MOST_FILES = 3_000
 DEEPEST = 200  # elements within elements; engines read models recursively
+MOST_COPIES = 10_000  # that one element makes: engines write out each of them before they look at the next
+COPYING = ("replicate", "composite", "flexcomp")  # elements with a count, or a product of counts
+POINTER = b"version https://git-lfs"  # what a clone without Git LFS has in place of a file
 MOST_WATCHED = 8
 TIME_STEP = 0.002  # s, of MJCF that names none; also what MuJoCo gives a URDF
 GRAVITY = (0.0, 0.0, -9.81)  # m/s², of a file that names none
@@ -80,7 +84,7 @@ class _Body:
 
 def folder_of(path: Path) -> Path:
     """The folder a model belongs to: its repository, installed package or ROS package; else the one it lies in."""
-    here = path.resolve().parent
+    here = _resolved(path).parent
     for folder in (here, *here.parents):
         if folder.parent.name in INSTALLED or any((folder / name).exists() for name in ROOTS):
             return folder
@@ -114,7 +118,7 @@ class _Reader:
 
     def inside(self, path: Path, named_in: Path) -> Path:
         """The file itself, if it lies inside the folder."""
-        found = path.resolve()
+        found = _resolved(path)
         if not found.is_relative_to(self.folder):
             raise ModelError(
                 f'{named_in} names {path}, which lies outside {self.folder}; say folder = "…" in its [[model]] '
@@ -133,6 +137,11 @@ class _Reader:
             raise ModelError(
                 f"{path} has {size / 1e6:.0f} MB; a file of a model may have {most / 1e6:.0f} MB"
             )
+        with found.open("rb") as start:
+            if start.read(len(POINTER)) == POINTER:
+                raise ModelError(
+                    f"{path} is a pointer of Git LFS in place of the file itself; fetch it with: git lfs pull"
+                )
         self.files.setdefault(found)
         if len(self.files) > MOST_FILES:
             raise ModelError(f"{self.path} consists of more than {MOST_FILES} files")
@@ -140,8 +149,14 @@ class _Reader:
 
     def parsed(self, path: Path, named_in: Path | None = None) -> ElementTree.Element:
         """The XML of one file of the model."""
-        text = self.taken(path, named_in or path, MOST_XML).read_bytes()
-        if b"<!ENTITY" in text:
+        content = self.taken(path, named_in or path, MOST_XML).read_bytes()
+        try:  # whatever it declares: engines take bytes for UTF-8
+            text = content.decode("utf-8-sig")
+        except UnicodeDecodeError:
+            text = "\0"
+        if "\0" in text:  # a parser would take them for UTF-16, in which nothing below is found
+            raise ModelError(f"{path} is no text in UTF-8, which engines read; save it in that encoding")
+        if "<!ENTITY" in text:
             raise ModelError(
                 f"{path} declares XML entities, which no model needs; write out what they stand for"
             )
@@ -151,6 +166,12 @@ class _Reader:
             raise ModelError(f"{path} is no XML: {error}") from None
         level, depth = [root], 0
         while level:
+            if greedy := next(
+                (one for one in level if one.tag in COPYING and _copies(one) > MOST_COPIES), None
+            ):
+                raise ModelError(
+                    f"{path}: <{greedy.tag}> makes {_copies(greedy):.3g} copies; it may make {MOST_COPIES}"
+                )
             level, depth = [child for element in level for child in element], depth + 1
             if depth > DEEPEST:
                 raise ModelError(f"{path} has elements nested deeper than {DEEPEST}")
@@ -339,6 +360,22 @@ class _Reader:
             total.update(f"{_beside(file, main)}\0".encode())
             total.update(hashlib.sha256(file.read_bytes()).digest())
         return total.hexdigest()[:16]
+
+
+def _resolved(path: Path) -> Path:
+    """Where a path leads to."""
+    try:
+        return path.resolve()
+    except (RuntimeError, OSError):  # links that lead to each other; the first until Python 3.13
+        raise ModelError(f"{path} is a link that leads nowhere") from None
+
+
+def _copies(element: ElementTree.Element) -> float:
+    """What its counts ask for; what is no number is left to the engine."""
+    try:
+        return math.prod(map(float, element.get("count", "1").split()))
+    except ValueError:
+        return 1.0
 
 
 def _beside(file: Path, main: Path) -> str:

@@ -93,9 +93,11 @@ BOMB = '<!DOCTYPE m [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><mujoco><worldbody
     [
         ("<mujoco", "is no XML"),
         ("", "is no XML"),
-        ("\0\1\2", "is no XML"),
+        ("\0\1\2", "no text in UTF-8"),
         (BOMB, "declares XML entities"),
         (_nested(DEEPEST + 1), "nested deeper"),
+        ('<mujoco><worldbody><replicate count="1000000000"><body/></replicate></worldbody></mujoco>', "makes 1e\\+09 copies"),
+        ("version https://git-lfs.github.com/spec/v1", "pointer of Git LFS"),
         ("<html/>", "begins with <html>"),
         ("<mujocoinclude/>", "no model by itself"),
         ("<mujoco><asset/></mujoco>", "part for inclusion"),
@@ -132,6 +134,31 @@ def test_what_cannot_be_read_is_one_sentence_that_names_the_file(
         read(file)
 
     assert "\n" not in str(raised.value) and "robot.xml" in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("encoding", "content"),
+    [("utf-16", BOMB), ("utf-16-le", BOMB), ("iso-8859-1", CART.replace('"tip"', '"Knöchel"'))],
+)
+def test_an_encoding_that_engines_do_not_read_is_refused(cart: Path, encoding: str, content: str) -> None:
+    cart.write_bytes(f'<?xml version="1.0" encoding="{encoding}"?>{content}'.encode(encoding))
+
+    with pytest.raises(ModelError, match=r"no text in UTF-8"):
+        read(cart)
+
+
+def test_a_byte_order_mark_changes_nothing_but_the_hash(cart: Path) -> None:
+    plain = read(cart)
+    cart.write_bytes(b"\xef\xbb\xbf" + cart.read_bytes())
+
+    assert read(cart).watched == plain.watched
+
+
+def test_links_in_a_circle_lead_nowhere(tmp_path: Path) -> None:
+    (tmp_path / "robot.xml").symlink_to("robot.xml")
+
+    with pytest.raises(ModelError, match=r"leads nowhere|is no file"):
+        read(tmp_path / "robot.xml")
 
 
 def test_a_link_out_of_the_folder_is_outside(tmp_path: Path) -> None:

@@ -35,7 +35,7 @@ def run_model(run: ModelRun, time_step: float, duration: float, time_limit: floa
     began = time.perf_counter()
     try:
         first = load(run)
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, RuntimeError) as error:
         raise NotSupported(f"mujoco refuses {Path(run.model.path).name}: {_line(error)}") from None
     loads = [time.perf_counter() - began]
     if run.timed:

@@ -64,7 +64,7 @@ def compiled(run: ModelRun) -> Any:
     mujoco.set_mju_user_warning(lambda _: None)
     try:
         return load(run)
-    except (ValueError, OSError) as error:
+    except (ValueError, OSError, RuntimeError) as error:
         said = " ".join(str(error).split())[:240]
         raise NotSupported(
             f"spook reads by MuJoCo's parser, which refuses {Path(run.model.path).name}: {said}"

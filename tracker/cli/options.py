@@ -61,9 +61,13 @@ MODELS = "model files named on the command line"
 
 def _model(context: click.Context, option: click.Parameter, files: tuple[str, ...]) -> None:
     """A model file is a catalogue of one test; `_catalogue`, which is read after this, adds it."""
+    from spook_tracker.tracker.measure.model_files import is_model
+
     for file in files:
         if "," in file:
             raise click.BadParameter(f"{file!r}: a comma parts catalogues; give the file another name")
+        if not is_model(file):
+            raise click.BadParameter(f"{file!r} is no model file: it ends in .xml, .mjcf, .urdf or .sdf")
     context.meta[MODELS] = files
 
 
@@ -73,11 +77,6 @@ def _catalogue(context: click.Context, option: click.Parameter, names: str) -> s
     models = context.meta.get(MODELS, ())
     if not models:
         return names
-    from spook_tracker.tracker.measure.model_files import is_model
-
-    for file in models:
-        if not is_model(file):
-            raise click.BadParameter(f"{file!r} is no model file: it ends in .xml, .mjcf, .urdf or .sdf")
     named = context.get_parameter_source(str(option.name)) is click.core.ParameterSource.COMMANDLINE
     return ",".join([names] * named + [*models])
 
