@@ -68,30 +68,37 @@ def beside_run_times(changes: Sequence[Change], before: Samples, after: Samples)
         if change.role == EXPLAINING and old is not None and new is not None and old != new:
             words = f"{_name(change.metric)} {old:.6g} → {new:.6g}"
             why.setdefault((change.test, change.configuration), []).append(words)
+    counted = _instructions(before, after)
     told = []
     for change in changes:
         if change.kind in TIMES and change.role != EXPLAINING:
-            counted = _instructions(change, before, after)
-            if parts := [*counted, *sorted(why.get((change.test, change.configuration), ()))]:
+            rungs = counted.get(
+                (change.test, change.configuration, change.metric.removesuffix(":run-time")), []
+            )
+            if parts := [*rungs, *sorted(why.get((change.test, change.configuration), ()))]:
                 change = msgspec.structs.replace(change, sentence=f"{change.sentence}; {', '.join(parts)}")
         told.append(change)
     return told
 
 
-def _instructions(change: Change, before: Samples, after: Samples) -> list[str]:
-    """Retired instructions of a ladder's rungs on one side against the other, where both sides counted them."""
-    metric = change.metric.removesuffix(":run-time")
-    ratios = []
+Place = tuple[str, str, str]  # test, configuration and metric of a ladder
+
+
+def _instructions(before: Samples, after: Samples) -> Mapping[Place, list[str]]:
+    """Retired instructions of every ladder's rungs, after against before, where both counted them."""
+    ratios: dict[Place, list[float]] = {}
     for key, (definition, sample) in after.items():
-        place = (definition.test, definition.configuration, definition.metric)
-        if place == (change.test, change.configuration, metric) and key in before:
-            old, new = before[key][1].timing, sample.timing
-            if old and new and old.instructions and new.instructions:
-                ratios.append(new.instructions / old.instructions)
-    if not ratios:
-        return []
-    mean = geometric_mean(ratios)
-    return [f"instructions {100.0 * (mean - 1.0):+.1f} %"] if math.isfinite(mean) else []
+        new = sample.timing
+        old = before[key][1].timing if new and new.instructions and key in before else None
+        if new and old and new.instructions and old.instructions:
+            place = definition.test, definition.configuration, definition.metric
+            ratios.setdefault(place, []).append(new.instructions / old.instructions)
+    means = {place: geometric_mean(of_rungs) for place, of_rungs in ratios.items()}
+    return {
+        place: [f"instructions {100.0 * (mean - 1.0):+.1f} %"]
+        for place, mean in means.items()
+        if math.isfinite(mean)
+    }
 
 
 def beside_findings(findings: Sequence[Finding]) -> list[Finding]:
