@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from spook_tracker.tracker.website import page_test
-from spook_tracker.tracker.website.page_mutants import read_mutants
+from spook_tracker.tracker.website.options import SiteOptions
 from spook_tracker.tracker.website.publish import publish
 from tests.browser import LIVE, SEEN, STILL, arrive, look, wait_for
 from tests.synthetic_history import DocumentHistory, with_rival
@@ -82,7 +82,7 @@ def site(tmp_path_factory, recorded):
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("spook_tracker.tracker.website.pages.test_page", broken)
-        report = publish(with_rival(nights(motions=recorded)), out, mutants=read_mutants(RECORD))
+        report = publish(with_rival(nights(motions=recorded)), out, options=SiteOptions(mutants=RECORD))
     assert [line.partition(":")[0] for line in report.failed] == ["tests/door.html"]
     publish(DocumentHistory([]), out.parent / "empty")
     return out

@@ -13,6 +13,7 @@ from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.store.database import session_on
 from spook_tracker.tracker.store.record import record
 from spook_tracker.tracker.website.colours import DARK, LEAST, LIGHT, ColourError, accent, contrast
+from spook_tracker.tracker.website.options import SiteOptions
 from spook_tracker.tracker.website.publish import publish
 from tests.browser import arrive, look
 from tests.synthetic_history import DocumentHistory, document
@@ -91,7 +92,11 @@ def test_tracker_toml_says_the_colour_and_pages_wear_it(
 
 @pytest.mark.parametrize("dark", [False, True], ids=["light", "dark"])
 def test_a_browser_finds_every_text_readable_in_it(driver, tmp_path, dark) -> None:  # type: ignore[no-untyped-def]
-    publish(DocumentHistory([document(n, broken=1) for n in range(2)]), tmp_path / "public", colour="#7a1fa2")
+    publish(
+        DocumentHistory([document(n, broken=1) for n in range(2)]),
+        tmp_path / "public",
+        options=SiteOptions(colour="#7a1fa2"),
+    )
     look(driver, dark=dark)
     for page in ("index.html", "tests/pendulum.html"):
         arrive(driver, (tmp_path / "public" / page).as_uri())

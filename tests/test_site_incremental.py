@@ -14,6 +14,7 @@ from spook_tracker.tracker.library import record
 from spook_tracker.tracker.store.database import session_on
 from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.remove import remove
+from spook_tracker.tracker.website.options import SiteOptions
 from spook_tracker.tracker.website.publish import publish
 from tests.synthetic_history import DocumentHistory, engine
 from tests.test_tracker_one_judge import night, one
@@ -87,10 +88,10 @@ def test_what_changed_is_written_again(
 
 def test_what_a_team_says_of_its_site_is_written_again(tmp_path: Path) -> None:
     grown, anew = tmp_path / "grown", tmp_path / "anew"
-    said = {"title": "Another name", "home_page": "https://example.org/engine"}
+    said = SiteOptions(title="Another name", home_page="https://example.org/engine")
     publish(DocumentHistory(NIGHTS), grown)
-    publish(DocumentHistory(NIGHTS), grown, **said)
-    publish(DocumentHistory(NIGHTS), anew, **said)
+    publish(DocumentHistory(NIGHTS), grown, options=said)
+    publish(DocumentHistory(NIGHTS), anew, options=said)
 
     assert files(grown) == files(anew)
 

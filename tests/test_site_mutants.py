@@ -12,6 +12,7 @@ from click.testing import CliRunner
 from bench import mutants as bench
 from spook_tracker.tracker import library
 from spook_tracker.tracker.cli.main import main
+from spook_tracker.tracker.website.options import SiteOptions
 from spook_tracker.tracker.website.page_mutants import RecordError, read_mutants
 from spook_tracker.tracker.website.publish import publish
 from tests.synthetic_history import history
@@ -31,7 +32,7 @@ def test_the_page_names_each_what_was_broken_and_which_test_caught_it(tmp_path: 
     file = tmp_path / "record.json"
     missed = entry("sly", caught=False, said="<b>nothing</b> is worse", caught_by="tests/test_x.py::test_y")
     file.write_text(json.dumps([entry("bold"), missed]))
-    report = publish(history(2), tmp_path / "public", mutants=read_mutants(file))
+    report = publish(history(2), tmp_path / "public", options=SiteOptions(mutants=file))
 
     assert not report.failed
     page = (tmp_path / "public" / "mutants.html").read_text()
@@ -76,7 +77,9 @@ def test_no_night_is_measured_in_vain_when_the_record_cannot_be_read(
     assert done.exit_code == 2
     assert "tracker: nowhere.json: No such file or directory; `make mutants` writes it" in done.output
     with pytest.raises(RecordError, match="nowhere"):
-        library.nightly("sqlite:///tracker.db", Path("public"), mutants=Path("nowhere.json"))
+        library.nightly(
+            "sqlite:///tracker.db", Path("public"), site=SiteOptions(mutants=Path("nowhere.json"))
+        )
 
 
 def test_the_record_is_of_the_mutants_there_are() -> None:

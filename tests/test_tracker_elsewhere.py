@@ -39,7 +39,7 @@ def test_a_clock_that_goes_backwards_changes_no_verdict(tmp_path: Path, last: fl
                 given = {"engine": version, "id": f"night {place}", "idempotency_key": f"{place}"}
                 record(session, run_of({"a": value}, started=started, finished=finished, **given))
             history = History(session)
-            findings = library.judge(history, "night 4")
+            findings = library.judge_run(history, "night 4")
             report = library.publish(history, tmp_path / name)
         opened.dispose()
         told.append(([(f.series, f.verdict, f.red) for f in findings], report.pages, report.failed))

@@ -11,15 +11,28 @@ if TYPE_CHECKING:
     from spook_tracker.tracker.library import (
         History,
         NightlyReport,
+        RunOptions,
+        SiteOptions,
         compare,
-        judge,
+        judge_run,
         nightly,
         publish,
         record,
         run,
     )
 
-__all__ = ["History", "NightlyReport", "compare", "judge", "nightly", "publish", "record", "run"]
+__all__ = [
+    "History",
+    "NightlyReport",
+    "RunOptions",
+    "SiteOptions",
+    "compare",
+    "judge_run",
+    "nightly",
+    "publish",
+    "record",
+    "run",
+]
 
 
 def __getattr__(name: str) -> Any:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import timedelta
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 from spook_tracker.tracker.document.collection import no_collection
 from spook_tracker.tracker.document.run_document import RunDocument, SeriesHistory
@@ -23,17 +23,58 @@ from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.series_history import Told
 from spook_tracker.tracker.judge.tonight import Finding, to_be_timed_again
 from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.website.options import PLAIN, SiteOptions
 
-__all__ = ["History", "NightlyReport", "compare", "judge", "nightly", "publish", "record", "run"]
+if TYPE_CHECKING:
+    from spook_tracker.tracker.measure.limits import Limits
+    from spook_tracker.tracker.measure.run import Progress, Questions, Request, Trigger
+    from spook_tracker.tracker.measure.timing import Repeats
+    from spook_tracker.tracker.website.publish import Report
+
+__all__ = [
+    "History",
+    "NightlyReport",
+    "RunOptions",
+    "SiteOptions",
+    "compare",
+    "judge_run",
+    "nightly",
+    "publish",
+    "record",
+    "run",
+]
 
 
-def run(
-    tests: Iterable[str] = (), *, watch: Callable[[Any], None] | None = None, **asked: Any
-) -> RunDocument:
+class RunOptions(TypedDict, total=False):
+    """What is asked of which engine, and how it is measured; all that is left out is as `tracker run` has it."""
+
+    catalogue: str  # "standard", a module:attribute, several with commas between them
+    engine: str  # a name as `tracker engines` lists it, or module:NAME
+    limit: float | None  # s for one simulation
+    patience: float | None  # s after which a piece of work begins no further simulation
+    every_setting: bool  # whether single values are asked in each setting of another engine
+    limits: Limits  # a team's own, by series
+    folder: str  # where engine and catalogue are looked for, too
+    figures: bool
+    sweep: bool  # ladders of error against run time
+    stability: bool  # maps and break points
+    trigger: Trigger
+    workers: int  # processes, each watched; 0: in this one, where nothing can be ended
+    time_limit: float  # s for one piece of work
+    memory_limit: int  # bytes for one piece of work
+    repeats: int | Repeats  # of each timing
+    apart: bool  # in a process of its own
+    executor: str  # where values are measured
+
+
+Watch = Callable[["Progress"], None]
+
+
+def run(tests: Iterable[str] = (), *, watch: Watch | None = None, **asked: Unpack[RunOptions]) -> RunDocument:
     """Put the questions (all, or those named) to the engine, in a process of its own; nothing is recorded.
 
-    `asked` are fields of tracker.measure.run.Request (sweep, stability, figures, workers, apart …) and of
-    tracker.measure.run.Questions (catalogue, engine, limit, patience, every_setting, limits).
+    `watch` is told after each piece of work. TypeError for an option that RunOptions does not have; RunError if the run
+    cannot be started as asked.
     """
     from spook_tracker.tracker.measure.apart import run as measure
 
@@ -44,8 +85,8 @@ def run(
 def time_again(
     document: RunDocument,
     tests: Iterable[str],
-    watch: Callable[[Any], None] | None = None,
-    **asked: Any,
+    watch: Watch | None = None,
+    **asked: Unpack[RunOptions],
 ) -> RunDocument:
     """The document with the ladders of these tests timed once more; `asked` as for the run it comes from."""
     from spook_tracker.tracker.measure.apart import timed_again
@@ -54,24 +95,24 @@ def time_again(
     return timed_again(source, request, document, tests, watch or (lambda progress: None))
 
 
-WHERE = (
-    "catalogue",
-    "engine",
-    "limit",
-    "patience",
-    "every_setting",
-    "limits",
-    "folder",
-)  # fields of Questions
-
-
-def _asked(tests: Iterable[str], asked: dict[str, Any]) -> tuple[Any, Any]:
+def _asked(tests: Iterable[str], asked: RunOptions) -> tuple[Questions, Request]:
     """What is asked of whom: fields of a Request, and those of Questions, told apart."""
+    import difflib
+    from dataclasses import fields
+
     from spook_tracker.tracker.measure.run import Questions, Request
 
-    where = {name: asked[name] for name in WHERE if name in asked}
-    rest = {name: value for name, value in asked.items() if name not in where}
-    return Questions(**where), Request(**{"tests": tuple(tests), **rest})
+    for name in asked:
+        if name not in RunOptions.__annotations__:
+            near = difflib.get_close_matches(name, RunOptions.__annotations__, n=1)
+            hint = (
+                f"did you mean {near[0]!r}?" if near else f"there are {', '.join(RunOptions.__annotations__)}"
+            )
+            raise TypeError(f"a run has no option {name!r}; {hint}")
+    whose = {field.name for field in fields(Questions)}
+    where: dict[str, Any] = {name: value for name, value in asked.items() if name in whose}
+    how: dict[str, Any] = {name: value for name, value in asked.items() if name not in whose}
+    return Questions(**where), Request(tests=tuple(tests), **how)
 
 
 def record(document: RunDocument, database: str) -> bool:
@@ -147,7 +188,7 @@ def compare(
 
 
 @no_collection()
-def judge(history: History, run: str, accepted: Sequence[Accepted] = ()) -> list[Finding]:
+def judge_run(history: History, run: str, accepted: Sequence[Accepted] = ()) -> list[Finding]:
     """What became of a recorded run, against everything measured before it; red first."""
     from spook_tracker.tracker.judge.tonight import tonight
 
@@ -234,32 +275,25 @@ def publish(
     out: Path,
     accepted: Sequence[Accepted] = (),
     database: str = "",
-    title: str = "",
-    home_page: str = "",
-    mutants: Path | None = None,
-    colour: str = "",
-    documents: Path | None = None,
-) -> Any:
-    """Build the website in a folder; returns how many files were written (tracker.website.publish.Report).
+    options: SiteOptions = PLAIN,
+) -> Report:
+    """Build the website in the folder `out`; returns how many files were written.
 
-    `database` is the URL of the SQLite file that readers shall be able to load; none if it is empty.
-    `title` and `home_page` say whose website it is, `colour` (#rrggbb) is that of its links. `mutants` is the record that `make mutants` writes.
-    `documents` is a folder of HTML files that is published with it, as docs/.
+    `database` is the URL of the SQLite file that readers can load where the options say so. FolderError if `out` holds
+    files of others.
     """
-    from spook_tracker.tracker.website.page_mutants import read_mutants
     from spook_tracker.tracker.website.publish import publish as build
 
     offered = None
-    if database:
+    if database and options.with_database:
         from spook_tracker.tracker.store.offered import database_file
 
         offered = database_file(database)
-    wrong = read_mutants(mutants) if mutants else ()
-    return build(history, out, accepted, offered, title, home_page, wrong, colour, documents)
+    return build(history, out, accepted, offered, options)
 
 
 def judged_again(
-    session: Any, document: RunDocument, accepted: Sequence[Accepted] = (), **asked: Any
+    session: Any, document: RunDocument, accepted: Sequence[Accepted] = (), **asked: Unpack[RunOptions]
 ) -> tuple[RunDocument, list[Finding]]:
     """What became of a run just recorded; what seems slower is timed once more at once, stored, and judged again.
 
@@ -267,11 +301,11 @@ def judged_again(
     """
     from spook_tracker.tracker.store.record import add_again
 
-    findings = judge(History(session, ahead=NO_TIME), document.id, accepted)
+    findings = judge_run(History(session, ahead=NO_TIME), document.id, accepted)
     if seem_slower := to_be_timed_again(findings):
         document = time_again(document, seem_slower, **asked)
         add_again(session, document)
-        findings = judge(History(session, ahead=NO_TIME), document.id, accepted)
+        findings = judge_run(History(session, ahead=NO_TIME), document.id, accepted)
     return document, findings
 
 
@@ -284,7 +318,7 @@ class NightlyReport:
 
     document: RunDocument
     findings: list[Finding]
-    published: Any
+    published: Report
     notes: tuple[str, ...] = ()  # entries of accepted.toml that do nothing, runs dated ahead
 
     @property
@@ -298,19 +332,14 @@ def nightly(
     out: Path,
     *,
     accepted: Sequence[Accepted] = (),
-    watch: Callable[[Any], None] | None = None,
-    tell: Callable[[Any], None] = lambda news: None,
-    with_database: bool = False,
-    title: str = "",
-    home_page: str = "",
-    mutants: Path | None = None,
-    colour: str = "",
-    documents: Path | None = None,
-    **asked: Any,
+    watch: Watch | None = None,
+    tell: Callable[[RunDocument | list[Finding]], None] = lambda news: None,
+    site: SiteOptions = PLAIN,
+    **asked: Unpack[RunOptions],
 ) -> NightlyReport:
     """Measure everything, record it, judge it against the history, publish the website.
 
-    The database, `mutants` and `colour` are looked at first: no night is measured in vain. `tell` is called with the run
+    The database and what the website is told are looked at first: no night is measured in vain. `tell` is called with the run
     document and with the findings as soon as they are there. `asked` as for `run`. An interrupted night is recorded
     as far as it came (Interrupted says which run), neither judged nor published.
     """
@@ -320,14 +349,15 @@ def nightly(
     from spook_tracker.tracker.store.retention import drop_old_figures
     from spook_tracker.tracker.website.colours import accent
 
-    accent(colour)
-    if mutants:
+    asked["trigger"] = "nightly"
+    accent(site.colour)
+    if site.mutants:
         from spook_tracker.tracker.website.page_mutants import read_mutants
 
-        read_mutants(mutants)
+        read_mutants(site.mutants)
     with session_on(database) as session:
         try:
-            document = run(watch=watch, trigger="nightly", **asked)
+            document = run(watch=watch, **asked)
         except Interrupted as ended:
             ended.recorded = store(session, ended.document)
             raise
@@ -340,6 +370,5 @@ def nightly(
         drop_old_figures(session, history)  # once they have been compared
     with History.open(database, NO_TIME) as history:
         notes += [history.dated_ahead()] if history.ahead else []
-        offered = database if with_database else ""
-        published = publish(history, out, accepted, offered, title, home_page, mutants, colour, documents)
+        published = publish(history, out, accepted, database, site)
     return NightlyReport(document=document, findings=findings, published=published, notes=tuple(notes))

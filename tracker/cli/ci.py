@@ -76,7 +76,7 @@ def night(
     from spook_tracker.tracker.cli.main import nightly
     from spook_tracker.tracker.cli.report_ci import commands_of, night_markdown
     from spook_tracker.tracker.document.errors import TrackerError
-    from spook_tracker.tracker.library import judge
+    from spook_tracker.tracker.library import judge_run
     from spook_tracker.tracker.store.months import export_months
 
     try:
@@ -85,11 +85,11 @@ def night(
         raise TrackerError(f"the folder {history} cannot be made: {error.strerror}") from None
     refuse_unwritable(history / "month.jsonl.xz")  # a file like those that a night writes
     _bring_in(history, database)
-    same = {"json_file": None, "junit_file": None, "with_database": False}
+    same = {"json_file": None, "junit_file": None}
     code = _code_of(context, nightly, out=out, accepted=accepted, database=database, **same, **asked)
     with history_of(database) as kept:
         run = kept.resolve(recorded_runs()[-1])  # by its id: whatever its clock, or another's, has said
-        findings = judge(kept, run.id, accepted_levels(accepted))
+        findings = judge_run(kept, run.id, accepted_levels(accepted))
         _tell(night_markdown(run, findings, site), commands_of(findings))
         try:
             written = export_months(kept, history)

@@ -208,14 +208,14 @@ def judge_command(
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.report_compare import finding_lines, findings_json, old_answer_lines
     from spook_tracker.tracker.judge.choice import Choice
-    from spook_tracker.tracker.library import idle_entries, judge
+    from spook_tracker.tracker.library import idle_entries, judge_run
 
     refuse_unwritable(junit_file)
     kept = True
     choice = Choice(tests=tests, kinds=kinds, roles=roles)
     levels, run = accepted_levels(accepted), of_engine(engine, run)
     with history_of(database) as history:
-        findings = judge(history, run, levels)
+        findings = judge_run(history, run, levels)
         notes = idle_entries(history, run, findings, levels)
         findings = choice.of_findings(findings)
         then = _by_old_questions(history, history.resolve(run), findings, choice) if old_questions else []

@@ -29,6 +29,7 @@ from spook_tracker.tracker.cli.options import (
     mutants_option,
     recorded,
     refuse_unwritable,
+    site_options,
     source_options,
     terminated_is_interrupted,
     website_options,
@@ -176,12 +177,6 @@ def _of_engine(file: Path, name: str, names: list[str]) -> Path:
 def nightly(
     out: Path,
     quick: bool,
-    with_database: bool,
-    title: str,
-    home_page: str,
-    colour: str,
-    mutants: Path | None,
-    documents: Path | None,
     executor: str,
     workers: int,
     memory: int,
@@ -206,8 +201,9 @@ def nightly(
 
     refuse_unwritable(json_file, junit_file)
     refuse_unusable(out)
-    if mutants:
-        read_mutants(mutants)  # before the other engines are measured, too
+    site = site_options()
+    if site.mutants:
+        read_mutants(site.mutants)  # before the other engines are measured, too
     first, *others = engine.split(",")
     for other in others:
         asked = Request(
@@ -251,12 +247,7 @@ def nightly(
                 accepted=accepted_levels(accepted),
                 watch=lambda p: step(p.done, p.total, p.test, p.finished, p.failed),
                 tell=tell,
-                with_database=with_database,
-                title=title,
-                home_page=home_page,
-                colour=colour,
-                mutants=mutants,
-                documents=documents,
+                site=site,
                 catalogue=catalogue,
                 engine=first,
                 limits=present().limits_of(first),
@@ -302,12 +293,6 @@ def engines() -> None:
 @database_option
 def publish(
     out: Path,
-    with_database: bool,
-    title: str,
-    home_page: str,
-    colour: str,
-    mutants: Path | None,
-    documents: Path | None,
     accepted: Path | None,
     database: str,
 ) -> None:
@@ -316,9 +301,7 @@ def publish(
     from spook_tracker.tracker.library import publish as build
 
     with history_of(database) as history:
-        offered = database if with_database else ""
-        levels = accepted_levels(accepted)
-        report = build(history, out, levels, offered, title, home_page, mutants, colour, documents)
+        report = build(history, out, accepted_levels(accepted), database, site_options())
     _say_published(report, out)
 
 
@@ -331,9 +314,6 @@ def publish(
 def report(
     pdf: Path | None,
     html: Path | None,
-    title: str,
-    home_page: str,
-    colour: str,
     accepted: Path | None,
     database: str,
 ) -> None:
@@ -348,7 +328,7 @@ def report(
         raise click.UsageError("say what to write: --pdf FILE, --html FILE, or both")
     refuse_unwritable(pdf, html)
     with history_of(database) as history:
-        text = one_file(history, accepted_levels(accepted), title, home_page, colour)
+        text = one_file(history, accepted_levels(accepted), site_options())
     kept = html is None or write(html, text)
     if html is not None and kept:
         say(f"wrote {html}")

@@ -15,12 +15,15 @@ import traceback
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 import click
 
 import spook_tracker.tracker.cli.settings as tracker_toml
 from spook_tracker.tracker.measure.bounds import MEMORY, TIME_LIMIT
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.website.options import SiteOptions
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -42,10 +45,34 @@ def database_option(command: Command) -> Command:
     )(command)
 
 
+SITE = "what the website is told"
+
+
+def _kept(check: Callable[[Any], None] = lambda value: None) -> Callable[..., None]:
+    """A callback that looks at an option of the website before anything is measured; `site_options` has it then."""
+
+    def keep(context: click.Context, option: click.Parameter, value: Any) -> None:
+        check(value)
+        context.meta.setdefault(SITE, {})[option.name] = value
+
+    return keep
+
+
+def site_options() -> SiteOptions:
+    """What the command line says of the website."""
+    from spook_tracker.tracker.website.options import SiteOptions
+
+    return SiteOptions(**click.get_current_context().meta.get(SITE, {}))
+
+
 def with_database_option(command: Command) -> Command:
     """--with-database: let readers of the website load the history."""
     return click.option(
-        "--with-database", is_flag=True, help="Offer the SQLite file for download, as data/tracker.db."
+        "--with-database",
+        is_flag=True,
+        expose_value=False,
+        callback=_kept(),
+        help="Offer the SQLite file for download, as data/tracker.db.",
     )(command)
 
 
@@ -124,21 +151,18 @@ def source_options(command: Command) -> Command:
     return command
 
 
-def _readable(context: click.Context, option: click.Parameter, colour: str) -> str:
-    """Before anything is measured."""
+def _readable(colour: str) -> None:
     from spook_tracker.tracker.website.colours import accent
 
     accent(colour)
-    return colour
 
 
-def _web_address(context: click.Context, option: click.Parameter, address: str) -> str:
-    """Before anything is measured: what is no address of the web becomes no link."""
+def _web_address(address: str) -> None:
+    """What is no address of the web becomes no link."""
     from spook_tracker.tracker.document.wording import web_address
 
     if address and not web_address(address):
         raise click.BadParameter(f"{address[:80]!r} is no address of the web; write https://…")
-    return address
 
 
 def website_options(command: Command) -> Command:
@@ -148,17 +172,26 @@ def website_options(command: Command) -> Command:
             "--home-page",
             metavar="URL",
             default="",
-            callback=_web_address,
+            expose_value=False,
+            callback=_kept(_web_address),
             help="Address of your project, for the foot of every page.",
         ),
         click.option(
             "--colour",
             metavar="#RRGGBB",
             default="",
-            callback=_readable,
+            expose_value=False,
+            callback=_kept(_readable),
             help="Colour of links and buttons, dark enough to be read on white.",
         ),
-        click.option("--title", metavar="TEXT", default="", help="Title of the website."),
+        click.option(
+            "--title",
+            metavar="TEXT",
+            default="",
+            expose_value=False,
+            callback=_kept(),
+            help="Title of the website.",
+        ),
     ):
         command = option(command)
     return command
@@ -169,16 +202,16 @@ def mutants_option(command: Command) -> Command:
     return click.option(
         "--mutants",
         metavar="FILE",
+        expose_value=False,
+        callback=_kept(),
         type=click.Path(path_type=Path),
         help="Record of engines wrong on purpose, for a page of the website.",
     )(command)
 
 
-def _with_first_page(context: click.Context, option: click.Parameter, folder: Path | None) -> Path | None:
-    """Before anything is measured."""
+def _with_first_page(folder: Path | None) -> None:
     if folder is not None and not (folder / "index.html").is_file():
         raise click.BadParameter(f"{folder} has no index.html; build the documentation first")
-    return folder
 
 
 def documents_option(command: Command) -> Command:
@@ -186,7 +219,8 @@ def documents_option(command: Command) -> Command:
     return click.option(
         "--documents",
         metavar="DIR",
-        callback=_with_first_page,
+        expose_value=False,
+        callback=_kept(_with_first_page),
         type=click.Path(exists=True, file_okay=False, path_type=Path),
         help="A documentation as HTML files, to be published as docs/ and linked on every page.",
     )(command)

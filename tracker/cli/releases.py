@@ -128,7 +128,7 @@ def backfill(
         from spook_tracker.tracker.library import History, publish
 
         with History.open(database) as history:
-            publish(history, out, accepted_levels(None), "")
+            publish(history, out, accepted_levels(None))
         say(f"published {out / 'index.html'}")
 
 

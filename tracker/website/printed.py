@@ -17,6 +17,7 @@ from pathlib import Path
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.website.nights import Records
+from spook_tracker.tracker.website.options import PLAIN, SiteOptions
 from spook_tracker.tracker.website.publish import publish
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -31,14 +32,12 @@ class PrintError(TrackerError):
 def one_file(
     history: Records,
     accepted: Sequence[Accepted] = (),
-    title: str = "",
-    home_page: str = "",
-    colour: str = "",
+    options: SiteOptions = PLAIN,
 ) -> str:
     """The newest night's document as one HTML file: style inside, no script, no reference to another file."""
     with tempfile.TemporaryDirectory() as folder:
         site = Path(folder) / "site"
-        publish(history, site, accepted, None, title, home_page, colour=colour)
+        publish(history, site, accepted, None, options)
         document = site / "document.html"
         if not document.exists():
             raise PrintError("no night is recorded yet; record one with: tracker run")

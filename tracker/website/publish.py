@@ -40,8 +40,9 @@ from spook_tracker.tracker.website.events import Event, all_events
 from spook_tracker.tracker.website.folder import FolderError, digest, replacing
 from spook_tracker.tracker.website.live_module import built_module, module_script
 from spook_tracker.tracker.website.nights import Book, Records, TestHistory, book
+from spook_tracker.tracker.website.options import PLAIN, SiteOptions
 from spook_tracker.tracker.website.page_index import health
-from spook_tracker.tracker.website.page_mutants import Mutant
+from spook_tracker.tracker.website.page_mutants import read_mutants
 from spook_tracker.tracker.website.page_rows import Page
 from spook_tracker.tracker.website.pages import NAVIGATION, pages
 from spook_tracker.tracker.website.replays import replay_files
@@ -97,18 +98,13 @@ def publish(
     out: Path,
     accepted: Sequence[Accepted] = (),
     database: bytes | None = None,
-    title: str = "",
-    home_page: str = "",
-    mutants: Sequence[Mutant] = (),
-    colour: str = "",
-    documents: Path | None = None,
+    options: SiteOptions = PLAIN,
 ) -> Report:
     """Write the website of a history to the folder `out`. FolderError if the folder is somebody else's.
 
     `accepted` are the levels of accepted.toml: what they take is told as accepted, not as red. `database` is
-    the file of the database, where readers shall be able to load it; `title` and `home_page` say whose website it is, `colour` (#rrggbb) is that of its links and buttons: ColourError if it cannot be read. `mutants` are
-    engines that were wrong on purpose, and who noticed. What cannot be made says so in its place,
-    and everything else is published. `documents` is a folder of HTML files that goes along, as docs/.
+    the file of the database, where readers shall be able to load it. ColourError if the colour of the options cannot
+    be read. What cannot be made says so in its place, and everything else is published.
     """
     site = resource("site")
     static, templates = site / "static", site / "templates"
@@ -118,10 +114,11 @@ def publish(
     made = environment(templates)
     told = book(history, accepted)
     failed: list[str] = []
+    documents, mutants = options.documents, read_mutants(options.mutants) if options.mutants else ()
     whose = {
-        "site_title": clean(title) or TITLE,
-        "home_page": web_address(home_page),
-        "accent": accent(colour),
+        "site_title": clean(options.title) or TITLE,
+        "home_page": web_address(options.home_page),
+        "accent": accent(options.colour),
         "documents": documents is not None and (documents / "index.html").is_file(),
     }
     with replacing(out) as folder:
