@@ -220,3 +220,29 @@ def test_at_80_columns_the_configurations_of_a_metric_are_told_apart() -> None:
     assert any("length_deviation [cor" in line for line in narrow)
     assert max(map(len, narrow[1:])) <= 80
     assert "margin" not in narrow[2] and "margin" in wide[2]
+
+
+def test_the_short_table_has_a_line_a_test_and_one_for_every_broken_limit() -> None:
+    from spook_tracker.tracker.cli.report_short import short_table
+    from tests.run_documents import definition, run, sample
+
+    values = {"sound/a/far": 0.1, "sound/a/near": 0.9, "bad/a/one": 2.0, "bad/a/two": 3.0, "bad/a/held": 0.99}
+    document = run(
+        series=tuple(
+            definition(key, test=key.split("/")[0], metric=key.split("/")[2], role="gate", limit=1.0)
+            for key in values
+        ),
+        samples=tuple(
+            sample(key, value)
+            if value <= 1.0
+            else sample(key, value, outcome="out_of_limit", passed=False)
+            for key, value in values.items()
+        ),
+    )
+
+    lines = unstyle(short_table(document, room=120)).splitlines()
+
+    shown = [line.split()[1] for line in lines if "PASS" in line or "FAIL" in line]
+    assert sorted(shown) == ["near", "one", "two"]
+    assert "not shown: 2 further limits, 1 stability map; --all prints them" in lines
+    assert lines[-1] == "✗ red: 2 of 5 limits broken"

@@ -92,7 +92,7 @@ def test_database_judge_and_pages_tell_it(nights, url, tmp_path):
     with History.open(url) as history:
         stored = history.document(nights[1].id)
         compared = library.compare(history, nights[0].id, nights[1].id)
-        findings = library.judge(history, nights[1].id)
+        findings = library.judge_run(history, nights[1].id)
         library.publish(history, tmp_path / "public")
 
     assert by_key(stored) == by_key(nights[1])

@@ -59,6 +59,9 @@ def width() -> int:
     return max(60, shutil.get_terminal_size((PIPE_WIDTH, 24)).columns)
 
 
+FEW = 20  # pieces of work; of more a log gets a line each tenth, and for each test that is red
+
+
 def is_terminal(stream: TextIO | None) -> bool:
     """Whether somebody is looking at the stream; one that was closed from the start is None."""
     return stream is not None and stream.isatty() and os.environ.get("TERM") != "dumb"
@@ -205,11 +208,14 @@ def watching(title: str) -> Iterator[Callable[[int, int, str, bool, tuple[str, .
     """A function to call after each piece of work: (done, total, test, test finished, failed series)."""
     if not is_terminal(sys.stderr):
         failures: dict[str, list[str]] = {}
+        tenths = -1
 
         def line(done: int, total: int, test: str, finished: bool, failed: tuple[str, ...]) -> None:
+            nonlocal tenths
             failures.setdefault(test, []).extend(failed)
-            if finished:
-                bad = failures[test]
+            bad = failures[test]
+            if finished and (bad or total <= FEW or 10 * done // total > tenths):
+                tenths = 10 * done // total
                 say(
                     f"[{done:>{len(str(total))}}/{total}] {test}" + (f": {len(bad)} red" if bad else ""),
                     err=True,

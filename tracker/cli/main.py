@@ -75,13 +75,18 @@ def _print_versions() -> None:
     )
 
 
+all_option = click.option(
+    "--all", "everything", is_flag=True, help="Print every limit and value, not a line a test."
+)
+
+
 @main.command("run", epilog=example("tracker run pendulum door --sweep --json run.json"))
 @click.argument("tests", nargs=-1, metavar="[TEST]...")
 @click.option("--sweep", is_flag=True, help="Also measure error against run time.")
 @click.option("--stability", is_flag=True, help="Also find break points and stability maps.")
 @click.option("--figures", is_flag=True, help="Also draw the figures' data.")
 @click.option("--no-record", is_flag=True, help="Measure and print only.")
-@click.option("--all", "everything", is_flag=True, help="Show values without a limit, too.")
+@all_option
 @click.option(
     "--json", "json_file", metavar="FILE", type=click.Path(path_type=Path), help="Write the run document."
 )
@@ -158,6 +163,7 @@ def _of_engine(file: Path, name: str, names: list[str]) -> Path:
 @main.command(epilog=example("tracker nightly --db sqlite:///tracker.db --out public"))
 @click.option("--out", metavar="DIR", default="public", show_default=True, type=click.Path(path_type=Path))
 @click.option("--quick", is_flag=True, help="Leave out sweeps and stability studies.")
+@all_option
 @executor_option
 @workers_option
 @limit_option
@@ -177,6 +183,7 @@ def _of_engine(file: Path, name: str, names: list[str]) -> Path:
 def nightly(
     out: Path,
     quick: bool,
+    everything: bool,
     executor: str,
     workers: int,
     memory: int,
@@ -192,6 +199,7 @@ def nightly(
     """Run everything, record it, judge it against the history and publish the website."""
     from spook_tracker.tracker.cli.console import say, watching
     from spook_tracker.tracker.cli.history import accepted_levels
+    from spook_tracker.tracker.cli.report_compare import finding_lines, summary
     from spook_tracker.tracker.document.errors import TrackerError
     from spook_tracker.tracker.library import nightly as night
     from spook_tracker.tracker.measure.questions import EngineUnavailable
@@ -211,7 +219,7 @@ def nightly(
             executor=executor,
         )  # fmt: skip
         try:
-            _print_run(_measure(asked, other, limit, catalogue, database), everything=False)
+            _print_run(_measure(asked, other, limit, catalogue, database), everything)
         except EngineUnavailable as reason:
             say(f"left out: {reason}", err=True)
 
@@ -222,13 +230,9 @@ def nightly(
     def tell(news: Any) -> None:
         nonlocal kept
         if isinstance(news, list):
-            from spook_tracker.tracker.cli.report_compare import finding_lines
-
             judged.append(news)
-            summary, *lines = finding_lines(news, f"{out}/")
-            say(summary)  # what the night came to stands first
-            _print_run(measured[0], everything=False)
-            say("\n".join(lines))
+            say("\n".join([*finding_lines(news, f"{out}/"), ""]))  # what the night came to stands first
+            _print_run(measured[0], everything)
             if junit_file:
                 from spook_tracker.tracker.cli.report_junit import junit_of_night
 
@@ -269,6 +273,7 @@ def nightly(
     for sentence in report.notes:
         say(f"note: {sentence}")
     _say_published(report.published, out)
+    say(summary(report.findings))  # and last
     return _end(report.red, _answered(report.document) and kept)
 
 
@@ -429,9 +434,11 @@ def _measure(request: Any, engine: str, limit: float | None, catalogue: str, dat
 
 def _print_run(document: Any, everything: bool) -> None:
     from spook_tracker.tracker.cli.console import say, width
+    from spook_tracker.tracker.cli.report_short import FEW, short_table
     from spook_tracker.tracker.cli.report_table import pass_table
 
-    say(pass_table(document, everything))
+    few = len(document.tests) <= FEW
+    say(pass_table(document, everything) if everything or few else short_table(document))
     timed = [sample.timing for sample in document.samples if sample.timing is not None]
     if timed and not any(timing.instructions for timing in timed):
         from spook_tracker.tracker.measure.instructions import why_not

@@ -29,7 +29,7 @@ Pair = tuple[SeriesDefinition, Sample]
 
 def number(value: float, digits: int = 6) -> str:
     """A value as a reader wants it: six digits, no padding."""
-    return f"{value:.{digits}g}"
+    return f"{value + 0.0:.{digits}g}"  # no -0
 
 
 def measured(definition: SeriesDefinition, sample: Sample, digits: int = 6) -> str:
@@ -210,17 +210,23 @@ WIDE_COLUMNS = (
 )
 
 
-def _styles(narrow: bool, columns: int) -> dict[int, Style]:
+def verdict_styles(column: int) -> dict[int, Style]:
+    """Green and red in the column of verdicts."""
+
     def paint(_row: int, text: str) -> str:
         return click.style(
             text, fg={"✓": "green", "✗": "red"}.get(text[:1]), dim=text.startswith("·") or None
         )
 
+    return {column: paint}
+
+
+def _styles(narrow: bool, columns: int) -> dict[int, Style]:
     def warn(_row: int, text: str) -> str:
         return click.style(text, fg="red") if text.startswith("LEFT") else text
 
     last = columns - 1
-    return {last: paint} if narrow else {last: paint, last - 1: warn}
+    return verdict_styles(last) if narrow else {**verdict_styles(last), last - 1: warn}
 
 
 def failures(run: RunDocument) -> list[str]:
