@@ -233,9 +233,7 @@ def test_the_short_table_has_a_line_a_test_and_one_for_every_broken_limit() -> N
             for key in values
         ),
         samples=tuple(
-            sample(key, value)
-            if value <= 1.0
-            else sample(key, value, outcome="out_of_limit", passed=False)
+            sample(key, value) if value <= 1.0 else sample(key, value, outcome="out_of_limit", passed=False)
             for key, value in values.items()
         ),
     )

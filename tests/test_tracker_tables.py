@@ -14,6 +14,7 @@ from spook_tracker.tracker.cli.console import MOST_LINES, Column, cells, table, 
 from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.store.database import session_on
 from spook_tracker.tracker.store.record import record
+from tests.run_documents import definition, run, sample
 from tests.test_tracker_questions import nights
 from tests.test_tracker_rank import recorded, rungs
 
@@ -68,8 +69,8 @@ def history(tmp_path_factory: pytest.TempPathFactory) -> str:
     """Five nights, the fourth worse than its limit."""
     url = f"sqlite:///{tmp_path_factory.mktemp('nights')}/t.db"
     with session_on(url) as session:
-        for run in nights():
-            record(session, run)
+        for night in nights():
+            record(session, night)
     return url
 
 
@@ -122,3 +123,29 @@ def _of(sample: object, key: str) -> object:
     from msgspec.structs import replace
 
     return replace(sample, series=key)  # type: ignore[type-var]
+
+
+def test_a_test_of_many_series_is_told_a_line_each_and_what_is_red_night_by_night(tmp_path: Path) -> None:
+    """`tracker trend pendulum` printed 1459 lines for one night."""
+    keys = [f"t/plain/m{number}" for number in range(9)] + ["t/plain/ladder:e/h=0.1"]
+    kinds = ["scalar"] * 9 + ["ladder"]
+    address = f"sqlite:///{tmp_path / 't.db'}"
+    document = run(
+        series=tuple(
+            definition(key, test="t", metric=key.split("/")[2], limit=1.0, kind=kind)
+            for key, kind in zip(keys, kinds, strict=True)
+        ),
+        samples=(
+            *(sample(key, 0.5) for key in keys if key != keys[3]),
+            sample(keys[3], 2.0, outcome="out_of_limit", passed=False),
+        ),
+    )
+    with session_on(address) as session:
+        record(session, document)
+
+    shown = unstyle(CliRunner().invoke(main, ["trend", "t", "--db", address]).output)
+
+    assert len(shown.splitlines()) < 25 and "1 of kind ladder" in shown
+    assert "\nt/plain/m3" in shown and "\nt/plain/m4" not in shown, "night by night what is red alone"
+    whole = CliRunner().invoke(main, ["trend", "t", "--all", "--db", address]).output
+    assert all(key in whole for key in keys)

@@ -258,6 +258,7 @@ def _by_old_questions(history: Any, run: Any, findings: Any, choice: Any) -> Any
 @click.option(
     "--last", type=click.IntRange(min=1), default=10, show_default=True, help="Values to list of each series."
 )
+@click.option("--all", "everything", is_flag=True, help="Night by night, however many series there are.")
 @engine_option
 @kind_options
 @json_option
@@ -267,6 +268,7 @@ def trend(
     test: str,
     metric: str | None,
     last: int,
+    everything: bool,
     engine: str | None,
     kinds: tuple[str, ...],
     roles: tuple[str, ...],
@@ -291,12 +293,23 @@ def trend(
 
         click.echo(trend_json(trends, maps))
         return
-    from spook_tracker.tracker.cli.report_trend import gates_first, map_lines, summary, trend_lines
+    from spook_tracker.tracker.cli.report_trend import (
+        FEW,
+        gates_first,
+        map_lines,
+        overview_lines,
+        summary,
+        trend_lines,
+    )
 
     say(summary(trends, maps))
     if maps:
         say("\n".join(map_lines(maps)))
-    for told in gates_first(trends):
+    whole = gates_first(trends)
+    if len(whole) > FEW and not (everything or metric or kinds or roles):
+        say("\n".join(["", *overview_lines(whole)]))
+        whole = [told for told in whole if told.nights and told.nights[-1].red][:FEW]
+    for told in whole:
         say()
         say("\n".join(trend_lines(told, last)))
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import click
@@ -15,6 +16,9 @@ from spook_tracker.tracker.judge.judged import BY_TIME, Judged, blame, commit_of
 from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.series_history import Told, is_noisy, lanes_of, on_one_clock
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, STATES, spaced
+
+FEW = 6  # series that are shown night by night; of more, those that are red
+SMALL = 12  # columns of a small sparkline
 
 
 def summary(trends: Sequence[Told], maps: Sequence[ToldMap] = ()) -> str:
@@ -99,6 +103,32 @@ def map_lines(maps: Sequence[ToldMap]) -> list[str]:
 
 def _map_word(told: ToldMap) -> str:
     return "recovered" if told.state == "recovered" else told.verdict.name or spaced(told.verdict.word)
+
+
+def overview_lines(trends: Sequence[Told]) -> list[str]:
+    """A line for each value of a test, for those that are red of everything else, and how much that leaves out."""
+    shown = [t for t in trends if t.definition.kind == "scalar" or (t.nights and t.nights[-1].red)]
+    rows = [
+        (
+            clean(told.key.removeprefix(f"{told.definition.test}/")),
+            sparkline([judged.night.value for judged in told.nights], SMALL),
+            f"{number(told.nights[-1].night.value)} {told.definition.unit}".removesuffix(" 1"),
+            limit(told.definition),
+            STATES[told.nights[-1].state] or spaced(told.nights[-1].verdict.word),
+        )
+        for told in gates_first(shown)
+    ]
+    columns = (
+        Column(clean(trends[0].definition.test), flexible=True),
+        Column("nights"),
+        Column("newest", "right"),
+        Column("limit", "right"),
+        Column("verdict"),
+    )
+    left = Counter(told.definition.kind for told in trends if told not in shown)
+    kinds = ", ".join(f"{count} of kind {kind}" for kind, count in sorted(left.items()))
+    more = [f"not shown: {kinds}; --all prints every series, --kind those of one"] if kinds else []
+    return [*table(columns, rows), "", *more]
 
 
 def trend_lines(told: Told, last: int = 10) -> list[str]:
