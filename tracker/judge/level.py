@@ -131,12 +131,10 @@ class PresentLevel:
         """Whether a night has a time: none is infinite, and so is that of a rate of zero."""
         return math.isfinite(self.values[place]) and not (self.larger_is_better and self.values[place] == 0.0)
 
-    def _stands_clear(self, change: float, threshold: float) -> bool:
-        """Whether a night is beyond what is usual, and beyond where nights that remember each other go."""
+    def _stands_clear(self, change: float) -> bool:
+        """Whether a night beyond what is usual is beyond where nights that remember each other go, too."""
         import numpy as np
 
-        if change <= threshold:
-            return False
         base = self._base()
         if len(base) < FEWEST_BASE or not math.isfinite(change) or not remembered(base):
             return True

@@ -159,8 +159,8 @@ class _Walk(PresentLevel):
 
     def _see(self, place: int, change: float, threshold: float) -> None:
         """The nights in a row that stand clear of the segment on one side; what no second one confirmed is noise."""
-        worse, better = self._stands_clear(change, threshold), -change > threshold
-        better = better and -change > self._reach_down(threshold)
+        worse = change > threshold and self._stands_clear(change)
+        better = -change > threshold and -change > self._reach_down(threshold)
         if self.off and (not (worse or better) or better != self.better):
             self._join(self.off)
             self.off = []

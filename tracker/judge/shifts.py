@@ -99,15 +99,13 @@ def _apart_from_clusters(base: Values, last: Values, rare: float = RAREST) -> Sh
     """
     import numpy as np
 
-    split = clusters(base)
-    if split is None:
+    change = float(last.sum() / len(last) / (base.sum() / len(base))) - 1.0
+    if change <= LEAST or (split := clusters(base)) is None:
         return None
     low, high = split
     near = [nights / np.where(nights - low < high - nights, low, high) for nights in (base, last)]
     tried = _tried(near[0], near[1], rare)
-    change = float(np.mean(last) / np.mean(base)) - 1.0
-    memory = remembered(base)
-    if tried is None or change <= LEAST or (memory and tried.probability >= RAREST):
+    if tried is None or ((memory := remembered(base)) and tried.probability >= RAREST):
         return None  # where visits last, no second test knows of them: off the nearer cluster nothing is remembered
     return replace(tried, change=change, apart=not memory)
 
