@@ -92,6 +92,7 @@ class _Walk(PresentLevel):
     anchor: list[int] = field(default_factory=list)  # the nights at the last release
     anchored: float = math.nan  # the middle of these
     crept: float = 0.0  # the largest drift since it is red; zero while it is not
+    crept_at: int = 0  # the night when that was told
     first: tuple[int, int] | None = None  # of the red: last good and first bad night
     broken: bool = False  # no finite value last night
 
@@ -471,8 +472,13 @@ class _Walk(PresentLevel):
         change = self._worse_by(old, recent)
         words = f"{change_in_words(change)}, little by little since the last release"
         verdict = Verdict(word="regressed", sentence=words, name="drift")
-        first = self.anchor
-        return Noisy(verdict=verdict, state="detected", against=first[0], first_bad=first[-1], news=news, worse_at=first[-1], levels=(old, recent))  # fmt: skip
+        if news:
+            self.crept_at = self.until - 1
+        good, bad = self.anchor[-1], self.crept_at  # no commit did it: any since then may have a share
+        return Noisy(
+            verdict=verdict, state="detected", against=self.anchor[0], first_bad=bad, last_good=good,
+            worse_at=bad, news=news, accused=(good, bad), levels=(old, recent),
+        )  # fmt: skip
 
     def segments(self) -> list[Segment]:
         """All segments, the present one last; each lasts until the next begins."""

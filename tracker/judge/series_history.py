@@ -208,7 +208,8 @@ def _judge_times(
             first = lane[noisy.first_bad] if noisy.first_bad is not None else None
             worse_at = lane[noisy.worse_at] if noisy.worse_at is not None else first
             good = lane[noisy.last_good] if noisy.last_good is not None else None
-            before = lane[noisy.worse_at - 1] if noisy.worse_at else good
+            again = noisy.worse_at if noisy.worse_at != noisy.first_bad else None
+            before = lane[again - 1] if again else good
             found[places[i]] = Judged(
                 night=lane[i],
                 verdict=noisy.verdict,
