@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 from spook_tracker.tracker.document.middle import median, median_of_sorted
 from spook_tracker.tracker.judge.normal_nights import exceeded
 from spook_tracker.tracker.judge.segments import NORMAL, Boundary, Standing
-from spook_tracker.tracker.judge.shifts import BASE, CLIP, FEWEST_BASE, remembered, standard_error
+from spook_tracker.tracker.judge.shifts import BASE, CLIP, FEWEST_BASE, clusters, remembered, standard_error
 from spook_tracker.tracker.judge.slower import LEAST, worse_by
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ REACHED = 200  # nights of which that is remembered
 SECOND = 2.5  # standard deviations that the second largest of two hundred nights reaches
 ROOM = 400  # powers of two about one: squares of so large values, summed, are doubles
 CREEP = 5  # nights in each median that is compared for drift
+APART_BY_CHANCE = 1.25  # times the distance of two clusters that medians of their nights may be apart
 RANGES = 2.0  # times what nights of a segment range over: none that remember each other go so far
 
 
@@ -171,7 +172,10 @@ class PresentLevel:
         return np.minimum(np.maximum(base, middle - far), middle + far) if far > 0.0 else base
 
     def _wanders(self) -> float:
-        """How far the means of two spans of nights may lie apart, a trend of these nights taken out."""
+        """How far medians of a few nights lie apart by chance: where nights remember each other, or are of two clusters.
+
+        Of what they remember a trend of these nights is no part; of two clusters either may hold the median.
+        """
         import numpy as np
 
         base = self._base()
@@ -179,7 +183,10 @@ class PresentLevel:
             return 0.0
         nights = np.arange(len(base))
         level = base - np.polyval(np.polyfit(nights, base, 1), nights)
-        return math.sqrt(2.0) * standard_error(level, CREEP) if remembered(level) else 0.0
+        if remembered(level):
+            return math.sqrt(2.0) * standard_error(level, CREEP)
+        split = clusters(base)
+        return APART_BY_CHANCE * (split[1] - split[0]) if split else 0.0
 
     def _chance(self, nights: Sequence[int]) -> float:
         """How probable it is that these nights lie so far off by chance: the tail of Student's t."""
