@@ -131,15 +131,18 @@ def test_nights_that_are_not_looked_at_again_make_a_series_no_younger(
 
 def test_a_step_off_two_clusters_is_seen_though_one_of_them_is_visited() -> None:
     """Where one cluster is usual and the other is visited, nights above both seemed a visit for as long as they came."""
-    found = silent = 0
+    found = started = lasting = 0
     for series in range(40):
         values = list(map(float, battery.step("+10 % on clusters 8 % apart", 5000 + series, 60, 6)))
         told = [night.state for night in judge_noisy(values)]
         found += "detected" in told[60:]
-        silent += battery.starts([state == "detected" for state in told[:60]], 30) == 0
+        red = [state == "detected" for state in told[:60]]
+        started += battery.starts(red, 30)
+        lasting += any(red[30:])
 
     assert found >= 37
-    assert silent == 40
+    assert started == 0
+    assert lasting <= 1  # before thirty nights clusters are not known; a red of then ends with several nights back
 
 
 @pytest.mark.parametrize("series", [20148, 20180, 20381, 20398])
