@@ -151,6 +151,16 @@ def test_a_printed_pair_agrees_with_its_percentage(tracker: Any, pair: tuple[int
             assert change["red"] <= (ratio > 1.0)
 
 
+def test_one_slow_night_is_told_by_every_command_and_red_in_none(tracker: Any) -> None:
+    runs = [night(n, rungs(1e-3 * noise(n) * (2.0 if n == 13 else 1.0))) for n in range(14)]
+
+    for command in (["judge", "latest"], ["trend", "t"], ["compare", "previous", "latest"]):
+        code, said = tracker(runs, *command)
+        assert code == 0
+        assert "slow for one night: t/" in said if "compare" in command else "; 1 to be confirmed" in said
+        assert re.search(r"\+\d+\.\d % for the worse, to be confirmed", said)
+
+
 def test_timing_is_told_from_a_clock_that_stands_still(tracker: Any) -> None:
     """Zero seconds are no level to be slower than, and no crash."""
     definition = series("t", "ladder:e", kind="ladder", time_step=0.1)

@@ -142,7 +142,9 @@ def test_a_step_off_two_clusters_is_seen_though_one_of_them_is_visited() -> None
 
     assert found >= 37
     assert started == 0
-    assert lasting <= 1  # before thirty nights clusters are not known; a red of then ends with several nights back
+    assert (
+        lasting <= 1
+    )  # before thirty nights clusters are not known; a red of then ends with several nights back
 
 
 @pytest.mark.parametrize("series", [20148, 20180, 20381, 20398])

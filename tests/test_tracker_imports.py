@@ -207,6 +207,31 @@ def test_numbers_in_no_known_unit_explain_and_the_command_says_so(tmp_path: Path
     assert {d["role"] for d in found.runs()[0]["series"] if d["metric"] == "contacts_mean"} == {"explaining"}
 
 
+def test_a_column_that_is_not_there_is_named(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text(f"commit,run_time\n{'a' * 40},0.1\n")
+    said = Imported(tmp_path, "--column", "runtime=s", "--column", "run_*=s", tmp_path / "x.csv").said
+
+    assert said.splitlines()[1:] == [
+        "no record has a column runtime: what --column says of it changes nothing"
+    ]
+
+
+def test_one_environment_follows_another_and_nothing_is_missing(tmp_path: Path) -> None:
+    """asv with a newer Python: a series that begins, and one that ends without being missed."""
+    for name, run in (("a", asv("py3.11", 1)), ("b", asv("py3.12", 2))):
+        (tmp_path / f"{name}.json").write_text(json.dumps(run))
+    found = Imported(tmp_path, tmp_path / "a.json", tmp_path / "b.json")
+
+    assert "1 are measured for the first time" in found.tracker("judge", "latest")
+
+
+def asv(environment: str, day: int) -> dict[str, Any]:
+    return {
+        "commit_hash": f"{day}" * 40, "env_name": environment, "date": 86400000 * day, "params": {"machine": "desk"},
+        "result_columns": ["result", "params", "version"], "version": 2, "results": {"time_x": [[0.5], [], "v"]},
+    }  # fmt: skip
+
+
 def test_rows_of_one_commit_are_told_apart_by_a_parameter(tmp_path: Path) -> None:
     found = Imported(tmp_path, "--column", "solver=parameter", TOOLS / "csv" / "times.csv")
 

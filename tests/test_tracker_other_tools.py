@@ -142,6 +142,9 @@ def test_times_are_judged_as_noisy_and_decide_nothing(said: Any) -> None:
         ("B/op", 4.0, "B", "smaller"),
         ("KB", 4e3, "B", "smaller"),
         ("MiB", 4 * 2.0**20, "B", "smaller"),
+        ("FPS", 4.0, "frames/s", "larger"),
+        ("kHz", 4e3, "1/s", "larger"),
+        ("GFLOPS", 4.0, "gflop/s", "larger"),
         ("m/s", 4.0, "m/s", "smaller"),
         ("bodies", 4.0, "bodies", "smaller"),
     ],
@@ -160,7 +163,10 @@ def test_a_direction_that_the_tool_gives_counts_more_than_the_unit() -> None:
     assert values(other)["x"][2] == "larger"
 
 
-@pytest.mark.parametrize(("bad", "outcome"), [(None, FAILED), (math.nan, "not_finite"), (-1.0, "not_finite")])
+@pytest.mark.parametrize(
+    ("bad", "outcome"),
+    [(None, FAILED), (math.nan, "not_finite"), (-1.0, "not_finite"), ("fast", "not_finite")],
+)
 def test_what_is_no_time_is_the_outcome_of_that_benchmark_alone(bad: Any, outcome: str) -> None:
     benches = [{"name": "x", "value": bad, "unit": "ns"}, {"name": "y", "value": 2e9, "unit": "ns"}]
     (run,) = read(action(benches))

@@ -25,6 +25,7 @@ class Read:
     files: frozenset[Path]  # those that were read here
     runs: tuple[tuple[RunDocument, Listed], ...]  # with what their tool says of its benchmarks
     unknown: tuple[str, ...]  # columns of numbers in no known unit
+    absent: tuple[str, ...]  # columns that were given a meaning and are in no file
 
 
 def read(
@@ -53,7 +54,9 @@ def read(
             continue
         seen.add(file)
     found = of_tables(tables, told, beside(next(iter(tables), Path()), engine, machine, branch))
-    return Read(frozenset(seen), (*runs, *((run, Listed()) for run in found.runs)), found.unknown)
+    return Read(
+        frozenset(seen), (*runs, *((run, Listed()) for run in found.runs)), found.unknown, found.absent
+    )
 
 
 def record(session: Any, found: Read) -> tuple[int, int]:

@@ -14,10 +14,11 @@ from spook_tracker.tracker.document.json_form import Number, readable
 from spook_tracker.tracker.judge.causes import causes_tonight
 from spook_tracker.tracker.judge.choice import worst_change
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Frontier, Side
+from spook_tracker.tracker.judge.explaining import TIMES
 from spook_tracker.tracker.judge.judged import Judged
 from spook_tracker.tracker.judge.tonight import Finding, not_compared
 from spook_tracker.tracker.judge.verdict import Verdict
-from spook_tracker.tracker.judge.vocabulary import OVERALL, QUIET, WORDS, spaced
+from spook_tracker.tracker.judge.vocabulary import OVERALL, QUIET, WORDS, besides, spaced
 
 COLOUR = {"✗": "red", "?": "yellow", "!": "yellow", "✓": "green"}
 MOST_ROWS = 40  # of a Markdown table: a comment on a pull request has its limits
@@ -132,7 +133,7 @@ def _worst(document: CompareDocument) -> list[str]:
 
 def _how(change: Change) -> str:
     """The size of the change in few letters: decades, or per cent; else the sentence."""
-    if change.kind == "run_time" or not change.decades:
+    if change.kind in TIMES or not change.decades:
         return change.sentence
     if abs(change.decades) >= 0.05:
         return f"{change.decades:+.1f} decades"
@@ -244,6 +245,7 @@ def finding_lines(findings: Sequence[Finding], site: str = "") -> list[str]:
         *shared,
         *(click.style(_finding_line(finding, site), fg="red") for finding in red),
         *(click.style(_finding_line(f, site), fg="green") for f in findings if f.recovered),
+        *(click.style(_finding_line(f, site), fg="yellow") for f in findings if f.suspected),
         *(f"note: {clean(note)}" for note in not_compared(_verdicts(findings))),
     ]
 
@@ -288,8 +290,7 @@ def _verdicts(findings: Sequence[Finding]) -> Iterator[tuple[str, Verdict]]:
 def summary(findings: Sequence[Finding]) -> str:
     """One sentence: how many are red, how many of them since tonight, which is the worst, how many recovered."""
     red = [finding for finding in findings if finding.red]
-    recovered = sum(finding.recovered for finding in findings)
-    also = f"; {recovered} recovered" if recovered else ""
+    also = besides([finding.state for finding in findings])
     words = Counter(finding.verdict.word for finding in findings if not finding.red)
     if red:
         new = sum(finding.news for finding in red)
@@ -299,8 +300,8 @@ def summary(findings: Sequence[Finding]) -> str:
         return click.style(told, fg="red", bold=True)
     if not findings:
         return click.style("? nothing was measured that could be judged", fg="yellow", bold=True)
-    held = len(findings) - words["new"] - words["not_comparable"]
-    parts = [f"{held} series hold their level"] if held or not words else []
+    held = len(findings) - words["new"] - words["not_comparable"] - sum(f.suspected for f in findings)
+    parts = [f"{held} series hold their level"] if held or also or not words else []
     if words["new"]:
         parts.append(f"{words['new']} are measured for the first time: nothing to compare with yet")
     if words["not_comparable"]:
@@ -310,7 +311,8 @@ def summary(findings: Sequence[Finding]) -> str:
 
 def _finding_line(finding: Finding, site: str) -> str:
     judged, definition = finding.judged, finding.definition
-    parts = [f"✓ {finding.series}: recovered" if finding.recovered else f"✗ {finding.series}: {finding.name}"]
+    mark, what = ("✓", "recovered") if finding.recovered else ("✗", finding.name)
+    parts = [f"? {finding.series}: suspected" if finding.suspected else f"{mark} {finding.series}: {what}"]
     if judged is not None and definition is not None:
         before, now = judged.pair
         parts.append(f"{value(before)} → {value(now, definition.unit)}")

@@ -15,7 +15,7 @@ from spook_tracker.tracker.judge.events import name_of
 from spook_tracker.tracker.judge.judged import BY_TIME, Judged, blame, commit_of, of_one_lineage
 from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.series_history import Told, is_noisy, lanes_of, on_one_clock
-from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, STATES, spaced
+from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, STATES, besides, spaced
 
 FEW = 6  # series that are shown night by night; of more, those that are red
 SMALL = 12  # columns of a small sparkline
@@ -42,8 +42,7 @@ def summary(trends: Sequence[Told], maps: Sequence[ToldMap] = ()) -> str:
     beside = "".join(f"\n{line}" for line in lines[:1])
     beside += "".join(f"\n! red when another machine was last asked: {line}" for line in elsewhere)
     states = [told.nights[-1].state for told in trends if told.nights] + [told.state for told in maps]
-    recovered = states.count("recovered")
-    also = f"; {recovered} recovered" if recovered else ""
+    also = besides(states)
     if not named:
         return click.style(f"✓ {every} series, none of them red tonight{also}", fg="green") + beside
     _, _, key, name = min(named, key=lambda one: one[:2])

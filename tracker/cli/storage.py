@@ -103,6 +103,10 @@ def import_files(
         click.echo(
             f"no unit, so only kept as what may explain a change: {names}; say it with --column {found.unknown[0]}=UNIT"
         )
+    if found.absent:
+        click.echo(
+            f"no record has a column {', '.join(found.absent)}: what --column says of it changes nothing"
+        )
 
 
 @click.command(epilog=example("tracker schema > run.schema.json"))

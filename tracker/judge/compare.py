@@ -18,7 +18,7 @@ from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesD
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.compare_ladders import frontiers, run_times
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Side
-from spook_tracker.tracker.judge.explaining import beside_run_times, calm
+from spook_tracker.tracker.judge.explaining import TIMES, beside_run_times, calm
 from spook_tracker.tracker.judge.judged import BY_TIME, Judged, of_one_lineage, red_class
 from spook_tracker.tracker.judge.known import Known, judged_in, known
 from spook_tracker.tracker.judge.lane import (
@@ -32,7 +32,7 @@ from spook_tracker.tracker.judge.lane import (
 )
 from spook_tracker.tracker.judge.maps import NO_MAP, map_key, stands_of
 from spook_tracker.tracker.judge.series_history import Told, judge_all
-from spook_tracker.tracker.judge.slower import Usual, judge_time, only_followed, to_be_confirmed
+from spook_tracker.tracker.judge.slower import CONFIRM, Usual, judge_time, only_followed, to_be_confirmed
 from spook_tracker.tracker.judge.standing import FOLLOWED, NO_VALUE, honest, standing
 from spook_tracker.tracker.judge.tonight import not_compared
 from spook_tracker.tracker.judge.verdict import Verdict, judge, judge_map
@@ -40,7 +40,6 @@ from spook_tracker.tracker.judge.vocabulary import OVERALL, RED, WORD_RANK, Clas
 from spook_tracker.tracker.judge.work import families_of, is_read_off
 
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
-TIMES = ("time", "run_time")
 MOST_NAMES = 5  # of series, in a note
 DOUBLED = 0.3  # decades: a time read off one session that doubled is worth a line, though it proves nothing
 
@@ -405,6 +404,11 @@ def _notes(before: ComparedRun, after: ComparedRun, changes: Sequence[Change]) -
             if change.kind not in ("work", *TIMES)
         ]
         notes += not_compared(told)
+    slow = [f"{change.series} ({change.sentence})" for change in changes if CONFIRM in change.sentence]
+    if slow:
+        notes.append(
+            f"slow for one night: {', '.join(slow[:MOST_NAMES])}{', …' if len(slow) > MOST_NAMES else ''}"
+        )
     lost = sum(
         change.before_outcome in NO_VALUE and change.after_outcome in NO_VALUE and change.role not in FOLLOWED
         for change in changes

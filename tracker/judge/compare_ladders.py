@@ -35,8 +35,8 @@ def run_times(before: Samples, after: Samples) -> list[Change]:
             [new for _, new in both],
             definition.time_tolerance if definition.kind == "ladder" else definition.relative_tolerance,
         )
-        if found is None:
-            continue
+        if found is None or (definition.kind == "time" and not found.repeated):
+            continue  # a time without repeats is told by itself
         word: Word = "regressed" if found.slower else "improved" if found.faster else "same"
         percent = 100.0 * (found.ratio - 1.0)
         sentence = f"{percent:+.0f} % run time over {found.rungs} rungs"

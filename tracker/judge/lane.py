@@ -259,8 +259,10 @@ def with_missing(
         for i in silent:
             if runs[i].engine.name != points[0].run.engine.name:
                 continue
-            if begun is not None and begun.get(runs[i].machine.fingerprint, i) >= i:
-                continue  # that machine has never timed it
+            if begun is not None and (
+                runs[i].trigger == "import" or begun.get(runs[i].machine.fingerprint, i) >= i
+            ):
+                continue  # what an imported run misses it says itself; or that machine has never timed it
             gone = not any(definition.test in asked(i).get(family, ()) for family in families)
             if gone and not any(removed(i, family, definition.role == "gate") for family in families):
                 continue

@@ -10,6 +10,7 @@ from spook_tracker.tracker.document.run_document import Sample
 from spook_tracker.tracker.judge.verdict import Verdict
 
 LEAST = 0.01  # relative: no change of a time below is told, whatever the evidence
+CONFIRM = "to be confirmed by another night"
 Usual = tuple[float, float]  # level, and the relative change that stands clear of its noise
 
 
@@ -17,9 +18,7 @@ def to_be_confirmed(verdict: Verdict) -> Verdict:
     """A slow night that no second one has confirmed yet is not red."""
     if not verdict.red:
         return verdict
-    return replace(
-        verdict, word="same", name="", sentence=f"{verdict.sentence}, to be confirmed by another night"
-    )
+    return replace(verdict, word="same", name="", sentence=f"{verdict.sentence}, {CONFIRM}")
 
 
 def only_followed(verdict: Verdict) -> Verdict:
@@ -65,7 +64,7 @@ def slower(change: float, level: float, value: float, name: str) -> Verdict:
             word="regressed", sentence=f"no finite value any more, {level:g} before", name="not finite"
         )
     if not name:
-        return Verdict(word="same", sentence=f"{change_in_words(change)}, to be confirmed by another night")
+        return Verdict(word="same", sentence=f"{change_in_words(change)}, {CONFIRM}")
     return Verdict(
         word="regressed",
         sentence=change_in_words(change),
@@ -76,8 +75,11 @@ def slower(change: float, level: float, value: float, name: str) -> Verdict:
 
 def by_outcome(verdict: Verdict, sample: Sample) -> Verdict:
     """The same, where a night without a number is called what became of it."""
-    if verdict.name != "not finite" or sample.outcome in ("value", "not_finite"):
+    if verdict.name != "not finite" or sample.outcome == "value":
         return verdict
+    if sample.outcome == "not_finite":
+        why = f"{sample.failure}; " if sample.failure else ""
+        return replace(verdict, sentence=f"{why}{verdict.sentence}")
     if sample.outcome == "missing":
         return replace(verdict, word="missing", name="missing", sentence=sample.failure or verdict.sentence)
     name = sample.outcome.replace("_", " ")

@@ -51,6 +51,11 @@ class Finding:
         return self.state == "recovered"
 
     @property
+    def suspected(self) -> bool:
+        """A slow night that no second one has confirmed."""
+        return self.state == "suspected"
+
+    @property
     def stands(self) -> Class:
         """What it stands for tonight."""
         return self.judged.stands if self.judged is not None else stands_of(self.verdict)

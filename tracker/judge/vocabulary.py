@@ -6,7 +6,7 @@ here the word, its mark, whether it is red and how bad it is.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -100,6 +100,12 @@ STATES: dict[State, str] = {
     "suspected": "? suspected",
     "unjudged": "",
 }
+
+
+def besides(states: Sequence[State]) -> str:
+    """How many series recovered, and how many are slow and to be confirmed; empty if none."""
+    words: list[tuple[State, str]] = [("recovered", "recovered"), ("suspected", "to be confirmed")]
+    return "".join(f"; {count} {said}" for state, said in words if (count := states.count(state)))
 
 
 def with_recoveries(states: Iterable[State]) -> Iterator[State]:

@@ -302,7 +302,11 @@ def _bench(one: Mapping[str, Any], better: Literal["smaller", "larger"] | None) 
     unit = unit_of(str(one.get("unit", "1")))
     if better:
         unit = msgspec.structs.replace(unit, better=better)
-    return sampled(one["name"], one["value"], unit)
+    try:
+        return sampled(one["name"], one["value"], unit)
+    except (TypeError, ValueError):  # a text, a list
+        failed = sampled(one["name"], None, unit)
+        return msgspec.structs.replace(failed, **_failed(one["value"]))
 
 
 def sampled(test: str, value: Any, unit: Unit) -> ShortResult:

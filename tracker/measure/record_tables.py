@@ -59,6 +59,7 @@ class Tables:
 
     runs: tuple[RunDocument, ...]
     unknown: tuple[str, ...]
+    absent: tuple[str, ...]  # columns that were given a meaning and are in no record
 
 
 def is_table(file: Path, content: bytes) -> bool:
@@ -94,10 +95,12 @@ def of_tables(
 ) -> Tables:
     """The runs in these files together: what several say of one commit is one run. DocumentError."""
     unknown: dict[str, None] = {}
+    columns: set[str] = set()
     runs: dict[tuple[str, ...], list[_Growing]] = {}
     for file, content in files.items():
         records = sorted(_records(file, content), key=lambda one: _started(one[1], told))
         for place, record in records:
+            columns |= record.keys()
             about, results = _read(file, place, record, told, unknown)
             key = tuple(about.get(name, "") for name in RUN if name != "started")
             same = runs.setdefault(key, [])
@@ -107,9 +110,9 @@ def of_tables(
             run.add(results, f"{file}:{place}")
     short = [one.whole() for same in runs.values() for one in same]
     origin = str(next(iter(files), ""))
-    return Tables(
-        documents_of(((run, branch) for run, branch in short if run.results), beside, origin), tuple(unknown)
-    )
+    documents = documents_of(((run, branch) for run, branch in short if run.results), beside, origin)
+    absent = (pattern for pattern, _ in told if not any(fnmatchcase(name, pattern) for name in columns))
+    return Tables(documents, tuple(unknown), tuple(absent))
 
 
 @dataclass(slots=True)

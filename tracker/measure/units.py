@@ -12,6 +12,15 @@ SECONDS |= dict.fromkeys(("s", "sec", "secs", "second", "seconds"), 1.0)
 BYTES = {"b": 1.0, "byte": 1.0, "bytes": 1.0}  # B
 BYTES |= {f"{letter}b": 1e3**power for power, letter in enumerate("kmgt", 1)}
 BYTES |= {f"{letter}ib": 1024.0**power for power, letter in enumerate("kmgt", 1)}
+RATES = {
+    "fps": "frames/s",
+    "hz": "1/s",
+    "khz": "1/ms",
+    "mhz": "1/us",
+    "qps": "queries/s",
+    "rps": "requests/s",
+}
+RATES |= {f"{size}flops": f"{size}flop/s" for size in ("", "k", "m", "g", "t")}
 PHYSICAL = (
     "m",
     "mm",
@@ -33,6 +42,7 @@ class Unit(msgspec.Struct, frozen=True):
 
 def unit_of(text: str) -> Unit:
     """`us/iter` is s, `KB` is B, `ops/ms` is ops/s, larger is better; an unknown unit stays, smaller is better."""
+    text = RATES.get(text.strip().lower(), text)
     above, _, below = (part.strip() for part in text.partition("/"))
     if (scale := SECONDS.get(above.lower())) is not None:
         return Unit("s", scale)
