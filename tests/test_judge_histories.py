@@ -159,6 +159,9 @@ def test_one_slow_night_is_told_by_every_command_and_red_in_none(tracker: Any) -
         assert code == 0
         assert "slow for one night: t/" in said if "compare" in command else "; 1 to be confirmed" in said
         assert re.search(r"\+\d+\.\d % for the worse, to be confirmed", said)
+        if pair := re.search(r"suspected; ([\d.e-]+) → ([\d.e-]+) s; .*?\+([\d.]+) %", said):
+            assert 100.0 * (float(pair[2]) / float(pair[1]) - 1.0) == pytest.approx(float(pair[3]), abs=0.1)
+        assert (pair is not None) == ("judge" in command)
 
 
 def test_timing_is_told_from_a_clock_that_stands_still(tracker: Any) -> None:

@@ -57,8 +57,8 @@ class Judged(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def pair(self) -> tuple[Number | None, Number]:
-        """What is printed beside the sentence: the value before and now, of run times red or recovered their levels."""
-        if self.state in ("detected", "recovered") and self.levels is not None:
+        """What is printed beside the sentence: the value before and now, of run times red, slow or recovered their levels."""
+        if self.state in ("detected", "recovered", "suspected") and self.levels is not None:
             return Number(self.levels[0]), Number(self.levels[1])
         return None if self.against is None else self.against.sample.value, self.night.sample.value
 
