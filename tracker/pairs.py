@@ -21,7 +21,6 @@ from spook_tracker.tracker.document.run_document import RunDocument, Sample, Ser
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.calibration import geometric_mean
 from spook_tracker.tracker.judge.compare import (
-    TIMES,
     ComparedRun,
     accept,
     compare,
@@ -30,7 +29,7 @@ from spook_tracker.tracker.judge.compare import (
     side_of,
 )
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
-from spook_tracker.tracker.judge.explaining import EXPLAINING, beside_run_times
+from spook_tracker.tracker.judge.explaining import EXPLAINING, TIMES, beside_run_times
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
 from spook_tracker.tracker.judge.pairs import (
     BLOCKS,

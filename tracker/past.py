@@ -19,8 +19,9 @@ import msgspec
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import RunDocument, Sample, SeriesDefinition
 from spook_tracker.tracker.judge.choice import Choice
-from spook_tracker.tracker.judge.compare import TIMES, ComparedRun, compare, side_of
+from spook_tracker.tracker.judge.compare import ComparedRun, compare, side_of
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
+from spook_tracker.tracker.judge.explaining import TIMES
 from spook_tracker.tracker.judge.lane import asked_for, line_of
 from spook_tracker.tracker.judge.tonight import Finding
 from spook_tracker.tracker.judge.verdict import NEW_DEFINITION

@@ -260,7 +260,7 @@ def with_missing(
             if runs[i].engine.name != points[0].run.engine.name:
                 continue
             if begun is not None and (
-                runs[i].trigger == "import" or begun.get(runs[i].machine.fingerprint, i) >= i
+                getattr(runs[i], "trigger", "") == "import" or begun.get(runs[i].machine.fingerprint, i) >= i
             ):
                 continue  # what an imported run misses it says itself; or that machine has never timed it
             gone = not any(definition.test in asked(i).get(family, ()) for family in families)

@@ -208,8 +208,8 @@ def _judge_times(
             first = lane[noisy.first_bad] if noisy.first_bad is not None else None
             worse_at = lane[noisy.worse_at] if noisy.worse_at is not None else first
             good = lane[noisy.last_good] if noisy.last_good is not None else None
-            again = noisy.worse_at if noisy.worse_at != noisy.first_bad else None
-            before = lane[again - 1] if again else good
+            later = noisy.worse_at if noisy.worse_at != noisy.first_bad else None
+            before = lane[later - 1] if later else good
             found[places[i]] = Judged(
                 night=lane[i],
                 verdict=noisy.verdict,
