@@ -1,28 +1,6 @@
 """What to keep of a run: a quantity, reduced inside the native loop. Only what is asked for is computed.
 
-Quantities (per sample)                         shape            unit
-  Position, Velocity (body or all)              (3,) or (n, 3)   m, m/s; of the centre of mass, or of `point` [m] of
-                                                                 one rigid body, in its axes from that centre
-  Orientation (body or all)                     (4,) or (n, 4)   1, quaternion (w, x, y, z)
-  AngularVelocity (body or all)                 (3,) or (n, 3)   rad/s, world axes
-  KineticEnergy, PotentialEnergy, Energy        ()               J; gravity −m g·x, central −m k/r,
-                                                                 springs, those of joints too, ½ k d²; compliant
-                                                                 rows count nothing
-  Violation (constraint or all distances)       (), (n,), (rows,)  m or rad; of a distance |d| − rest_length, of
-                                                                 a wire its length beyond, of a relation its sum
-  ConstraintForce (constraint or all distances) (), (n,) or (6,) N, positive where the rod or wire pulls (tension);
-                                                                 joints: force [N], torque [N m] on the second;
-                                                                 relations: what a coordinate of coefficient 1 feels
-  Momentum, AngularMomentum(about)              (3,)             N s, kg m²/s
-  ContactForce (body, other or all)             (3,)             N, on `body`, sum over the contact points
-  ContactCount, Penetration                     ()               1; largest penetration depth, m
-  ContactPoints (most)                          (most, 10)       place [m], normal onto the first body of the pair,
-                                                                 force [N] on that body, coefficient of friction [1],
-                                                                 along its direction if it has one; in order of
-                                                                 bodies, NaN where there are fewer points
-  JointCoordinate (joint)                       ()               m or rad, free coordinate of an axial joint;
-                                                                 a hinge counts its turns
-
+Each quantity says its shape, unit, axes and sign, and what it costs: `help(Violation)`.
 Sample k is the state after k steps, sample 0 the start; forces and contact forces belong to the step that
 ended there and are zero at sample 0. With half-step velocities, velocities and energies are those at the
 sample's time, the mean of the half steps before and after.
@@ -58,6 +36,11 @@ def _point_of_one(quantity: Position | Velocity) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Position(Quantity):
+    """Where a body is: shape (3,) [m], world axes; of all bodies (None) (bodies, 3), in the scene's order.
+
+    Of the centre of mass, or of a `point` [m] of one rigid body, in its axes from that centre. Costs a copy.
+    """
+
     body: str | None = None
     point: Vector = (0.0, 0.0, 0.0)
 
@@ -67,6 +50,12 @@ class Position(Quantity):
 
 @dataclass(frozen=True, slots=True)
 class Velocity(Quantity):
+    """How fast a body moves: shape (3,) [m/s], world axes; of all bodies (None) (bodies, 3).
+
+    Of the centre of mass, or of a `point` [m] of one rigid body, in its axes from that centre. Costs a copy. With
+    half-step velocities it is that at the sample's time, the mean of the half steps before and after.
+    """
+
     body: str | None = None
     point: Vector = (0.0, 0.0, 0.0)
 
@@ -76,46 +65,74 @@ class Velocity(Quantity):
 
 @dataclass(frozen=True, slots=True)
 class Orientation(Quantity):
+    """How a rigid body is turned: shape (4,) [1], the unit quaternion (w, x, y, z) from its axes to the world's; of all
+    bodies (None) (bodies, 4), a particle's (1, 0, 0, 0). Costs a copy.
+    """
+
     body: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class AngularVelocity(Quantity):
+    """How fast a rigid body turns: shape (3,) [rad/s], world axes, right-handed; of all bodies (None) (bodies, 3), a
+    particle's 0. Costs a copy.
+    """
+
     body: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class KineticEnergy(Quantity):
-    pass
+    """½ m v² + ½ ω·I ω over all bodies that move dynamically: shape () [J]. Costs one pass over the bodies."""
 
 
 @dataclass(frozen=True, slots=True)
 class PotentialEnergy(Quantity):
-    pass
+    """Of gravity −m g·x, of central gravity −m k/r, of springs, those of joints too, ½ k d²: shape () [J].
+
+    What compliant rows store counts nothing. Costs one pass over bodies and springs.
+    """
 
 
 @dataclass(frozen=True, slots=True)
 class Energy(Quantity):
-    pass
+    """Kinetic and potential energy together: shape () [J]; a closed scene keeps it. Costs as both."""
 
 
 @dataclass(frozen=True, slots=True)
 class Violation(Quantity):
+    """By how much a constraint is violated.
+
+    Of a distance |d| − rest_length [m], positive where it is too long, of a wire its length beyond, of a relation its
+    sum: shape (). Of a joint shape (rows,) [m, then rad], in the frame fixed to its first body. Of all distances (None)
+    (distances,), in the scene's order; a scene that has other constraints alone must name one. Costs nothing that the
+    step does not compute.
+    """
+
     constraint: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class ConstraintForce(Quantity):
+    """What a constraint exerts in the step that ended here; zero at sample 0.
+
+    Of a distance or a wire its tension [N], positive where it pulls, of a relation what a coordinate of coefficient 1
+    feels: shape (). Of a joint force [N] and torque [N m] on its second body: shape (6,), world axes. Of all distances
+    (None) (distances,). Costs one product for each joint that is asked.
+    """
+
     constraint: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Momentum(Quantity):
-    pass
+    """Σ m v of what moves dynamically: shape (3,) [N s], world axes. Costs one pass over the bodies."""
 
 
 @dataclass(frozen=True, slots=True)
 class AngularMomentum(Quantity):
+    """Σ m (x − about) × v + I ω: shape (3,) [kg m²/s], world axes, about a world point [m]. Costs one pass over the bodies."""
+
     about: Vector = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
@@ -124,22 +141,32 @@ class AngularMomentum(Quantity):
 
 @dataclass(frozen=True, slots=True)
 class ContactForce(Quantity):
+    """What contacts exert on `body` in the step that ended here, by `other` or by all (None): shape (3,) [N], world axes,
+    the sum over the points; zero at sample 0. Costs one pass over the contact points.
+    """
+
     body: str
     other: str | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class ContactCount(Quantity):
-    pass
+    """How many contact points there are: shape () [1]. Costs nothing."""
 
 
 @dataclass(frozen=True, slots=True)
 class Penetration(Quantity):
-    pass
+    """The largest depth by which two bodies overlap, 0 where none do: shape () [m]. Costs one pass over the points."""
 
 
 @dataclass(frozen=True, slots=True)
 class ContactPoints(Quantity):
+    """Every contact point, at most `most` of them: shape (most, 10), in order of bodies, NaN where there are fewer.
+
+    Columns: place [m], normal onto the first body of the pair [1], force on that body [N], coefficient of friction [1],
+    along its direction if it has one; world axes. Costs a copy.
+    """
+
     most: int
 
     def __post_init__(self) -> None:
@@ -151,6 +178,10 @@ class ContactPoints(Quantity):
 
 @dataclass(frozen=True, slots=True)
 class JointCoordinate(Quantity):
+    """The free coordinate of a hinge [rad, its turns counted] or of a prismatic joint [m]: shape (), positive along or
+    about its axis, of the second body against the first. Costs one product.
+    """
+
     joint: str
 
 

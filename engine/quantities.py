@@ -112,6 +112,12 @@ def _of_constraint(
     name = "constraint_force" if force else "violation"
     if quantity.constraint is None:
         count = sum(isinstance(constraint, Distance) for constraint in scene.constraints)
+        if scene.constraints and not count:
+            named = scene.constraints[0].name
+            raise MethodError(
+                f"observe: {quantity!r} means every distance constraint, and this scene has none; name one of its "
+                f"constraints, as in {type(quantity).__name__}({named!r})"
+            )
         return _ask(name), (count,)
     index = _constraint(scene, quantity.constraint)
     constraint = scene.constraints[index]

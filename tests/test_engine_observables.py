@@ -7,21 +7,25 @@ import pytest
 
 from spook_tracker.engine import (
     AngularMomentum,
+    Box,
     CentralGravity,
     ConstraintForce,
     Distance,
     Energy,
     Final,
+    Hinge,
     KineticEnergy,
     Maximum,
     MaximumAbsolute,
     Mean,
     Method,
+    MethodError,
     Minimum,
     Momentum,
     Particle,
     Position,
     PotentialEnergy,
+    RigidBody,
     Scene,
     Spring,
     Trace,
@@ -29,6 +33,7 @@ from spook_tracker.engine import (
     Violation,
     simulate,
 )
+from spook_tracker.engine.observe import Quantity
 from tests.particle_scenes import TIME_STEP, chain, everything
 
 QUANTITIES = (
@@ -167,3 +172,21 @@ def test_an_observable_that_was_not_asked_for_is_an_error_that_says_what_was() -
     )
     with pytest.raises(KeyError, match="heat"):
         result["weather"]
+
+
+def test_every_quantity_says_its_shape_and_what_it_costs() -> None:
+    for kind in Quantity.__subclasses__():
+        assert all(word in (kind.__doc__ or "") for word in ("shape (", "Costs")), kind
+
+
+@pytest.mark.parametrize("kind", [Violation, ConstraintForce])
+def test_all_distances_of_a_scene_that_has_other_constraints_alone_are_refused(kind: type[Quantity]) -> None:
+    """It gave an array without a value, in silence."""
+    door = RigidBody(name="door", mass=1.0, shape=Box((1.0, 0.1, 1.0)), position=(0.5, 0.0, 0.0))
+    hinge = Hinge(name="hinge", between=("world", "door"), at=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
+    scene = Scene(bodies=(door,), constraints=(hinge,))
+
+    with pytest.raises(MethodError, match=r"has none; name one of its constraints, as in \w+\('hinge'\)"):
+        simulate(scene, time_step=TIME_STEP, steps=1, observe={"x": Final(quantity=kind())})
+    named = simulate(scene, time_step=TIME_STEP, steps=1, observe={"x": Final(quantity=kind("hinge"))})
+    assert named["x"].size in (5, 6)
