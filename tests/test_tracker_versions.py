@@ -178,3 +178,13 @@ def test_an_imported_engine_is_not_the_one_a_word_means_while_another_was_measur
     ours, theirs = runs_of(commit(A, name="ours"), commit(B, name="theirs"))
 
     assert found([ours, replace(theirs, trigger="import")], "latest").engine.git_hash == A
+
+
+def test_a_version_as_pages_print_it_is_one_commits_or_refused() -> None:
+    """A clone without tags calls its versions 0.1.dev1352+g381feb610, and pages leave out what follows the plus sign."""
+    whole = ("0.1.dev7+g1a1a1a1", "0.1.dev8+g2b2b2b2", "0.1.dev8+g3c3c3c3")
+    runs = runs_of(*(commit(git_hash, version=name) for git_hash, name in zip((A, B, C), whole, strict=True)))
+
+    assert found(runs, "0.1.dev7").engine.git_hash == A
+    with pytest.raises(UnknownName, match=r"could be 0\.1\.dev8\+g2b2b2b2, 0\.1\.dev8\+g3c3c3c3; write it whole"):
+        found(runs, "0.1.dev8")

@@ -1,7 +1,8 @@
 """Which run a name stands for. A name on the command line is one of
 
 latest, previous, last-green    the newest run, the one before it, the newest with every gate passed
-an engine version               1.2.0 or 1.2.1.dev3+g1a2b3c4: its newest run
+an engine version               1.2.0 or 1.2.1.dev3+g1a2b3c4: its newest run; 1.2.1.dev3 as pages print it, if it is one
+                                commit's
 a commit                        its hash or the start of it (4 characters or more), a tag, a branch
 a run                           its id or the start of it (4 characters or more)
 
@@ -98,7 +99,16 @@ def _among(runs: list[RunInfo], name: str, commit_of: Callable[[str], str | None
         return started
     commit = commit_of(name)
     of_commit = [run for run in runs if commit and run.engine.git_hash == commit]
-    return _newest(of_commit) if of_commit else None
+    return _newest(of_commit) if of_commit else _by_public_version(runs, name)
+
+
+def _by_public_version(runs: list[RunInfo], name: str) -> RunInfo | None:
+    """The version without the commit behind its plus sign: no more can be told from a page or a terminal."""
+    meant = [run for run in runs if run.engine.version.partition("+")[0] == name]
+    versions = tuple(sorted({run.engine.version for run in meant}))
+    if len(versions) > 1:
+        raise UnknownName(f"{name!r} could be {', '.join(versions[:5])}; write it whole", versions[:5])
+    return _newest(meant) if meant else None
 
 
 def _by_word(runs: list[RunInfo], word: str) -> RunInfo | None:
