@@ -53,8 +53,9 @@ class Method:
     friction           cone (isotropic), box (bound from the step before), scaled_box (current normal force)
     impacts            simultaneous: all that touch take part in one impact (a ball on four gives −.6 and four times .4);
                        free balls of which one pair meets at a time do so one after the other, as often as they meet; any
-                       other pair, or a joint's stop, is hit once in a step, and stops without rebound where it approaches
-                       again (counters["stopped_impacts"]);
+                       other pair is hit once in a step, and stops without rebound where it approaches again
+                       (counters["stopped_impacts"]); so is a joint's stop where surfaces may touch or another is connected,
+                       else as often as its ends are met in the step;
                        successive: one pair after the other until none approaches, as if there were small gaps (the
                        last ball leaves, no energy is lost at restitution 1); those that are open as a step begins in
                        the order in which they close, free balls moved from one impact to the next

@@ -210,12 +210,41 @@ double JointSet::one_sided(double inwards, double violation, double rate, const 
     stop.rebound = 0.0;
     stop.hit = approach > state.rebounds && (open ? time_step_ * approach > gap : hit);
     stop.cut = restitution > 0.0 && stop.hit && restitution * approach > room / time_step_;
-    if (restitution > 0.0 && stop.hit)
+    if (stop.cut && stops_fold_ && state.given == 0.0)
+        value = fold(inwards, violation, approach, restitution, state, stop);
+    else if (restitution > 0.0 && stop.hit)
         value = stop.rebound = inwards * std::min(restitution * approach, std::max(0.0, room) / time_step_);
     else if (!open && hit)  // plastic: the SPOOK row would let a part of the speed in and send it back
         value = -row.violation_gain * violation;
     state.closed = open ? 0 : inwards > 0.0 ? 1 : -1;
     return value;
+}
+
+/// What is left of a rate that goes to and fro between the ends of a stop, `restitution` of it after each impact; and where the
+/// coordinate is then. Impacts act along one direction, and the joint's own rows are linear in the step: this is exact.
+double JointSet::fold(double inwards, double violation, double approach, double restitution, State& state,
+                      StopRow& stop) noexcept {
+    constexpr double most_impacts = 1e4;  // of those that lose speed
+    double way = inwards, speed = restitution * approach;
+    double left = time_step_ - std::max(0.0, inwards * violation) / approach;  // s
+    if (restitution == 1.0) {
+        const double impacts = std::floor(left * speed / stop.range);
+        left = std::max(0.0, left - impacts * (stop.range / speed));
+        if (std::fmod(impacts, 2.0) != 0.0) way = -way;
+    } else {
+        for (double impacts = 0.0; left * speed > stop.range && impacts < most_impacts; ++impacts) {
+            left -= stop.range / speed;
+            speed *= restitution;
+            way = -way;
+        }
+    }
+    const double gone = std::min(left * speed, stop.range);  // since the last impact
+    state.folds = some_given_ = true;
+    state.fold_to =
+        state.angle - violation + (way == inwards ? inwards * gone : inwards * (stop.range - gone));
+    stop.room = unbounded;
+    stop.cut = false;
+    return stop.rebound = way * speed;
 }
 
 JointSet::RowGain JointSet::gain(int index, int row) const noexcept {
@@ -282,6 +311,10 @@ void JointSet::overstep(int index, std::span<const BodyState> bodies, double* ou
     const Axial& axial = axials_[joint.axial];
     if (!axial.has_limit) return;
     const double at = coordinate(block.joint, bodies), low = at - axial.lower, high = at - axial.upper;
+    if (states[block.joint].folds) {
+        out[axial.has_motor ? 1 : 0] = at - states[block.joint].fold_to;
+        return;
+    }
     out[axial.has_motor ? 1 : 0] =
         axial.lower == axial.upper ? low : std::min(0.0, low) + std::max(0.0, high);
 }
@@ -318,7 +351,8 @@ void JointSet::follow(std::span<const BodyState> bodies) noexcept {
             continue;  // the next rows do
         const AxialRow row = axial_row(joint.constants, first, second);
         double& angle = states[index].angle;
-        angle = unwrapped(joint, row.coordinate, angle + time_step_ * row.rate);
+        const State& state = states[index];
+        angle = unwrapped(joint, row.coordinate, state.folds ? state.fold_to : angle + time_step_ * row.rate);
     }
 }
 

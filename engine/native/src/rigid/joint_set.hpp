@@ -118,7 +118,13 @@ public:
     }
     /// Free coordinate of a hinge (unwrapped) or prismatic joint.
     double coordinate(int joint, std::span<const BodyState> bodies) const noexcept;
-    /// Whether some limit that the scene began beyond was assembled since this was asked last.
+    /// From now on a stop that is hit several times in a step, by turns with its other end, gives back what all of these leave.
+    void let_stops_fold() noexcept { stops_fold_ = true; }
+    bool folds(int block) const noexcept {
+        return blocks_[block].axial && states[blocks_[block].joint].folds;
+    }
+    /// Whether some limit was assembled, since this was asked last, that a step does not end at by its velocities: the scene
+    /// began beyond it, or it folds.
     bool take_given() noexcept { return std::exchange(some_given_, false); }
     /// How far the one-sided row of a block is to come back in this step, since the scene began beyond it: a part of
     /// its overstep(), whose sign it has; `row` is its index. 0 where there is none.
@@ -135,6 +141,7 @@ public:
             states[joint].at_limit = states[joint].closed;
             states[joint].rebounds = 0.0;
             states[joint].met = 0;
+            states[joint].folds = false;
         }
     }
     /// Counts the turns of tracked hinges after every step, whose rates tell how many there were.
@@ -229,12 +236,14 @@ private:
                        double* second, BlockRight& right) noexcept;
     double one_sided(double inwards, double violation, double rate, const Regularisation& row,
                      double restitution, double room, State& state, StopRow& stop) noexcept;
+    double fold(double inwards, double violation, double approach, double restitution, State& state,
+                StopRow& stop) noexcept;
     double unwrapped(const Joint& joint, double angle, double near) const noexcept;
     void assemble_axial(const Joint& joint, State& state, std::span<const BodyState> bodies, double* first,
                         double* second, BlockRight& right) noexcept;
 
     double time_step_;
-    bool some_given_ = false;
+    bool some_given_ = false, stops_fold_ = false;
     BodyState world_;
     LargeArray<Joint> joints_;
     std::vector<Axial> axials_;

@@ -24,7 +24,9 @@ struct JointState {
         0.0;  // only what arrives faster than this, m/s or rad/s: an impact of the step has answered it
     double given =
         -1.0;  // how far the scene began beyond its limit, as far as it still is; negative: not known
-    double angle = 0.0;  // unwrapped coordinate of a hinge that needs it
+    bool folds = false;    // the stops of the joint are hit several times in the step,
+    double fold_to = 0.0;  // and its coordinate is here behind the last, m or rad
+    double angle = 0.0;    // unwrapped coordinate of a hinge that needs it
     // N s: of an eye's row; of a tyre's rows along and across; of a joint's friction, as far as it follows the load
     std::array<double, 2> bound{};
 };

@@ -174,6 +174,13 @@ void RigidSystem::project_limits() {
         const int first = mixed_.rows[k].first, second = mixed_.rows[k].second;
         const int island = limit_projection_.islands.of_body[std::max(first, second)];
         if (std::min(first, second) < 0) limit_projection_.grounded[island] = 1;
+        if (joints_.folds(static_cast<int>(k))) {  // to where it shall be, the zero of its overstep
+            double* at = scratch_.overstep.data() + scratch_.overstep_at[k];
+            if (std::any_of(at, at + blocks[k].size, [](double each) { return each != 0.0; }))
+                beyond[island] = 1;
+            std::fill_n(at, blocks[k].size, 0.0);
+            continue;
+        }
         int row = 0;
         const double back = joints_.given_back(static_cast<int>(k), row);
         if (back == 0.0) continue;
@@ -288,14 +295,14 @@ bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector
             block.first = given.first < 0 ? -1 : place[given.first];
             block.second = given.second < 0 ? -1 : place[given.second];
             BlockRight unused;
+            double now[6];
+            joints_.overstep(k, live_.bodies, now);  // before its rows take notes
             joints_.assemble(k, live_.bodies, block.first_jacobian[0].data(), block.second_jacobian[0].data(),
                              unused);
             if (!joints_.others(k).empty()) {
                 fill_further(k, block, unused, scratch_.holding_further[k]);
                 for (FurtherBody& other : scratch_.holding_further[k]) other.body = place[other.body];
             }
-            double now[6];
-            joints_.overstep(k, live_.bodies, now);
             for (int row = 0; row < block.size; ++row) {
                 const double wanted = scratch_.overstep[scratch_.overstep_at[k] + row],
                              change = now[row] - wanted;

@@ -332,6 +332,9 @@ void RigidSystem::fill_rows(bool solved) {
         rows.upper = numbers.upper;
         rows.stop = numbers.stop;
         if (numbers.softness) std::copy_n(numbers.softness, rows.size, rows.softness.data());
+        if (const int i = rows.stop.row;
+            i >= 0)  // an impact is over long before the step is: its row does not give way
+            rows.softness[i] = rows.stop.rebound != 0.0 ? 0.0 : blocks[k].softness[i];
     }
     for (const int k : scratch_.other_ends) {
         mixed_.rows[k].stop.both = true;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <stdexcept>
+#include <utility>
 
 namespace spook {
 
@@ -14,6 +15,31 @@ RigidBodySpec turning(RigidBodySpec body) {
     body.particle = false;
     body.inertia = {body.mass, body.mass, body.mass};
     return body;
+}
+
+}  // namespace
+
+namespace {
+
+/// Whether no stop is connected to another: what one sends back does not reach any.
+bool stops_are_apart(const JointSet& joints, std::span<const int> index, int bodies) {
+    IslandFinder finder;
+    finder.begin(bodies);
+    const auto own = [&](int body) { return body < 0 ? -1 : index[body]; };
+    for (int k = 0; k < static_cast<int>(joints.blocks().size()); ++k) {
+        const JointBlock& block = joints.blocks()[k];
+        finder.tie(own(block.first), own(block.second));
+        for (const int body : joints.others(k))
+            finder.tie(std::max(own(block.first), own(block.second)), own(body));
+    }
+    const Islands& islands = finder.find();
+    std::vector<char> known(static_cast<std::size_t>(islands.count), 0);
+    for (const JointBlock& block : joints.blocks()) {
+        const int body = std::max(own(block.first), own(block.second));
+        if (body < 0 || !joints.may_stop(block)) continue;
+        if (std::exchange(known[static_cast<std::size_t>(islands.of_body[body])], 1) != 0) return false;
+    }
+    return true;
 }
 
 }  // namespace
@@ -101,6 +127,9 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     composed_ = method_.composition > 2;
     half_step_ = stages_.runs(Stage::half_step) && !composed_;
     stiff_ = stages_.runs(Stage::string_stiffness) && solver_ == RigidSolver::block;
+    if ((!fresh_contacts_ || !fresh_contacts_->possible()) &&
+        stops_are_apart(joints_, solver_index_, static_cast<int>(constrained_.size())))
+        joints_.let_stops_fold();
     curved_ = method_.corrections > 0 && !composed_ && rows_ > 0 &&
               (solver_ != RigidSolver::block || (fresh_contacts_ && fresh_contacts_->possible()));
     if (solver_ == RigidSolver::block && !composed_ && !half_step_ && !stiff_ && method_.corrections == 0 &&
