@@ -5,6 +5,7 @@ Every way that was found to end a gate with exit code 0 and nothing measured, pu
 
 from __future__ import annotations
 
+import os
 import sys
 from pathlib import Path
 
@@ -19,6 +20,8 @@ TOY = "from toy_engine import build_info, simulate\n"
 QUESTIONS = "from toy_questions import CATALOGUE\n"
 NIGHT = ("nightly", "--quick")
 GATES = [("run",), NIGHT, ("ci", "night", "--quick"), ("ci", "change")]
+DECIDES = "imported by the process that decides"
+pytestmark = pytest.mark.timeout(120)  # a gate that never ends is no gate
 
 ENDS_THE_PROCESS = {
     "sys.exit()": "import sys; sys.exit()",
@@ -58,10 +61,13 @@ def _desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 def gate(command: tuple[str, ...], **modules: str) -> Result:
     """The command with an engine and a catalogue of these texts, found where one stands."""
+    stops = f"import os\nif os.getpid() == {os.getpid()}: raise BaseException('{DECIDES}')\n"  # or it ends this test, too
     for name, text in modules.items():
-        Path(f"their_{name}.py").write_text(text)
+        Path(f"their_{name}.py").write_text(stops + text)
     asked = ["--engine", "their_engine", "--catalogue", "their_catalogue", "--workers", "1"]
-    return CliRunner().invoke(main, [*command, *asked], prog_name="tracker")
+    done = CliRunner().invoke(main, [*command, *asked], prog_name="tracker")
+    assert DECIDES not in f"{done.output}{done.exception}"
+    return done
 
 
 def runs() -> int:
@@ -100,14 +106,14 @@ def test_whatever_ends_the_process_that_imports_it_is_said_and_is_not_green(act:
 
     assert (done.exit_code, runs()) == (2, 0), done.output
     assert "nothing was measured" in done.stderr
-    assert not {"their_engine", "their_catalogue"} & set(sys.modules), "imported by the process that decides"
+    assert not {"their_engine", "their_catalogue"} & set(sys.modules), DECIDES
 
 
 def test_an_exit_is_told_with_the_line_it_stands_in() -> None:
     done = gate(("run",), engine="import sys\nsys.exit()", catalogue=QUESTIONS)
 
     assert "SystemExit" in done.stderr
-    assert "their_engine.py, line 2" in done.stderr
+    assert "their_engine.py, line 4" in done.stderr
 
 
 def test_a_tale_without_end_is_not_listened_to_for_ever(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import errno
 import lzma
 import os
 import tracemalloc
+from pathlib import Path
 
 import pytest
 from sqlalchemy.orm import Session
@@ -71,6 +73,42 @@ def test_a_night_rewrites_its_own_month_and_keeps_what_is_there(desk, tmp_path):
     assert (months / "2026-10.jsonl.xz").stat().st_mtime_ns == before
     assert lzma.decompress((months / "2026-11.jsonl.xz").read_bytes()).startswith(there)
     assert export_months(History(session), months) == ()
+
+
+def test_a_month_is_whole_until_the_new_one_takes_its_name(desk, tmp_path, monkeypatch):
+    session, months = desk("first"), tmp_path / "history"
+    record(session, night(1))
+    (file,) = export_months(History(session), months)
+    old, seen, rename = file.read_bytes(), [], Path.replace
+    record(session, night(2))
+
+    def stands(beside: Path, place: Path) -> Path:
+        seen.append((place.read_bytes(), lzma.decompress(beside.read_bytes()).count(b"\n")))
+        return rename(beside, place)
+
+    monkeypatch.setattr(Path, "replace", stands)
+    export_months(History(session), months)
+
+    assert seen == [(old, 2)]
+
+
+def test_a_disk_that_is_full_in_the_middle_of_a_month_costs_nothing_that_was_there(
+    desk, tmp_path, monkeypatch
+):
+    session, months = desk("first"), tmp_path / "history"
+    record(session, night(1))
+    (file,) = export_months(History(session), months)
+    old = file.read_bytes()
+    record(session, night(2))
+
+    def full(*_: object) -> int:
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(lzma.LZMAFile, "write", full)
+    with pytest.raises(DocumentError, match="No space left on device"):
+        export_months(History(session), months)
+
+    assert [(path, path.read_bytes()) for path in months.iterdir()] == [(file, old)]
 
 
 def test_a_known_run_is_not_decoded_again(desk, tmp_path, monkeypatch):
