@@ -18,6 +18,13 @@ REFUSED = [
     f"Server=localhost;Database=nights;Password={SECRET}",
     f"Data Source=nights;uid=u;pwd={SECRET}",
     f"service=x passfile={SECRET}",
+    f"PGPASSWORD={SECRET} psql nights",
+    f"psql --password {SECRET} nights",
+    f"{{'host': 'localhost', 'password': '{SECRET}'}}",
+    f"localhost:5432:nights:u:{SECRET}",
+    f"u%3A{SECRET}%40localhost/nights",
+    f"password%3D{SECRET} host%3Dlocalhost",
+    f"u/{SECRET}@localhost:5432/nights",
     f"postgresql:/u:{SECRET}@localhost/nights",
     f"postgresql:u:{SECRET}@localhost/nights",
     f"postgres:{SECRET}@localhost",
@@ -65,6 +72,13 @@ def test_of_a_database_only_its_place_is_shown(url: str) -> None:
     assert SECRET not in printed
     assert printed.startswith("postgresql://localhost")
     assert printed.endswith("/nights")
+
+
+@pytest.mark.parametrize(
+    "name", ["passwords.db", "my passages.db", "a:b.db", "nights@desk.db", "pg 16/user.db"]
+)
+def test_a_name_that_only_sounds_like_it_is_a_file(name: str) -> None:
+    assert shown(database_url(name)) == name
 
 
 def test_a_file_that_is_there_is_that_file_whatever_its_name(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 from sqlalchemy import URL, Engine, create_engine, event, exc, make_url
 from sqlalchemy.orm import Session
@@ -64,8 +65,9 @@ def database_url(given: str | None = None) -> URL:
 
 
 CONNECTS = re.compile(  # what the programs of PostgreSQL, ODBC and others take where we want a URL
-    r"(?:^|[\s;,&?])(?:host|hostaddr|port|dbname|user|user ?id|uid|pass\w*|pwd|service|server|ssl\w+)\s*="
-    r"|^\s*postgres\w*[:+]",
+    r"(?:^|[\s;,&?'\"{-])(?:host|hostaddr|port|dbname|user|user ?id|uid|pass\w*|pwd|service|server|ssl\w+|pg[a-z]+|secret|token)['\"]?\s*="
+    r"|(?:^|[\s;,&?'\"{-])(?:pass\w*|pwd)['\"]?\s*[:\s]\s*\S"
+    r"|^\W*postgres\w*[:+]|:[^/]*@|@[\w.-]+:\d|^[^:/\\]+:\d+:[^:]*:[^:]*:",
     re.IGNORECASE,
 )
 
@@ -74,7 +76,7 @@ def _refuse_secrets(path: str) -> None:
     """DatabaseError, which does not repeat it, if what would be the name of a file is meant for a server."""
     if Path(path).exists():
         return
-    if CONNECTS.search(path) or re.search(r":[^/]*@", path):
+    if CONNECTS.search(path) or CONNECTS.search(unquote(path)):
         raise DatabaseError(
             "the database looks like a server's, with a password perhaps, and is no URL: write "
             "postgresql://USER:PASSWORD@HOST/NAME, or for a file of such a name make it first"
