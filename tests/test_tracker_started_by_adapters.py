@@ -72,6 +72,7 @@ ENDS = {
     "answers": ("pass", (), 0),
     "hangs": ("time.sleep(300)", ("--time-limit", "1"), 1),
     "dies": ("os._exit(0)", (), 1),
+    "makes sessions": ("subprocess.Popen(MARK, start_new_session=True)", (), 0),
 }
 
 
@@ -125,11 +126,11 @@ def test_what_a_piece_has_started_ends_with_its_time_limit_while_the_others_go_o
 
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
 def test_a_command_that_is_ended_leaves_nobody_behind(how: signal.Signals, tmp_path: Path, mark: str) -> None:
-    process = start(tmp_path, mark, "time.sleep(300)")
+    process = start(tmp_path, mark, "subprocess.Popen(MARK, start_new_session=True); time.sleep(300)")
     end = time.monotonic() + 60
-    while not (tmp_path / "started").exists() and time.monotonic() < end:
+    while len(left(mark)) < 2 and time.monotonic() < end:
         time.sleep(0.05)
-    assert left(mark)
+    assert len(left(mark)) == 2
 
     process.send_signal(how)
     process.communicate(timeout=30)

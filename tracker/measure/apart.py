@@ -11,6 +11,7 @@ import base64
 import json
 import os
 import pickle
+import secrets
 import signal
 import subprocess
 import sys
@@ -213,9 +214,10 @@ def _started(order: tuple[Any, ...]) -> Iterator[subprocess.Popen[bytes]]:
     """A process that has its order; at the end nothing of it is left, and none of our streams was ever its own."""
     flags = ["-S"] * sys.flags.no_site + ["-P"]
     command = [sys.executable, *flags, "-c", BEGIN, json.dumps(sys.path)]
+    mark = secrets.token_hex(8)
     process = subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
-        start_new_session=os.name == "posix",
+        start_new_session=os.name == "posix", env={**os.environ, left_behind.MARK: mark},
     )  # fmt: skip
     relay = threading.Thread(target=_relay, args=(process.stderr, sys.stderr), daemon=True)
     relay.start()
@@ -226,7 +228,7 @@ def _started(order: tuple[Any, ...]) -> Iterator[subprocess.Popen[bytes]]:
             process.stdin.flush()
         yield process
     finally:
-        left_behind.end(process)
+        left_behind.end(process, mark)
         relay.join(1.0)  # what still holds the other end does not hold us
 
 

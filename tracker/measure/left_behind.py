@@ -1,7 +1,8 @@
 """Ending a process with all it has started, however it ended and whoever is there to see to it.
 
-The process is the first of a session of its own, in which everything that it starts stays, whatever process groups
-it makes. On Linux the session is looked up; elsewhere its first process group has to do.
+The process is the first of a session of its own, in which what it starts stays, whatever process groups it makes. What
+makes a session for itself, as servers do, is known by a word of its environment, which every process hands on. On Linux
+both are looked up; elsewhere the first process group has to do.
 """
 
 from __future__ import annotations
@@ -15,11 +16,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
+MARK = "TRACKER_SESSION"  # of the environment: which process it was that all this was started for
 ROUNDS = 20  # in which one that starts others while it is looked for is found, too
 
 
-def end(process: subprocess.Popen[Any]) -> None:
-    """End a process that was started in a session of its own, and that session; its pipes are closed."""
+def end(process: subprocess.Popen[Any], mark: str = "") -> None:
+    """End a process that was started in a session of its own and with this mark, and all of both; its pipes are closed."""
     if os.name != "posix":
         process.kill()
     else:
@@ -29,7 +31,7 @@ def end(process: subprocess.Popen[Any]) -> None:
             if os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT | os.WNOHANG) is None:
                 process.kill()
                 os.waitid(os.P_PID, process.pid, os.WEXITED | os.WNOWAIT)
-        end_session(process.pid)
+        end_session(process.pid, mark)
     process.wait()
     for pipe in (process.stdin, process.stdout):
         with suppress(OSError):
@@ -37,11 +39,11 @@ def end(process: subprocess.Popen[Any]) -> None:
                 pipe.close()
 
 
-def end_session(session: int) -> None:
-    """Kill every process of a session but this one."""
+def end_session(session: int, mark: str = "") -> None:
+    """Kill every process of a session, and all that have a mark, but this one."""
     end_group(session)
     for _ in range(ROUNDS):
-        found = [pid for pid in _of_session(session) if pid != os.getpid()]
+        found = [pid for pid in {*_of_session(session), *_with_mark(mark)} if pid != os.getpid()]
         for pid in found:
             with suppress(ProcessLookupError, PermissionError):
                 os.kill(pid, signal.SIGKILL)
@@ -62,6 +64,17 @@ def _of_session(session: int) -> list[int]:
         with suppress(OSError, ValueError, IndexError):
             state, _, _, its = place.read_text().rpartition(")")[2].split()[:4]
             if int(its) == session and state not in "ZX":
+                found.append(int(place.parent.name))
+    return found
+
+
+def _with_mark(mark: str) -> list[int]:
+    found = []
+    for place in Path("/proc").glob("[0-9]*/environ") if mark else ():
+        with suppress(
+            OSError
+        ):  # another user's, or ended; what has ended and is not taken away has no environment
+            if f"{MARK}={mark}".encode() in place.read_bytes().split(b"\0"):
                 found.append(int(place.parent.name))
     return found
 
@@ -107,6 +120,6 @@ def _watch(session: int, *pipes: int) -> None:
         for pipe in pipes:
             watched.register(pipe, 0)  # its end alone, not what is written to it
         watched.poll()
-        end_session(session)
+        end_session(session, os.environ.get(MARK, ""))
     finally:
         os._exit(0)
