@@ -55,6 +55,13 @@ def test_no_file_accepts_nothing(tmp_path):
     assert read_accepted(tmp_path / "accepted.toml") == ()
 
 
+def test_a_folder_of_its_name_is_one_sentence(tmp_path):
+    (tmp_path / "accepted.toml").mkdir()
+
+    with pytest.raises(AcceptedError, match="cannot be read: Is a directory"):
+        read_accepted(tmp_path / "accepted.toml")
+
+
 def test_the_file_in_the_repository_is_valid():
     assert read_accepted(Path(__file__).resolve().parents[1] / "accepted.toml") == ()
 
@@ -63,6 +70,10 @@ def test_the_file_in_the_repository_is_valid():
     ("old", "new", "sentence"),
     [
         ("[[accepted]]", "[[accepted", "not valid TOML"),
+        ("[0.0, 0.5]", f"[0.0, 1{'0' * 400}]", "range is a whole number of more than 19 digits"),
+        ("[0.0, 0.5]", f"[0.0, 1{'0' * 5000}]", "not valid TOML"),
+        ("[0.0, 0.5]", "[" * 5000 + "]" * 5000, "it is nested too deeply"),
+        ("[[accepted]]", "a." * 5000 + "b = 1\n[[accepted]]", "it is nested too deeply"),
         ("[[accepted]]", "[[acepted]]", r"\[\[accepted\]\] tables only"),
         ('who = "Ada"', "", "who must be a text"),
         ('"Ada"', '" "', "who must be a text"),

@@ -180,6 +180,7 @@ def test_a_test_that_two_catalogues_have_is_refused() -> None:
         ("workers = " + "9" * 5000, "cannot be read"),
         ("[limits]\n" + '"a/*" = ' + "9" * 400, "a/* is a whole number of more than 19 digits"),
         ("x = " + "[" * 5000 + "]" * 5000, "it is nested too deeply"),
+        ("x." * 5000 + "x = 1", "it is nested too deeply"),
         ("time_limit = nan", "time_limit must be a number, not nan"),
         ("home_page = 'javascript:alert(1)'", "is no address of the web"),
     ],

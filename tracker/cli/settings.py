@@ -23,7 +23,6 @@ What a command line or an environment variable says goes before it.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -32,6 +31,7 @@ from typing import Any
 import click
 
 from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.tracker.document.toml_file import read_toml
 from spook_tracker.tracker.measure.build_settings import TABLE, Build, build_of
 
 FILE = "tracker.toml"
@@ -93,12 +93,9 @@ def read(here: Path) -> Settings:
     if file is None:
         return Settings()
     try:
-        said = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:  # of TOML, of UTF-8, of a number with too many digits
+        said = read_toml(file)
+    except (OSError, ValueError) as error:
         raise SettingsError(f"{file} cannot be read: {error!s:.300}") from None
-    except RecursionError:
-        raise SettingsError(f"{file} cannot be read: it is nested too deeply") from None
-    _refuse_endless(file, said)
     limits, models, build = said.pop("limits", {}), said.pop("model", []), said.pop(TABLE, None)
     for name, value in said.items():
         if name not in KINDS:
@@ -117,18 +114,6 @@ def read(here: Path) -> Settings:
         build=None if build is None else build_of(build, file),
         folder=file.parent,
     )
-
-
-def _refuse_endless(file: Path, said: Any, name: str = "") -> None:
-    """SettingsError for a number with more digits than anything here holds."""
-    if isinstance(said, dict):
-        for key, value in said.items():
-            _refuse_endless(file, value, key)
-    elif isinstance(said, list):
-        for value in said:
-            _refuse_endless(file, value, name)
-    elif isinstance(said, int) and abs(said) >= 2**63:
-        raise SettingsError(f"{file}: {name} is a whole number of more than 19 digits")
 
 
 def defaults(group: click.Group, settings: Settings) -> dict[str, Any]:

@@ -20,7 +20,6 @@ red until that day, the level from before stays the one to come back to, and onc
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import date, datetime
@@ -29,6 +28,7 @@ from pathlib import Path
 from typing import Any
 
 from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.tracker.document.toml_file import read_toml
 
 KINDS = ("accepted", "expected")
 KNOWN = {"series", "range", "removed", "who", "why", "until"}
@@ -75,9 +75,11 @@ def read_accepted(file: Path) -> tuple[Accepted, ...]:
     if not file.exists():
         return ()
     try:
-        content = tomllib.loads(file.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise AcceptedError(f"{file} is not valid TOML: {error}") from None
+        content = read_toml(file)
+    except OSError as error:
+        raise AcceptedError(f"{file} cannot be read: {error.strerror}") from None
+    except ValueError as error:
+        raise AcceptedError(f"{file} is not valid TOML: {error!s:.300}") from None
     kinds = [content.get(kind, []) for kind in KINDS]
     if set(content) - set(KINDS) or not all(isinstance(entries, list) for entries in kinds):
         raise AcceptedError(f"{file} may hold [[accepted]] tables only, and [[expected]] ones")

@@ -7,7 +7,6 @@ decides its values: a change there is shown and is evidence of nothing.
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
@@ -15,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from spook_tracker.tracker.document.errors import DocumentError
+from spook_tracker.tracker.document.toml_file import read_toml
 from spook_tracker.tracker.judge.comparison_document import Change
 from spook_tracker.tracker.judge.model_words import Moved, severity, words
 from spook_tracker.tracker.judge.release_order import Scene
@@ -91,14 +91,14 @@ def moved(before: float, after: float, outcomes: tuple[str, str]) -> bool:
 def read_changelog(file: Path) -> Changelog:
     """From TOML: source, releases (oldest first) and a table [[entry]] each. DocumentError names what is wrong."""
     try:
-        given: dict[str, Any] = tomllib.loads(file.read_text(encoding="utf-8"))
+        given: dict[str, Any] = read_toml(file)
         entries = tuple(
             Entry(release=one["release"], item=one["item"], says=one["says"], shows=tuple(one["shows"]))
             for one in given["entry"]
         )
         releases = tuple(given["releases"])
         source, blown_up = given["source"], tuple(given.get("blown_up", ()))
-    except (OSError, tomllib.TOMLDecodeError, KeyError) as error:
+    except (OSError, ValueError, KeyError) as error:
         raise DocumentError(
             f"{file} is no changelog: {error}; it has source, releases and [[entry]] with release, item, "
             "says and shows"

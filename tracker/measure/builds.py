@@ -11,7 +11,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import tomllib
 import uuid
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
@@ -22,6 +21,7 @@ import msgspec
 
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import RunDocument
+from spook_tracker.tracker.document.toml_file import read_toml
 from spook_tracker.tracker.measure.build_settings import FILE, TABLE, Build, build_of
 from spook_tracker.tracker.measure.commit import MOST
 from spook_tracker.tracker.measure.commits import CommitError, check_out, last_words
@@ -64,9 +64,9 @@ class TeamRepository:
         if not file.is_file():
             return self.today
         try:
-            said = tomllib.loads(file.read_text(encoding="utf-8"))
+            said = read_toml(file)
             return build_of(said[TABLE], file) if TABLE in said else self.today
-        except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError, TrackerError) as error:
+        except (OSError, ValueError, TrackerError) as error:
             raise CommitError(f"its {FILE} cannot be read: {error}") from None
 
     def ask(self, commit: str, home: Path, tests: Sequence[str], *options: str) -> tuple[RunDocument, str]:

@@ -26,7 +26,6 @@ import importlib.util
 import itertools
 import math
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -37,6 +36,7 @@ from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.scalar_tests.catalogue import QUESTIONS
 from spook_tracker.scalar_tests.model_file.question import test_of
 from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.tracker.document.toml_file import read_toml
 
 SUFFIXES = (".xml", ".mjcf", ".urdf", ".sdf", ".world")
 KINDS: Mapping[str, tuple[type, ...]] = {
@@ -74,8 +74,8 @@ def catalogue(name: str) -> dict[str, ScalarTest]:
 
 def _of_toml(file: Path) -> dict[str, ScalarTest]:
     try:
-        tables = tomllib.loads(file.read_text(encoding="utf-8")).get("model", [])
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        tables = read_toml(file).get("model", [])
+    except (OSError, ValueError) as error:
         raise ModelFileError(f"{file} cannot be read: {error}") from None
     found: dict[str, ScalarTest] = {}
     for place, table in enumerate(tables, start=1):
