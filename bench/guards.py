@@ -53,7 +53,6 @@ GUARDS = (
     Guard("an odd answer is one sample's", "tracker/measure/fitting.py", "return sample if not fault else _crashed(sample.series, fault)", "return sample", "test_tracker_odd_answers"),
     Guard("a worker has a group of its own", WORKERS, "os.setpgid(0, 0)", "pass", "test_tracker_started_by_adapters"),
     Guard("a session is ended whole", "tracker/measure/left_behind.py", "        end_session(process.pid, mark)\n    process.wait()", "    process.wait()", "test_tracker_started_by_adapters"),
-    Guard("a session of its own is known by its mark", "tracker/measure/left_behind.py", "in {*_of_session(session), *_with_mark(mark)} if", "in {*_of_session(session)} if", "test_tracker_started_by_adapters"),
     Guard("a worker has none of our streams", WORKERS, "    os.dup2(2, 1)\n", "", "test_tracker_started_by_adapters"),
     Guard("hosts are marks", "tracker/measure/other_tools.py", "no. {hashlib.sha256(host.encode()).hexdigest()[:6]}", "{host}", "test_tracker_other_tools host"),
     Guard("a home page is an address", "tracker/cli/options.py", "if address and not web_address(address):", "if False:", "test_tracker_settings home_page"),
