@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from spook_tracker.engine.errors import EngineError
 from spook_tracker.engine.find import find
 from spook_tracker.engine.method import PLAIN
 from spook_tracker.engine.model_file import Drive, ModelFile, ModelRun, Watched
@@ -248,6 +249,31 @@ def test_the_books_of_a_damped_pendulum_balance_without_its_damping(tmp_path: Pa
     assert damped.shape == free.shape
     turned = [_run(asked.model, 0.3, conservative=on)["orientation"][-1, 0] for on in (False, True)]
     assert turns(turned[1], np.array([1.0, 0, 0, 0])) > 1.3 * turns(turned[0], np.array([1.0, 0, 0, 0]))
+
+
+@pytest.mark.parametrize(
+    ("function", "said"),
+    [
+        ("numpy:ones_like", r"at 0 s fails: TypeError"),
+        ("tests.test_engine_mujoco_files:no_number", r"at 0 s gives \[nan\]; the model has 1 controls"),
+        ("tests.test_engine_mujoco_files:two", r"gives \[0\. 0\.\]; the model has 1 controls"),
+        ("tests.test_engine_mujoco_files:gone", r"there is no control .*gone"),
+    ],
+)
+def test_a_control_function_that_controls_nothing_is_said(tmp_path: Path, function: str, said: str) -> None:
+    drive = Drive(kind="function", function=function)
+    model = _model(tmp_path, SPIN.format(actuator="motor", more=""), drive=drive)
+
+    with pytest.raises(EngineError, match=said):
+        _simulate()(ModelRun(model=model), time_step=0.01, duration=0.1)
+
+
+def no_number(time: float, count: int) -> list[float]:
+    return [math.nan] * count
+
+
+def two(time: float, count: int) -> list[float]:
+    return [0.0] * 2
 
 
 def test_euler_falls_to_the_finest_run_with_order_one(tmp_path: Path) -> None:

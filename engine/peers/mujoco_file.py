@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
+from spook_tracker.engine.errors import EngineError
 from spook_tracker.engine.model_file import Drive, ModelRun, Watched
 from spook_tracker.engine.peers.model_loop import Array, LoadedModel, elsewhere
 from spook_tracker.engine.protocol import NotSupported
@@ -59,7 +60,7 @@ def _unheard(message: str) -> None:
     """MuJoCo would print it and write a log where one stands; a state it resets is found by its counters."""
 
 
-def _line(error: Exception) -> str:
+def _line(error: object) -> str:
     return " ".join(str(error).split())[:240]
 
 
@@ -256,12 +257,26 @@ class Driven:
         if not self.varies:
             return
         if self.function is not None:
-            data.ctrl[:] = self.function(float(data.time), self.count)
+            data.ctrl[:] = self._asked(float(data.time))
         elif self.drive.kind == "sinusoid":
             data.ctrl[:] = self.drive.amplitude * np.sin(2.0 * np.pi * self.drive.frequency * data.time)
         else:
             place = int(np.searchsorted(self.times, data.time + 1e-12, side="right")) - 1
             data.ctrl[:] = self.values[place] if place >= 0 else 0.0
+
+    def _asked(self, time: float) -> Array:
+        """What the user's function gives; MuJoCo would put zeros in place of what is not finite, without a word."""
+        assert self.function is not None
+        where = f"the control {self.drive.function} at {time:g} s"
+        try:
+            given = np.asarray(self.function(time, self.count), dtype=float)
+        except Exception as error:
+            raise EngineError(f"{where} fails: {type(error).__name__}: {_line(error)}") from None
+        if given.shape != (self.count,) or not np.isfinite(given).all():
+            raise EngineError(
+                f"{where} gives {_line(given)}; the model has {self.count} controls, each a finite number"
+            )
+        return given
 
 
 def driven(drive: Drive, model: Any, data: Any) -> Driven:
@@ -271,7 +286,10 @@ def driven(drive: Drive, model: Any, data: Any) -> Driven:
     function = None
     if drive.kind == "function":
         module, _, name = drive.function.partition(":")
-        function = getattr(import_module(module), name)
+        try:
+            function = getattr(import_module(module), name)
+        except Exception as error:
+            raise NotSupported(f"there is no control {drive.function}: {_line(error)}") from None
     if drive.kind == "hold":
         data.ctrl[:] = holding(model, data)
     return Driven(drive, model.nu, function)

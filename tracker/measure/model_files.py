@@ -168,7 +168,7 @@ def _keyframe(wanted: str | int, reading: Reading, origin: str) -> str:
 def _drive(said: Any, folder: Path, origin: str) -> Drive:
     if isinstance(said, dict):
         if set(said) != {"amplitude", "frequency"} or not all(
-            isinstance(v, float | int) for v in said.values()
+            isinstance(v, float | int) and math.isfinite(v) for v in said.values()
         ):
             raise ModelFileError(f"{origin}: a sinusoid is {{ amplitude = 0.1, frequency = 2.0 }}, in Hz")
         return Drive(kind="sinusoid", amplitude=float(said["amplitude"]), frequency=float(said["frequency"]))
@@ -178,7 +178,10 @@ def _drive(said: Any, folder: Path, origin: str) -> Drive:
         return Drive(kind="table", rows=_table(folder / said, origin))
     module, _, name = said.partition(":")
     if name:
-        spec = importlib.util.find_spec(module)
+        try:
+            spec = importlib.util.find_spec(module)
+        except (ImportError, ValueError):  # of a package that is not there
+            spec = None
         if spec is None or spec.origin is None:
             raise ModelFileError(f"{origin}: there is no module {module!r} with a function {name!r}")
         digest = hashlib.sha256(Path(spec.origin).read_bytes()).hexdigest()[:16]
@@ -191,7 +194,7 @@ def _drive(said: Any, folder: Path, origin: str) -> Drive:
 def _table(file: Path, origin: str) -> tuple[tuple[float, ...], ...]:
     """Rows of time [s] and controls; a first line of words is passed over."""
     try:
-        with file.open(encoding="utf-8", newline="") as lines:
+        with file.open(encoding="utf-8-sig", newline="") as lines:
             rows = [row for row in csv.reader(lines) if row]
         if rows and not _numbers(rows[0]):
             rows = rows[1:]
