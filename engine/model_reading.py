@@ -91,6 +91,14 @@ def folder_of(path: Path) -> Path:
     return here
 
 
+def shown(path: Path) -> str:
+    """Where in its folder a model lies, for readers elsewhere: what lies above says something of a machine alone."""
+    found = _resolved(path)
+    folder = folder_of(path)
+    above = folder.parent if folder.parent.name in INSTALLED else folder
+    return found.relative_to(above).as_posix()
+
+
 def read(path: Path, folder: Path | None = None) -> Reading:
     """The model in the file `path`; nothing outside `folder` (by default `folder_of` it) is touched. ModelError."""
     return _Reader(path, (folder or folder_of(path)).resolve()).reading()

@@ -56,6 +56,21 @@ def test_a_file_is_a_test_and_its_content_is_its_definition(ball: Path, tmp_path
     assert not _versions(str(ball)) & before
 
 
+def test_a_page_says_where_in_its_folder_a_model_lies_and_nothing_of_the_machine(tmp_path: Path) -> None:
+    for folder, said in (
+        ("lib/site-packages/robots/arms", "robots/arms/ball.xml"),
+        ("repository/models", "models/ball.xml"),
+        ("alone", "ball.xml"),
+    ):
+        (tmp_path / folder).mkdir(parents=True)
+        (tmp_path / "repository/.git").mkdir(parents=True, exist_ok=True)
+        (tmp_path / folder / "ball.xml").write_text(BALL.format(height=".1"))
+        (test,) = catalogue(str(tmp_path / folder / "ball.xml")).values()
+
+        assert dict(test.parameters)["file"] == said
+        assert "1 body with joints; watched: ball." in test.model
+
+
 def test_a_model_called_as_a_question_of_ours_gets_another_name(ball: Path) -> None:
     assert list(catalogue(f"pendulum={ball}")) == ["pendulum_model"]
     assert list(catalogue(f"bowl 2={ball}")) == ["bowl_2"]

@@ -37,7 +37,7 @@ def _step(values: dict[str, tuple[float, float]]) -> Step:
 
 
 STEP = _step({"falls": (0.1, 0.102), "rounds": (0.1, 0.1 + 9e-15), "stays": (0.1, 0.1)})
-CARDS = [SimpleNamespace(name="falls", parameters=(("file", "/opt/lib/site-packages/robots/falls.xml"),))]
+CARDS = [SimpleNamespace(name="falls", parameters=(("file", "robots/falls.xml"),))]
 
 
 def test_each_model_is_said_to_have_changed_rounded_or_stayed() -> None:

@@ -44,8 +44,8 @@ def test_of(
         question=f"Does {title} move, rest and cost what it did?",
         why="Engines are upgraded by people who use them, and their models break in silence. A model has no closed form, "
         "but it has a history: what it did in the release before.",
-        model=f"{model.format} of {files} file{'s' * (files != 1)}, {bodies} bodies with joints; watched are "
-        f"{', '.join(body.label for body in model.watched)}.",
+        model=f"{model.format} of {files} file{'s' * (files != 1)}, {bodies} bod{'y' if bodies == 1 else 'ies'} with joints; "
+        f"watched: {', '.join(body.label for body in model.watched)}.",
         parameters=(
             ("file", file),
             ("hash of all its files", model.digest),

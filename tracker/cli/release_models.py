@@ -8,8 +8,6 @@ from typing import Any
 
 from spook_tracker.tracker.judge.release_notes import Step, by_test, told
 
-INSTALLED = ("site-packages/", "dist-packages/")
-
 
 def model_page(engine: str, cards: Iterable[Any], steps: Sequence[Step]) -> list[str]:
     """A table of all models, and below it in words what changed. `cards` are those of the newest run."""
@@ -31,7 +29,7 @@ def model_page(engine: str, cards: Iterable[Any], steps: Sequence[Step]) -> list
     ]
     for model in models:
         cells = " | ".join(_cell(step, model) for step in steps)
-        lines.append(f"| {model} | `{_short(files.get(model, ''))}` | {cells} |")
+        lines.append(f"| {model} | `{files.get(model, '')}` | {cells} |")
     lines += ["", _counted(models, steps), ""]
     for step in steps:
         changed = {test: found for test, found in by_test(step.changes).items() if test in step.alike}
@@ -59,13 +57,6 @@ def _counted(models: Sequence[str], steps: Sequence[Step]) -> str:
         return f"{step.release}: {words.count('changed')} changed, {words.count('rounding')} rounded, {words.count('same bits')} the same bits"
 
     return f"{len(models)} models. {'; '.join(map(count, steps))}."
-
-
-def _short(file: str) -> str:
-    """Of a file in an installed package, where in the package."""
-    for folder in INSTALLED:
-        file = file.rpartition(folder)[2]
-    return file
 
 
 def without_models(steps: Sequence[Step]) -> list[Step]:

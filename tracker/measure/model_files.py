@@ -31,7 +31,7 @@ from pathlib import Path
 from typing import Any
 
 from spook_tracker.engine.model_file import Drive, ModelFile, Watched
-from spook_tracker.engine.model_reading import ModelError, Reading, read
+from spook_tracker.engine.model_reading import ModelError, Reading, read, shown
 from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.scalar_tests.catalogue import QUESTIONS
 from spook_tracker.scalar_tests.model_file.question import test_of
@@ -136,7 +136,7 @@ def _test(name: str, said: Mapping[str, Any], reading: Reading, folder: Path, or
     return test_of(
         name,
         model,
-        file=said["file"],
+        file=shown(reading.path),
         duration=float(said.get("duration", 5.0)),
         stands_free=reading.stands_free,
         tolerance=float(said.get("tolerance", 0.0)),
