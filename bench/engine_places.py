@@ -99,7 +99,7 @@ def first(run: Sequence[Place]) -> list[str]:
     lines = [
         "## Who is first",
         "",
-        "Run time to come within an error, in the best setting; in brackets how much longer the next engine takes. *Alone*:",
+        "Run time to come within an error, in the setting named; in brackets how much longer the next engine takes. *Alone*:",
         "others can be asked and do not come so near. *Only one asked*: nobody else has what the scene needs.",
         "",
         "| scene | " + " | ".join(f"{error:g}" for error in ranks.ERRORS) + " |",
@@ -112,7 +112,8 @@ def first(run: Sequence[Place]) -> list[str]:
         further = {"alone": "alone", "unasked": "only one asked"}.get(one.how, "")
         further = further or f"{number(rest[0][0] / best, 2)} × {rest[0][1]}"
         scene = f"{race.test}, {race.ladder.replace('_', ' ')} [{race.unit}]"
-        scenes.setdefault(scene, {})[race.error] = f"{name} {seconds(best)} ({further})"
+        setting = f" ({race.settings[0]})" if race.settings and race.settings[0] else ""
+        scenes.setdefault(scene, {})[race.error] = f"{name}{setting} {seconds(best)} ({further})"
     for scene, cells in scenes.items():
         lines.append(f"| {scene} | {' | '.join(cells.get(error, 'nobody') for error in ranks.ERRORS)} |")
     kinds = {"won": "first of several", "alone": "the only one so near", "unasked": "the only one asked"}

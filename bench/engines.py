@@ -39,9 +39,9 @@ from spook_tracker.tracker.store.database import session_on
 OURS = engine_places.OURS
 FACTS = "bench.engine_facts:FACTS"
 FACT_LIMIT = 5.0  # s of one simulation
-# Of another engine: short runs are timed three times, what takes longer than this many seconds once; most of the time goes
-# into models that are built anew for each.
-REPEATS = Repeats(most=3, seconds=0.05, fewest=1, stages_up_to=0.02, runs=5)
+# Of every engine, ours included: short runs are timed three times, what takes longer than this many seconds twice, visiting
+# all rungs before the second; most of the time goes into models that are built anew for each.
+REPEATS = Repeats(most=3, seconds=0.05, fewest=2, stages_up_to=0.02, runs=5)
 ANSWERED = ("value", "out_of_limit", "unsettled", "not_supported")  # the rest are failures
 CAUSES = Path(__file__).parents[1] / "docs" / "engine-causes.toml"
 LIMIT = re.compile(r"time limit of ([\d.]+) s was reached|the ([\d.]+) s for this question")
@@ -65,14 +65,21 @@ def installed() -> list[str]:
 def measure(names: Sequence[str], database: str, facts: str, limit: float, tests: Sequence[str] = ()) -> None:
     """A run with ladders of each engine, and one of the facts, recorded each in its own; says how long both took.
 
+    Ours and the others have one budget: `limit` [s] a simulation, and as much for those of a ladder in one setting.
     Of `tests` alone if there are any, and no facts then.
     """
     for name in names:
         begin = time.perf_counter()
-        theirs: dict[str, Any] = {}
-        if name != OURS:
-            theirs = {"limit": limit, "patience": limit, "every_setting": False, "repeats": REPEATS}
-        document = tracker.run(tests, sweep=True, engine=name, workers=2, **theirs)
+        document = tracker.run(
+            tests,
+            sweep=True,
+            engine=name,
+            workers=2,
+            limit=limit,
+            patience=limit,
+            every_setting=False,
+            repeats=REPEATS,
+        )
         tracker.record(document, database)
         if not tests:
             measure_facts([name], facts)
@@ -188,28 +195,16 @@ def causes() -> Causes:
 
 
 def _gates(samples: Mapping[str, ranks.Samples]) -> list[str]:
-    """What each engine says to the questions that decide green or red for ours, by whose limit it is."""
+    """What each engine says where a limit is printed or physical: what a method owes itself is no question to another."""
     gates = [d for d, _ in samples[OURS].values() if d.role == "gate"]
-    told = ranks.answers(gates, samples)
-    facts = {
-        (name, measurement.configuration, metric.name)
-        for name, test in CATALOGUE.items()
-        for measurement, metric in test.metrics()
-        if metric.limit_kind == "physical"
-    }
-    printed = [one for one in told if (one[0].test, one[0].configuration, one[0].metric) in facts]
+    printed = [d for d in gates if d.limit_kind == "physical"]
     return [
-        f"## {len(told)} gates",
+        f"## {len(printed)} printed or physical limits",
         "",
-        f"The limits of {len(printed)} are printed or physical and hold for every engine. Those of the others are what our method",
-        "owes where it is right, often rounding: an engine of another method may rightly miss them.",
+        f"They hold for every engine. The limits of {len(gates) - len(printed)} more questions are what our own method owes, often",
+        "rounding, and are not counted between engines.",
         "",
-        f"### {len(printed)} printed or physical limits",
-        "",
-        *_counted(samples, printed),
-        f"### {len(told) - len(printed)} limits of our method",
-        "",
-        *_counted(samples, [one for one in told if one not in printed]),
+        *_counted(samples, ranks.answers(printed, samples)),
     ]
 
 
@@ -274,10 +269,10 @@ def _rungs(samples: Mapping[str, ranks.Samples], runs: Mapping[str, Sequence[Any
     return [
         "## Rungs of the ladders, and what was left out",
         "",
-        "Of another engine a simulation may take so long, of the processor's time, and where the simulations of one ladder",
+        "A simulation of any engine may take so long, of the processor's time, and where the simulations of one ladder",
         "in one setting have taken as long together its finer rungs are not tried: a front may end there where patience",
         "would lead it on. Ladders are asked in every setting, the gates in the one that the engine names first. A run",
-        "beyond 50 ms is timed once, a shorter one three times; while run times are taken nothing else runs.",
+        "beyond 50 ms is timed twice, a shorter one three times, all rungs before any again; nothing else runs then.",
         "",
         "| engine | rungs with a value | out of time | limit | diverged or else failed | not supported | whole night |",
         "|---|---|---|---|---|---|---|",
@@ -301,22 +296,19 @@ def _limits(samples: Sequence[Any]) -> str:
 
 
 def _treatment(samples: Mapping[str, ranks.Samples]) -> list[str]:
-    """How ours and the others are not treated alike, and how often that told."""
-    rungs = {
-        name: [sample for definition, sample in told.values() if definition.kind == "ladder"]
+    """The one budget of all, and how often it told."""
+    late = {
+        name: sum(d.kind == "ladder" and sample.outcome == "timed_out" for d, sample in told.values())
         for name, told in samples.items()
     }
-    theirs = [sample for name, found in rungs.items() if name != OURS for sample in found]
-    late, ours = (sum(s.outcome == "timed_out" for s in found) for found in (theirs, rungs[OURS]))
-    bound = _limits(theirs)
+    bound = _limits([sample for told in samples.values() for _, sample in told.values()])
     return [
-        "Ours and the others are not treated alike. Of another engine a simulation has a limit"
-        + (f" ({bound})," if bound else ","),
-        "and so have those of one ladder in one setting together; a run is timed up to "
-        f"{REPEATS.most} times, beyond {1e3 * REPEATS.seconds:g} ms once.",
-        f"Ours has no limit and is timed up to {Repeats().most} times, never less than {Repeats().fewest}. "
-        f"Rungs that ran out of time: {late} of the",
-        f"others, {ours} of ours.",
+        "One budget for all, ours included: a simulation has a limit"
+        + (f" ({bound})" if bound else "")
+        + ", and so have those",
+        f"of one ladder in one setting together; a run is timed up to {REPEATS.most} times, never less than {REPEATS.fewest}, all",
+        "rungs before any again, its model built anew. Rungs that ran out of time: "
+        f"{sum(late.values()) - late[OURS]} of the others, {late[OURS]} of ours.",
     ]
 
 
@@ -415,7 +407,7 @@ def main(arguments: list[str]) -> int:
         "--limit",
         type=float,
         default=0.5,
-        help="s of one simulation of another engine, and of a ladder's together",
+        help="s of one simulation of any engine, and of a ladder's together",
     )
     parser.add_argument("--missing", action="store_true", help="ask only whom the database has no run of")
     parser.add_argument(

@@ -17,7 +17,17 @@ from spook_tracker.tracker.document.run_document import Asked
 from spook_tracker.tracker.judge.rank import Race
 from tests.synthetic_history import document, rival
 
-THEIRS = msgspec.structs.replace(rival("3.1"), trigger="manual")
+
+def physical(run: Any, only: str = "") -> Any:
+    """The run with the limits of its gates made physical, of one test or of all."""
+    series = tuple(
+        msgspec.structs.replace(d, limit_kind="physical") if d.role == "gate" and only in d.test else d
+        for d in run.series
+    )
+    return msgspec.structs.replace(run, series=series)
+
+
+THEIRS = physical(msgspec.structs.replace(rival("3.1"), trigger="manual"))
 FILE = Path(__file__).parents[1] / "bench" / "engines.py"
 
 
@@ -35,7 +45,7 @@ def test_the_page_says_who_is_first_and_why_we_are_behind(
     engines: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     database = f"sqlite:///{tmp_path}/engines.db"
-    for run in (document(0), THEIRS):
+    for run in (physical(document(0)), THEIRS):
         tracker.record(run, database)
     causes = tmp_path / "causes.toml"
     monkeypatch.setattr(engines, "CAUSES", causes)
@@ -83,20 +93,45 @@ def tracker_race(*order: tuple[float, str]) -> Race:
     return Race(test="pendulum", ladder="length", unit="%", error=1e-4, order=order)
 
 
-def test_printed_limits_and_those_of_our_method_are_counted_apart(engines: Any, tmp_path: Path) -> None:
-    """One gate of the made-up history is given a printed limit in the catalogue."""
-    database = f"sqlite:///{tmp_path}/engines.db"
-    first = document(0)
-    gate = next(d for d in first.series if d.role == "gate" and d.test == "pendulum")
-    printed = msgspec.structs.replace(gate, configuration="curved", metric="length_deviation")
-    series = tuple(printed if d is gate else d for d in first.series)
-    tracker.record(msgspec.structs.replace(first, series=series), database)
-    told = engines.page(database).partition("## 7 gates")[2]
+def test_a_first_place_names_the_setting_that_took_it(engines: Any) -> None:
+    race = Race(
+        test="pendulum", ladder="length", unit="%", error=1e-4,
+        order=((1e-4, "rival"), (2e-4, "spook")), settings=("rk4", "plain"),
+    )  # fmt: skip
+    lines = engines.engine_places.first([engines.engine_places.Place(race, frozenset({"spook", "rival"}))])
 
-    assert "### 1 printed or physical limits" in told
-    assert "| spook | 1 | 0 | 0 | 0 |" in told
-    assert "### 6 limits of our method" in told
-    assert "| spook | 6 | 0 | 0 | 0 |" in told
+    assert any("rival (rk4) 100 µs (2 × spook)" in line.replace("\u202f", " ") for line in lines), lines
+
+
+def test_only_printed_limits_count_between_engines(engines: Any, tmp_path: Path) -> None:
+    """Of seven gates two have a physical limit; what our method owes is named and not counted."""
+    database = f"sqlite:///{tmp_path}/engines.db"
+    run = physical(document(0), "pendulum")
+    gates = [d for d in run.series if d.role == "gate"]
+    printed = sum(d.limit_kind == "physical" for d in gates)
+    tracker.record(run, database)
+    told = engines.page(database).partition(f"## {printed} printed or physical limits")[2]
+
+    assert 0 < printed < len(gates)
+    assert f"The limits of {len(gates) - printed} more questions are what our own method owes" in told
+    assert f"| spook | {printed} | 0 | 0 | 0 |" in told
+
+
+def test_all_engines_have_one_budget(engines: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ours is asked with the same limits and repeats as another, by the same call; nothing is timed once."""
+    asked: dict[str, dict[str, Any]] = {}
+
+    def run(tests: Any, *, engine: str, **budget: Any) -> Any:
+        asked[engine] = budget
+        return document(0)
+
+    monkeypatch.setattr(engines.tracker, "run", run)
+    monkeypatch.setattr(engines.tracker, "record", lambda document, database: None)
+    engines.measure(["spook", "rival"], "unused", "unused", 0.5, ["pendulum"])
+
+    assert asked["spook"] == asked["rival"]
+    assert asked["spook"]["limit"] == asked["spook"]["patience"] == 0.5
+    assert asked["spook"]["repeats"].fewest == 2
 
 
 def test_questions_asked_again_by_themselves_take_the_place_of_their_answers_alone(
@@ -104,11 +139,11 @@ def test_questions_asked_again_by_themselves_take_the_place_of_their_answers_alo
 ) -> None:
     """A night of both, then one test of ours: that is new, all else stands; a whole night later and nothing older counts."""
     database = f"sqlite:///{tmp_path}/engines.db"
-    whole = document(0)
+    whole = physical(document(0))
     gates = [d.key for d in whole.series if d.role == "gate" and d.test == "pendulum"]
 
     def again(night: int, asked: Asked, value: float) -> Any:
-        run = document(night)
+        run = physical(document(night))
         series = tuple(d for d in run.series if asked.whole or d.test == "pendulum")
         keys = {d.key for d in series}
         samples = tuple(
@@ -163,7 +198,7 @@ def test_a_page_without_a_run_of_ours_is_refused(engines: Any, tmp_path: Path) -
 def test_times_of_another_machine_are_not_set_against_ours(engines: Any, tmp_path: Path) -> None:
     database = f"sqlite:///{tmp_path}/engines.db"
     machine = msgspec.structs.replace(THEIRS.machine, fingerprint="another")
-    for run in (document(0), msgspec.structs.replace(THEIRS, machine=machine)):
+    for run in (physical(document(0)), msgspec.structs.replace(THEIRS, machine=machine)):
         tracker.record(run, database)
     told = engines.page(database)
 
@@ -210,8 +245,8 @@ def test_rungs_that_were_out_of_time_are_counted_and_the_limit_told(engines: Any
     assert line.split(" | ")[2:4] == ["2", "0.5 s"]
 
 
-def test_the_published_page_says_how_unequal_the_treatment_is_and_how_long_all_took(engines: Any) -> None:
-    """Sums of the page's own rows."""
+def test_the_published_page_says_how_its_engines_were_treated_and_how_long_all_took(engines: Any) -> None:
+    """Sums of the page's own rows; a page of nights with unequal budgets says so until it is made anew."""
     text = engines.PAGE.read_text(encoding="utf-8")
     table = text.partition("## Rungs")[2].partition("\n## ")[0]
     rows = {
@@ -224,7 +259,7 @@ def test_the_published_page_says_how_unequal_the_treatment_is_and_how_long_all_t
     late = sum(int(cells[1]) for name, cells in rows.items() if name != engines.OURS)
     assert f"Rungs that ran out of time: {late} of the others, {rows[engines.OURS][1]} of ours." in first
     assert f"a limit ({', '.join({c[2] for c in rows.values()} - {'-'})})," in first
-    assert f"timed up to {engines.REPEATS.most} times, beyond 50 ms once. Ours has no limit" in first
+    assert ("One budget for all, ours included" in first) != ("Ours has no limit" in first)
     minutes = sum(float(cells[-1].removesuffix(" min")) for cells in rows.values())
     assert f"All nights together, the facts above not counted: {minutes:.1f} min." in table
 
@@ -241,7 +276,7 @@ def test_a_new_page_says_so_too(engines: Any, tmp_path: Path) -> None:
         tracker.record(run, database)
     told = " ".join(engines.page(database).split())
 
-    assert "Of another engine a simulation has a limit (0.5 s), and so have those" in told
+    assert "One budget for all, ours included: a simulation has a limit (0.5 s), and so have those" in told
     count = sum(s.outcome == "timed_out" for s in late)
     assert count > 0
     assert f"Rungs that ran out of time: {count} of the others, 0 of ours." in told

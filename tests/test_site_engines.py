@@ -14,7 +14,7 @@ import pytest
 from spook_tracker.tracker.judge.compare import ComparedRun, compare, side_of
 from spook_tracker.tracker.judge.rank import answers
 from spook_tracker.tracker.judge.work import with_work
-from spook_tracker.tracker.website.page_engines import _value
+from spook_tracker.tracker.website.page_engines import _cells, _value
 from spook_tracker.tracker.website.publish import publish
 from tests.browser import arrive, wait_for
 from tests.synthetic_history import (
@@ -204,3 +204,10 @@ def test_two_engines_stand_beside_each_other_gate_by_gate(driver: Any, site: Pat
     assert f"spook 0.1.1 keeps {kept[0]} of" in text
     assert f"rival 3.2 keeps {kept[1]} of" in text
     assert "REGRESSED" not in text.upper()
+
+
+def test_errors_within_rounding_are_a_tie_and_no_ratio_of_rounding_is_said() -> None:
+    cells = _cells([1e-15, 4e-13, 3e-12, None], [""] * 4, str, tie=1e-12)
+
+    assert [cell.best for cell in cells] == [True, True, False, False]
+    assert [cell.what for cell in cells] == ["", "", "3000 times the best", ""]

@@ -17,6 +17,7 @@ from spook_tracker.tracker.judge.vocabulary import Class
 
 ERRORS = (1e-2, 1e-4, 1e-6)
 STEP = 1.0 / 60.0  # s
+TIE = 1e-12  # in the unit of a scene, whose quantities are about one in size: errors closer than this are rounding
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 Rungs = list[tuple[SeriesDefinition, Sample]]
 
@@ -32,6 +33,7 @@ class Standing:
     error: float | None  # magnitude at h = 1/60, the best configuration
     configuration: str
     seconds: tuple[float | None, ...]  # to reach each of ERRORS, the best configuration
+    settings: tuple[str, ...] = ()  # which configuration that is, for each of ERRORS
     outcome: str  # "value", what became of the rung at h = 1/60 in every configuration, or that there is none
 
 
@@ -56,6 +58,7 @@ class Race:
     unit: str
     error: float
     order: tuple[tuple[float, str], ...]  # run time [s] and engine, at least one
+    settings: tuple[str, ...] = ()  # the configuration of each in `order`
 
     def behind(self, engine: str) -> tuple[str, float, float | None] | None:
         """Who is first, in what time, and the time of this engine (None: never); None if nobody is sooner."""
@@ -125,10 +128,23 @@ def races(found: Sequence[Standing]) -> list[Race]:
     run = []
     for group in scenes(found):
         for place, error in enumerate(ERRORS):
-            order = sorted((t, one.engine) for one in group if (t := one.seconds[place]) is not None)
+            order = sorted(
+                (t, one.engine, one.settings[place] if one.settings else "")
+                for one in group
+                if (t := one.seconds[place]) is not None
+            )
             if order:
-                test, ladder, unit = group[0].test, group[0].ladder, group[0].unit
-                run.append(Race(test=test, ladder=ladder, unit=unit, error=error, order=tuple(order)))
+                first = group[0]
+                run.append(
+                    Race(
+                        test=first.test,
+                        ladder=first.ladder,
+                        unit=first.unit,
+                        error=error,
+                        order=tuple((t, engine) for t, engine, _ in order),
+                        settings=tuple(setting for _, _, setting in order),
+                    )
+                )
     return run
 
 
@@ -172,6 +188,7 @@ def _standing(place: tuple[str, str, str], engine: str, configurations: Mapping[
             outcomes.append(sample.outcome)
             if sample.outcome == "value" and abs(sample.value) < best:
                 best, chosen = abs(sample.value), name
+    soonest = [_soonest(configurations, error) for error in ERRORS]
     none = "not run at this time step" if configurations else "not asked"
     outcome = "value" if chosen else (outcomes[0] if outcomes else none)
     return Standing(
@@ -181,15 +198,16 @@ def _standing(place: tuple[str, str, str], engine: str, configurations: Mapping[
         engine=engine,
         error=best if chosen else None,
         configuration=chosen,
-        seconds=tuple(_soonest(configurations, error) for error in ERRORS),
+        seconds=tuple(seconds for seconds, _ in soonest),
+        settings=tuple(name for _, name in soonest),
         outcome=outcome,
     )
 
 
-def _soonest(configurations: Mapping[str, Rungs], error: float) -> float | None:
-    """Least run time at which some configuration reaches the error."""
-    times = []
-    for rungs in configurations.values():
+def _soonest(configurations: Mapping[str, Rungs], error: float) -> tuple[float | None, str]:
+    """Least run time at which some configuration reaches the error, and which that is."""
+    times: list[tuple[float, str]] = []
+    for name, rungs in configurations.items():
         timed = [
             (min(sample.timing.seconds), abs(sample.value))
             for _, sample in rungs
@@ -197,5 +215,5 @@ def _soonest(configurations: Mapping[str, Rungs], error: float) -> float | None:
         ]
         reached = time_at_error([t for t, _ in timed], [e for _, e in timed], error)
         if reached is not None and math.isfinite(reached):
-            times.append(reached)
-    return min(times, default=None)
+            times.append((reached, name))
+    return min(times, default=(None, ""))

@@ -28,6 +28,7 @@ from spook_tracker.tracker.document.wording import (
 )
 from spook_tracker.tracker.judge.rank import (
     ERRORS,
+    TIE,
     Answer,
     Samples,
     Standing,
@@ -162,7 +163,7 @@ def _ranks(found: Sequence[Standing], book: Book, untimed: Sequence[str]) -> Ite
     for group in scenes(found):
         first = group[0]
         lacks = [one.outcome.replace("_", " ") for one in group]
-        columns = [_cells([one.error for one in group], lacks, partial(_error, first.unit))]
+        columns = [_cells([one.error for one in group], lacks, partial(_error, first.unit), TIE)]
         late = [
             "another machine" if one.engine in untimed
             else lack if lack in ("not asked", "not supported") else "not reached"
@@ -184,17 +185,19 @@ def _error(unit: str, value: float) -> str:
     return quantity(value, unit, 2)
 
 
-def _cells(values: Sequence[float | None], lacks: Sequence[str], say: Callable[[float], str]) -> list[Cell]:
-    """The best of a line stands out; the others say how many times as much they take."""
+def _cells(
+    values: Sequence[float | None], lacks: Sequence[str], say: Callable[[float], str], tie: float = 0.0
+) -> list[Cell]:
+    """The best of a line stand out, all within `tie` of it; the others say how many times as much they take."""
     best = min((v for v in values if v is not None), default=math.nan)
     cells = []
     for value, lack in zip(values, lacks, strict=True):
         if value is None:
             cells.append(Cell(lack, "none"))
         else:
-            times = value / best if best > 0.0 else math.nan
+            times = value / best if best > 0.0 and value - best > tie else math.nan
             behind = f"{number(times, 2)} times the best" if times > 1.0 else ""
-            cells.append(Cell(say(value), "pass", behind, value == best))
+            cells.append(Cell(say(value), "pass", behind, value - best <= tie))
     return cells
 
 
