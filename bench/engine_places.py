@@ -11,7 +11,13 @@ import spook_tracker.tracker.judge.rank as ranks
 from spook_tracker.tracker.document.wording import number, seconds
 
 OURS = "spook"
-SINGLE = ("box3d", "jolt", "rapier")  # whose packages count in single precision, in every setting
+SINGLE = (
+    "box3d",
+    "jolt",
+    "rapier",
+    "rapier3d",
+    "sapien",
+)  # whose packages count in single precision, in every setting
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,9 @@ EXTRAS: Mapping[str, str] = {
     "pybullet": "pybullet",
     "drake": "drake",
     "dart": "dartpy",
+    "rapier3d": "rapier3d",
+    "sapien": "sapien",
+    "mjx": "mujoco-mjx",
 }  # engine: its package, from PyPI
 NODE: Mapping[str, str] = {
     "cannon": "cannon-es",

@@ -91,13 +91,13 @@ class _Limited:
         if self.limit is not None:
             options["time_limit"] = min(self.limit, options.get("time_limit") or self.limit)
         began, begun = time.process_time(), time.perf_counter()
-        theirs = None
+        theirs, setup = None, 0.0
         try:
             result = self.simulate(scene, **options)
-            theirs = result.seconds
+            theirs, setup = result.seconds, result.stage_seconds.get("setup", 0.0)  # compiling is no running
         finally:
             # Whichever is known: an engine in a process of its own takes none of this one's time, and what raises tells
             # no seconds, so that the clock has to do.
             theirs = time.perf_counter() - begun if theirs is None else theirs
-            self.spent += max(time.process_time() - began, theirs)
+            self.spent += max(time.process_time() - began - setup, theirs)
         return result

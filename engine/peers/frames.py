@@ -1,0 +1,50 @@
+"""A joint as engines want it that hold each end in axes of its own: point and turn there, x along the joint's axis."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from spook_tracker.engine.bodies import WORLD, Particle
+from spook_tracker.engine.recorded_joints import conjugate, joint_point, product, turned_back
+from spook_tracker.engine.result import Array
+from spook_tracker.engine.scene import Scene
+
+UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
+
+
+@dataclass(frozen=True)
+class End:
+    """Where a joint is on one of its ends, in the axes of that body at the start."""
+
+    point: tuple[float, float, float]  # m
+    turn: Array  # (w, x, y, z): carries x onto the joint's axis
+
+
+def ends_of(scene: Scene, joint: Any) -> tuple[End, End]:
+    """Both ends of a joint, in its order; the world's is in world axes."""
+    at = joint_point(scene, joint)
+    axes = along(getattr(joint, "axis", (1.0, 0.0, 0.0)))
+    found = []
+    for name in joint.between:
+        body = None if name == WORLD else scene.body(name)
+        place = np.zeros(3) if body is None else np.array(body.position)
+        turn = UPRIGHT if body is None or isinstance(body, Particle) else np.array(body.orientation)
+        x, y, z = turned_back(turn, at - place)
+        found.append(End((float(x), float(y), float(z)), product(conjugate(turn), axes)))
+    return found[0], found[1]
+
+
+def along(axis: tuple[float, float, float]) -> Array:
+    """The turn (w, x, y, z) that carries x onto an axis of unit length."""
+    x, y, z = axis
+    turn = np.array([1.0 + x, 0.0, -z, y]) if x > -1.0 + 1e-12 else np.array([0.0, 0.0, 0.0, 1.0])
+    return np.asarray(turn / np.linalg.norm(turn))
+
+
+def xyzw(turn: Array) -> tuple[float, float, float, float]:
+    """The same turn with its scalar last."""
+    w, x, y, z = (float(part) for part in turn)
+    return x, y, z, w

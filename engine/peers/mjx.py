@@ -1,0 +1,99 @@
+"""MuJoCo XLA, by its Python package: MuJoCo's equations compiled by JAX, on the CPU, in double precision.
+
+The model is the one our adapter of MuJoCo makes, without what MJX lacks (no-slip sweeps); all steps between two looks are
+one compiled loop. Compilation counts as setting up: a scene of the same make at another step is compiled once.
+"""
+
+from __future__ import annotations
+
+import time
+from importlib.metadata import version
+from typing import Any
+
+import jax
+import mujoco
+import numpy as np
+from mujoco import mjx
+
+from spook_tracker.engine.build_info import BuildInfo
+from spook_tracker.engine.forces import Load
+from spook_tracker.engine.joints import Ball, Distance, Hinge, Lock, Prismatic, Universal
+from spook_tracker.engine.observe import ContactCount, Penetration
+from spook_tracker.engine.peers import mujoco as through_c
+from spook_tracker.engine.peers.stepped import quiet, stepped
+from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
+from spook_tracker.engine.recording import Recording
+from spook_tracker.engine.shapes import Box, Capsule, Plane, Sphere
+
+jax.config.update("jax_enable_x64", True)
+CAREFUL = 'cone="elliptic" impratio="100" tolerance="1e-12" iterations="200"'
+
+
+class MJX:
+    """The adapter."""
+
+    name = "mjx"
+    capabilities = Capabilities(
+        shapes=frozenset({Sphere, Box, Capsule, Plane}),
+        joints=frozenset({Distance, Lock, Ball, Hinge, Prismatic, Universal}),
+        forces=frozenset({Load}),
+        shows=frozenset({ContactCount, Penetration}),
+        friction=True,
+        rolling_friction=True,
+        joint_friction=True,
+    )
+    configurations = (
+        Configuration(
+            name="rk4",
+            reason="as of MuJoCo, without its no-slip sweeps, which MJX has not",
+            expected_order=4.0,
+            options={"joints": True, "option": f'integrator="RK4" {CAREFUL}', "stiff": True},
+        ),
+        Configuration(
+            name="defaults",
+            reason="joint coordinates, semi-implicit Euler and soft contacts: what one gets without asking",
+            expected_order=1.0,
+            options={"joints": True, "option": 'integrator="Euler"', "stiff": False},
+        ),
+    )
+
+    def build_info(self) -> BuildInfo:
+        installed = version("mujoco-mjx")
+        made = f"wheel from the package index, float64, {jax.default_backend()} by JAX {jax.__version__}"
+        return BuildInfo(self.name, installed, "", False, "", (), made, "")
+
+    def record(self, task: Task) -> Recording:
+        with quiet():
+            began = time.perf_counter()
+            run = _Run(task)
+            return stepped(task, run.step, run._read, time.perf_counter() - began)
+
+
+class _Run(through_c._Run):
+    """MuJoCo's model, stepped by MJX and read where it came to."""
+
+    def __init__(self, task: Task) -> None:
+        super().__init__(task)
+        try:
+            self.compiled = mjx.put_model(self.model)
+            self.state = mjx.put_data(self.model, self.data)
+            self.state = _steps(self.compiled, self.state, 0)
+        except NotImplementedError as error:
+            raise NotSupported(f"mjx does not support {' '.join(str(error).split())[:200]}") from None
+
+    def step(self, count: int) -> None:
+        self.state = jax.block_until_ready(_steps(self.compiled, self.state, count))
+
+    def _read(self, keep: Any, place: int, sample: int) -> None:
+        self.data.qpos[:], self.data.qvel[:] = np.array(self.state.qpos), np.array(self.state.qvel)
+        if self.task.contacts and sample:
+            mujoco.mj_forward(self.model, self.data)  # contacts as they are where it came to
+        super()._read(keep, place, sample)
+
+
+def _loop(model: Any, state: Any, count: int) -> Any:
+    return jax.lax.fori_loop(0, count, lambda _, now: mjx.step(model, now), state)
+
+
+_steps = jax.jit(_loop)
+ENGINE = MJX()

@@ -1,0 +1,258 @@
+"""PhysX 5 by the Python package of SAPIEN: single precision on the CPU, one thread, by sweeps (PGS) or small steps (TGS).
+
+Joints are its six-axis joints, locked where they hold; limits of a swing do not hold there, so that hinges, slides and
+locks have a stiff spring about the other two axes. It has articulations in joint coordinates, too, which our
+adapter does not ask for. Every step is a call from Python. It shows of a contact the impulse without its friction: with
+friction a contact's force is not asked.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+import warnings
+from importlib.metadata import version
+from typing import Any
+
+import numpy as np
+
+from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
+from spook_tracker.engine.build_info import BuildInfo
+from spook_tracker.engine.forces import CentralGravity, Load, Spring
+from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic
+from spook_tracker.engine.observe import ContactCount, ContactForce, Penetration
+from spook_tracker.engine.peers.frames import along, ends_of
+from spook_tracker.engine.peers.pushes import Pushes
+from spook_tracker.engine.peers.stepped import Kept, quiet, stepped
+from spook_tracker.engine.peers.surfaces import one_friction, one_restitution, solid
+from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
+from spook_tracker.engine.recording import Recording
+from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Shape, Sphere
+
+with quiet(), warnings.catch_warnings():  # it looks for a display
+    warnings.simplefilter("ignore")
+    import sapien
+    from sapien import physx
+
+POINT_INERTIA = 1e-6  # kg m²: PhysX wants one of every body that turns
+FASTEST = 1e7  # rad/s, in place of 100
+SLOWEST_BOUNCE = 0.01  # m/s, in place of 2: slower impacts do not rebound
+FREE = (-math.inf, math.inf)
+SWING = (
+    1e9,
+    1e6,
+)  # N m/rad, N m s/rad: holds what the package's limits of a swing (cone or pyramid of 0) let go
+
+
+class Sapien:
+    """The adapter."""
+
+    name = "sapien"
+    capabilities = Capabilities(
+        shapes=frozenset({Sphere, Box, Capsule, Cylinder, Plane}),
+        joints=frozenset({Distance, Lock, Ball, Hinge, Prismatic}),
+        forces=frozenset({CentralGravity, Load, Spring}),
+        shows=frozenset({ContactForce, ContactCount, Penetration}),
+        friction=True,
+        restitution=True,
+        kinematic=False,
+    )
+    configurations = (
+        Configuration(
+            name="tgs",
+            reason="PhysX's solver of small steps, 50 position iterations in place of 10: its manual recommends it "
+            "for chains and mass ratios",
+            expected_order=1.0,
+            options={"tgs": True, "sweeps": 50},
+        ),
+        Configuration(
+            name="pgs",
+            reason="PhysX's projected Gauss-Seidel, 50 position iterations in place of 10",
+            expected_order=1.0,
+            options={"tgs": False, "sweeps": 50},
+        ),
+        Configuration(
+            name="defaults",
+            reason="small steps and 10 position iterations: what one gets from SAPIEN without asking",
+            expected_order=1.0,
+            options={"tgs": True, "sweeps": 10},
+        ),
+    )
+
+    def build_info(self) -> BuildInfo:
+        installed = version("sapien")
+        return BuildInfo(
+            self.name, installed, "", False, "", (), "wheel from the package index, float32, CPU", ""
+        )
+
+    def record(self, task: Task) -> Recording:
+        began = time.perf_counter()
+        with quiet(), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            run = _Run(task)
+            return stepped(task, run.step, run.read, time.perf_counter() - began)
+
+
+class _Run:
+    """One world, and what is read off it."""
+
+    def __init__(self, task: Task) -> None:
+        self.task, self.scene = task, task.scene
+        scene = self.scene
+        joined = {frozenset(c.between) for c in scene.constraints if isinstance(c, Joint)}
+        if scene.contacts and any(frozenset(pair) not in joined for pair in scene.no_contact):
+            raise NotSupported("our adapter cannot ask sapien for single pairs that must not touch")
+        if task.contacts and any(body.material.friction for body in solid(scene)):
+            raise NotSupported("our adapter cannot ask sapien for a contact force with friction")
+        friction = one_friction(scene, "sapien") if scene.contacts else 0.0
+        self.material = physx.PhysxMaterial(friction, friction, one_restitution(scene, "sapien"))
+        self.pushes = Pushes(scene)
+        _configure(task)
+        self.world = physx.PhysxCpuSystem()
+        self.world.timestep = task.time_step
+        self.place = sapien.Scene([self.world])
+        self.bodies = [self._body(body) for body in scene.bodies]
+        self.by_name = {body.name: made for body, made in zip(scene.bodies, self.bodies, strict=True)}
+        for constraint in scene.constraints:
+            self._hold(constraint)
+
+    def _body(self, body: Particle | RigidBody) -> Any:
+        moves = isinstance(body, Particle) or body.motion == "dynamic"
+        made = physx.PhysxRigidDynamicComponent() if moves else physx.PhysxRigidStaticComponent()
+        turn = (1.0, 0.0, 0.0, 0.0) if isinstance(body, Particle) else body.orientation
+        if isinstance(body, RigidBody) and body.shape is not None and self.scene.contacts:
+            made.attach(_shape(body.shape, self.material))
+        if moves:
+            made.mass = body.mass
+            made.inertia = (POINT_INERTIA,) * 3 if isinstance(body, Particle) else body.inertia
+            made.cmass_local_pose = sapien.Pose()
+            made.linear_damping = made.angular_damping = 0.0
+            made.max_angular_velocity = FASTEST
+        entity = sapien.Entity()
+        entity.add_component(made)
+        entity.set_pose(sapien.Pose(body.position, turn))
+        self.place.add_entity(entity)
+        if moves:
+            made.set_linear_velocity(body.velocity)
+            if isinstance(body, RigidBody):
+                made.set_angular_velocity(body.angular_velocity)
+        return made
+
+    def _hold(self, constraint: Any) -> None:
+        """PhysX wants the second end to move; the first may be the world or stand."""
+        ends = list(constraint.between)
+        if isinstance(constraint, Distance):
+            self._rod(constraint, ends)
+            return
+        frames = list(ends_of(self.scene, constraint))
+        if not self._moves(ends[1]):
+            ends, frames = ends[::-1], frames[::-1]
+        if not self._moves(ends[1]):
+            return
+        child = self.by_name[ends[1]]
+        joint = physx.PhysxDriveComponent(child)
+        joint.parent = None if ends[0] == WORLD else self.by_name[ends[0]]
+        joint.pose_in_parent = sapien.Pose(frames[0].point, frames[0].turn)
+        joint.pose_in_child = sapien.Pose(frames[1].point, frames[1].turn)
+        slides, twists = isinstance(constraint, Prismatic), isinstance(constraint, Ball | Hinge)
+        joint.set_limit_x(*(FREE if slides else (0.0, 0.0)))
+        joint.set_limit_y(0.0, 0.0)
+        joint.set_limit_z(0.0, 0.0)
+        joint.set_limit_twist(*(FREE if twists else (0.0, 0.0)))
+        if not isinstance(constraint, Ball):
+            joint.set_drive_property_swing(*SWING)
+        child.entity.add_component(joint)
+
+    def _rod(self, rod: Distance, ends: list[Any]) -> None:
+        if not self._moves(ends[1]):
+            ends = ends[::-1]
+        child = self.by_name[ends[1]]
+        joint = physx.PhysxDistanceJointComponent(child)
+        joint.parent = self.by_name[ends[0]] if isinstance(ends[0], str) else None
+        joint.pose_in_parent = sapien.Pose() if isinstance(ends[0], str) else sapien.Pose(ends[0])
+        joint.pose_in_child = sapien.Pose()
+        length = self.scene.length(rod)
+        joint.set_limit(length, length)
+        child.entity.add_component(joint)
+
+    def _moves(self, end: Any) -> bool:
+        if not isinstance(end, str) or end == WORLD:
+            return False
+        body = self.scene.body(end)
+        return isinstance(body, Particle) or body.motion == "dynamic"
+
+    def step(self, count: int) -> None:
+        """The steps, and before each what pushes."""
+        for _ in range(count):
+            if self.pushes:
+                self._push()
+            self.world.step()
+
+    def _push(self) -> None:
+        where = np.array([body.pose.p for body in self.bodies], dtype=float)
+        speeds = np.array(
+            [getattr(body, "linear_velocity", (0.0, 0.0, 0.0)) for body in self.bodies], dtype=float
+        )
+        forces, torques = self.pushes.at(where, speeds)
+        for body, force, torque in zip(self.bodies, forces, torques, strict=True):
+            if isinstance(body, physx.PhysxRigidDynamicComponent):
+                body.add_force_torque(force, torque)
+
+    def read(self, keep: Kept, row: int, sample: int) -> None:
+        for k, body in enumerate(self.bodies):
+            pose = body.pose
+            keep.positions[row, k], keep.orientations[row, k] = pose.p, pose.q
+            if isinstance(body, physx.PhysxRigidDynamicComponent):
+                keep.velocities[row, k], keep.spins[row, k] = body.linear_velocity, body.angular_velocity
+            described = self.scene.bodies[k]
+            if isinstance(described, Particle):
+                keep.orientations[row, k], keep.spins[row, k] = (1.0, 0.0, 0.0, 0.0), 0.0
+        if self.task.contacts and sample:
+            self._read_contacts(keep, row)
+
+    def _read_contacts(self, keep: Kept, row: int) -> None:
+        for contact in self.world.get_contacts():
+            first, second = (
+                next(name for name, made in self.by_name.items() if made == body) for body in contact.bodies
+            )
+            for point in contact.points:
+                keep.contacts[row] += point.separation <= 0.0
+                keep.depths[row] = max(keep.depths[row], -point.separation)
+                keep.pair((first, second))[row] += np.array(point.impulse) / self.task.time_step
+
+
+def _configure(task: Task) -> None:
+    """PhysX takes these for every world made from now on."""
+    options = task.configuration.options
+    scene = physx.PhysxSceneConfig()
+    scene.gravity, scene.enable_tgs, scene.bounce_threshold = (
+        task.scene.gravity,
+        options["tgs"],
+        SLOWEST_BOUNCE,
+    )
+    physx.set_scene_config(scene)
+    body = physx.PhysxBodyConfig()
+    body.sleep_threshold, body.solver_position_iterations = 0.0, options["sweeps"]
+    physx.set_body_config(body)
+
+
+def _shape(shape: Shape, material: Any) -> Any:
+    """Its axes lie along x where ours lie along z."""
+    if isinstance(shape, Sphere):
+        return physx.PhysxCollisionShapeSphere(shape.radius, material)
+    if isinstance(shape, Box):
+        return physx.PhysxCollisionShapeBox([0.5 * edge for edge in shape.size], material)
+    if isinstance(shape, Plane):
+        made: Any = physx.PhysxCollisionShapePlane(material)
+        made.local_pose = sapien.Pose((0.0, 0.0, 0.0), along(shape.normal))
+        return made
+    kind = (
+        physx.PhysxCollisionShapeCapsule if isinstance(shape, Capsule) else physx.PhysxCollisionShapeCylinder
+    )
+    assert isinstance(shape, Capsule | Cylinder)
+    made = kind(shape.radius, 0.5 * shape.length, material)
+    made.local_pose = sapien.Pose((0.0, 0.0, 0.0), along((0.0, 0.0, 1.0)))
+    return made
+
+
+ENGINE = Sapien()

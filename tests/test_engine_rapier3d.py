@@ -1,0 +1,111 @@
+"""Rapier's Python package behind the protocol: closed forms to single precision. Skipped, with the reason, without it."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import pytest
+
+from spook_tracker.engine import (
+    Ball,
+    Cone,
+    ContactForce,
+    Cylinder,
+    Final,
+    Hinge,
+    Lock,
+    Plane,
+    Position,
+    Prismatic,
+    RigidBody,
+    Scene,
+    Velocity,
+)
+from spook_tracker.engine.find import find
+from spook_tracker.engine.protocol import NotSupported
+from tests import peer_scenes
+
+rapier = pytest.importorskip(
+    "rapier3d", reason="the extra rapier3d is not installed: pip install 'spook-tracker[rapier3d]'"
+)
+DEFAULTS, MANY = "defaults", "many-iterations"
+
+
+def run(configuration: str) -> Any:
+    return partial(find("rapier3d").simulate, configuration=configuration)
+
+
+@pytest.mark.parametrize("configuration", [DEFAULTS, MANY])
+def test_a_fall_is_that_of_as_many_substeps_as_it_has_iterations(configuration: str) -> None:
+    """g T h / 2 of a semi-implicit step h is 9.81 h after 2 s; Rapier's iterations are substeps."""
+    substeps = {DEFAULTS: 4, MANY: 100}[configuration]
+    assert peer_scenes.fall_error(run(configuration), 1 / 60) == pytest.approx(
+        9.81 / 60.0 / substeps, abs=2e-3
+    )
+
+
+@pytest.mark.parametrize("kind", [Ball, Hinge, Lock, Prismatic])
+def test_a_joint_holds_its_body(kind: Any) -> None:
+    assert peer_scenes.left_its_place(run(MANY), kind) < 1e-6
+
+
+@pytest.mark.parametrize("kind", ["ball", "hinge", "lock", "prismatic"])
+def test_joints_between_bodies_turned_at_random_move_as_in_our_engine(kind: str) -> None:
+    assert peer_scenes.parted_from_ours(run(DEFAULTS), kind) < 3e-3
+
+
+def test_a_hinged_body_swings_with_its_period() -> None:
+    assert peer_scenes.swings(run(DEFAULTS), 1 / 1000) == pytest.approx(1.0, abs=2e-4)
+
+
+def test_friction_holds_below_its_coefficient_and_slides_by_the_closed_form_above() -> None:
+    assert abs(peer_scenes.slid(run(MANY), 0.3)) < 1e-3
+    assert peer_scenes.slid(run(MANY), 0.7) == pytest.approx(0.5 * 0.2 * 9.81 * 4.0, rel=2e-3)
+
+
+def test_a_ball_comes_back_to_restitution_squared() -> None:
+    assert peer_scenes.bounced(run(DEFAULTS), 0.5, 1e-3) == pytest.approx(0.25, abs=2e-3)
+
+
+def test_a_cylinder_stands_on_its_face_along_our_axis() -> None:
+    assert abs(peer_scenes.sunk(run(DEFAULTS), Cylinder(0.2, 1.0), 0.5)) < 1e-3
+
+
+def test_what_it_cannot_be_asked_is_said_to_be_our_adapter_s_lack_where_it_is() -> None:
+    cone = RigidBody(name="cone", mass=1.0, shape=Cone(0.5, 1.0), position=(0.0, 0.0, 0.5))
+    ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
+    with pytest.raises(NotSupported, match=r"^our adapter cannot ask rapier3d for the shape cone$"):
+        run(DEFAULTS)(Scene(bodies=(cone, ground)), time_step=0.01, steps=1)
+    with pytest.raises(NotSupported, match="does not support the joint distance"):
+        run(DEFAULTS)(peer_scenes.pendulum(), time_step=0.01, steps=1)
+    force = {"f": Final(quantity=ContactForce("box"))}
+    with pytest.raises(NotSupported, match="cannot ask rapier3d for a contact force with friction"):
+        run(DEFAULTS)(peer_scenes.box_on_ground(0.0), time_step=0.01, steps=1, observe=force)
+
+
+def test_a_contact_without_friction_shows_the_weight_it_carries() -> None:
+    force = {"f": Final(quantity=ContactForce("box"))}
+    found = run(MANY)(peer_scenes.box_on_ground(0.0, 0.0), time_step=1 / 60, duration=1.0, observe=force)
+    assert found["f"] == pytest.approx([0.0, 0.0, 9.81], abs=1e-3)
+
+
+def test_a_stranger_s_ten_lines_give_the_same_numbers() -> None:
+    """A fall, a speed and a bounce from the package's own interface, without our adapter: equal to the last digit."""
+    world = rapier.PhysicsWorld(gravity=(0.0, 0.0, -9.81))
+    world.integration_parameters.dt = 1 / 60
+    made = rapier.RigidBodyBuilder(rapier.RigidBodyType.DYNAMIC).can_sleep(False).translation((0.0, 0.0, 0.5))
+    inertia = (1 / 6, 1 / 6, 1 / 6)
+    made = made.additional_mass_properties(rapier.MassProperties((0.0, 0.0, 0.0), 1.0, inertia))
+    ground = rapier.RigidBodyBuilder(rapier.RigidBodyType.FIXED)
+    world.add_body(ground, [rapier.Collider.halfspace((0.0, 0.0, 1.0)).friction(0.5)])
+    box = world.add_body(made, [rapier.Collider.cuboid(0.5, 0.5, 0.5).density(0.0).friction(0.5)])
+    world.gravity = (0.7 * 9.81, 0.0, -9.81)
+    for _ in range(120):
+        world.step()
+    theirs = world.rigid_bodies[box]
+
+    observe = {"place": Final(quantity=Position("box")), "speed": Final(quantity=Velocity("box"))}
+    ours = run(DEFAULTS)(peer_scenes.box_on_ground(0.7), time_step=1 / 60, steps=120, observe=observe)
+    assert tuple(ours["place"]) == tuple(theirs.translation)
+    assert tuple(ours["speed"]) == tuple(theirs.linvel)
