@@ -317,16 +317,12 @@ def trend(
 @click.command("list", epilog=example("tracker list"))
 @test_option
 @kind_options
-@click.option(
-    "--coverage", is_flag=True, help="Which have error against run time and questions of stability."
-)
 @json_option
 @source_options
 def list_tests(
     tests: tuple[str, ...],
     kinds: tuple[str, ...],
     roles: tuple[str, ...],
-    coverage: bool,
     as_json: bool,
     engine: str,
     catalogue: str,
@@ -335,7 +331,7 @@ def list_tests(
     from fnmatch import fnmatchcase
 
     from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.report_catalogue import catalogue_table, coverage_table
+    from spook_tracker.tracker.cli.report_catalogue import catalogue_table
     from spook_tracker.tracker.measure.run import Questions
 
     source = Questions(
@@ -353,7 +349,7 @@ def list_tests(
 
         click.echo(list_json(found))
     else:
-        say(coverage_table(found) if coverage else catalogue_table(found))
+        say(catalogue_table(found))
 
 
 def _kinds_of(test: Any) -> set[str]:

@@ -8,7 +8,7 @@ from typing import Any
 
 import click
 
-from spook_tracker.scalar_tests.case import Ladder, LimitKind, Measurement, Metric, ScalarTest
+from spook_tracker.scalar_tests.case import LimitKind, Measurement, Metric, ScalarTest
 from spook_tracker.tracker.cli.console import Column, table, width
 from spook_tracker.tracker.cli.report_sweep import seconds
 from spook_tracker.tracker.cli.report_table import number
@@ -28,37 +28,6 @@ def catalogue_table(tests: Mapping[str, ScalarTest]) -> str:
         f"{len(rows)} tests, {seven} of them the continuous tests of the thesis; more with: tracker show TEST"
     )
     return "\n".join([*table(columns, rows), "", footer])
-
-
-def coverage_table(tests: Mapping[str, ScalarTest]) -> str:
-    """Which test has a ladder of error against run time, of how many configurations, and what of its stability."""
-    rows = [
-        (
-            name,
-            _count(max((len(ladder.configurations) for ladder in test.ladders), default=0), "configuration"),
-            _count(max((len(c) for c in map(_steps, test.ladders)), default=0), "time step"),
-            _count(len(test.stability), "question"),
-        )
-        for name, test in tests.items()
-    ]
-    columns = (Column("test"), Column("error against run time"), Column(""), Column("stability"))
-    lacking = [
-        f"{sum(row[column] == LACKING for row in rows)} of {len(rows)} tests have no {what}"
-        for column, what in ((1, "ladder of error against run time"), (3, "question of stability"))
-    ]
-    alone = sum(row[1] == "1 configuration" for row in rows)
-    return "\n".join([*table(columns, rows), "", *lacking, f"{alone} ladders have one configuration alone"])
-
-
-LACKING = "✗ none"
-
-
-def _count(many: int, what: str) -> str:
-    return f"{many} {what}{'s' * (many > 1)}" if many else LACKING
-
-
-def _steps(ladder: Ladder) -> set[float]:
-    return {step for configuration in ladder.configurations for step in ladder.steps_of(configuration)}
 
 
 def limit_of(metric: Metric) -> str:
