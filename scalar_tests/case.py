@@ -41,6 +41,13 @@ LimitKind = Literal[
 ]
 
 
+Part = Literal["ladder", "stability"]  # what every scene has, or the reason why not
+Reason = Literal[  # the world's own, and no others
+    "exact at every step",  # an error that is rounding whatever the step: nothing to buy with run time
+    "no parameter can break it",
+]
+
+
 class Estimate(float):
     """A value that a measurement gives together with what moves it, in its own unit.
 
@@ -328,6 +335,9 @@ class ScalarTest:
     ladders: tuple[Ladder, ...] = ()
     stability: tuple[StabilityStudy, ...] = ()
     misprints: tuple[str, ...] = ()  # where a reader comparing with the thesis would stumble
+    lacks: Mapping[str, Reason] = field(
+        default_factory=dict
+    )  # why it has no ladder, or no break point or map
     seven: bool = False  # one of the thesis' seven continuous tests
     formerly: tuple[str, ...] = ()  # its earlier names: its history goes on
     as_given: bool = False  # its measurements say all themselves: no engine puts it in settings of its own

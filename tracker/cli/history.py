@@ -18,6 +18,7 @@ from spook_tracker.tracker.cli.filters import (
 )
 from spook_tracker.tracker.cli.options import (
     ACCEPTED,
+    DEFAULT_DATABASE,
     NOT_COMPARABLE,
     RED,
     UNUSABLE,
@@ -317,17 +318,26 @@ def trend(
 @click.command("list", epilog=example("tracker list"))
 @test_option
 @kind_options
+@click.option(
+    "--coverage",
+    is_flag=True,
+    help="What each has: error against run time, stability, what leaving out saves; or why not.",
+)
 @json_option
 @source_options
+@database_option
 def list_tests(
     tests: tuple[str, ...],
     kinds: tuple[str, ...],
     roles: tuple[str, ...],
+    coverage: bool,
     as_json: bool,
     engine: str,
     catalogue: str,
+    database: str,
 ) -> None:
     """List the scalar tests: what is asked, and against which limit. With --kind or --role, those that have such."""
+    from contextlib import nullcontext
     from fnmatch import fnmatchcase
 
     from spook_tracker.tracker.cli.console import say
@@ -344,7 +354,18 @@ def list_tests(
         and (not kinds or _kinds_of(test) & set(kinds))
         and (not roles or {metric.role for _, metric in test.metrics()} & set(roles))
     }
-    if as_json:
+    if coverage:
+        from spook_tracker.tracker.cli.report_catalogue import coverage_rows, coverage_table
+        from spook_tracker.tracker.cli.report_json import coverage_json
+
+        unmeasured = database == DEFAULT_DATABASE and not Path(database.removeprefix("sqlite:///")).exists()
+        with nullcontext() if unmeasured else history_of(database) as history:
+            rows = coverage_rows(found, history)
+        if as_json:
+            click.echo(coverage_json(rows))
+        else:
+            say(coverage_table(rows))
+    elif as_json:
         from spook_tracker.tracker.cli.report_json import list_json
 
         click.echo(list_json(found))

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 SQLITE = b"SQLite format 3\0"  # a file that holds a history begins so
+DEFAULT_DATABASE = "sqlite:///tracker.db"
 MOST = 600  # characters of a complaint
 GREEN, RED, UNUSABLE, NOT_COMPARABLE = 0, 1, 2, 3
 
@@ -39,7 +40,7 @@ def database_option(command: Command) -> Command:
         "database",
         metavar="URL",
         envvar="TRACKER_DB",
-        default="sqlite:///tracker.db",
+        default=DEFAULT_DATABASE,
         show_default=True,
         help="History: sqlite:///FILE or postgresql://…; also TRACKER_DB.",
     )(command)

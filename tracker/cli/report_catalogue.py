@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import click
@@ -12,6 +12,7 @@ from spook_tracker.scalar_tests.case import LimitKind, Measurement, Metric, Scal
 from spook_tracker.tracker.cli.console import Column, table, width
 from spook_tracker.tracker.cli.report_sweep import seconds
 from spook_tracker.tracker.cli.report_table import number
+from spook_tracker.tracker.document.coverage import HEADINGS, Coverage, Rungs, coverage, rungs, summary
 from spook_tracker.tracker.measure.cards import explained
 
 
@@ -28,6 +29,39 @@ def catalogue_table(tests: Mapping[str, ScalarTest]) -> str:
         f"{len(rows)} tests, {seven} of them the continuous tests of the thesis; more with: tracker show TEST"
     )
     return "\n".join([*table(columns, rows), "", footer])
+
+
+def coverage_rows(tests: Mapping[str, ScalarTest], history: Any) -> list[Coverage]:
+    """What each scene has, and by the newest run of `history` (None: there is none) how far it came."""
+    runs = history.runs() if history is not None else ()
+    latest = runs[-1].id if runs else None
+    measured = rungs(history.samples(latest).values()) if latest else {}
+    stages = {card.name: card.stages for card in history.cards(latest)} if latest else {}
+    rows = []
+    for name, test in tests.items():
+        reached = measured.get(name, {})
+        ladders = [
+            Rungs(
+                ladder.name,
+                ladder.unit,
+                len(ladder.configurations),
+                reached[ladder.name].least if ladder.name in reached else None,
+            )
+            for ladder in test.ladders
+        ]
+        points = sum(bool(study.unit or study.expected_source) for study in test.stability)
+        maps = len(test.stability) - points
+        rows.append(coverage(name, test.title, ladders, points, maps, stages.get(name, ()), test.lacks))
+    return rows
+
+
+def coverage_table(rows: Sequence[Coverage]) -> str:
+    """Every scene with what is known of it; an empty cell is work to be done."""
+    columns = (
+        Column("test"),
+        *(Column(heading.lower(), flexible=heading == HEADINGS[0]) for heading in HEADINGS),
+    )
+    return "\n".join([*table(columns, [(row.test, *row.cells) for row in rows]), "", summary(rows)])
 
 
 def limit_of(metric: Metric) -> str:

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.tracker.cli.report_compare import accused
+from spook_tracker.tracker.document.coverage import HEADINGS, Coverage
 from spook_tracker.tracker.document.json_form import Number, readable
 from spook_tracker.tracker.judge.judged import Judged
 from spook_tracker.tracker.judge.maps import ToldMap
@@ -69,6 +70,16 @@ def _night(judged: Judged) -> dict[str, Any]:
 def list_json(tests: Mapping[str, ScalarTest]) -> str:
     """A list with an object for each test: its question and what is measured."""
     return readable([_test(name, test) for name, test in tests.items()])
+
+
+def coverage_json(rows: Sequence[Coverage]) -> str:
+    """A list with an object for each scene: its cells by their headings."""
+    return readable(
+        [
+            {"test": row.test, "title": row.title, **dict(zip(HEADINGS, row.cells, strict=True))}
+            for row in rows
+        ]
+    )
 
 
 def _test(name: str, test: ScalarTest) -> dict[str, Any]:

@@ -285,6 +285,7 @@ class TestCard(Struct, frozen=True, kw_only=True):
     seven: bool
     stages: tuple[StageChoice, ...]
     scene: SceneDrawing | None = None
+    lacks: dict[Name, Text] = {}  # why it has no "ladder", or no "stability"
 
 
 Family = Literal["values", "sweep", "stability"]

@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
+from spook_tracker.tracker.document.coverage import HEADINGS, coverage, rungs, summary
 from spook_tracker.tracker.document.wording import clean, slug, web_address
 from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.maps import map_key
@@ -84,6 +85,25 @@ def stability(book: Book, events: Sequence[Event]) -> Page:
     return Page(
         "stability.html", "stability.html", "Stability", "Break points and maps.", context, plotly=True
     )
+
+
+def covered(book: Book) -> Page:
+    """What is known of every scene, and what is not."""
+    rows = []
+    for test in book.tests:
+        ladders = rungs((t.definition, t.latest) for t in test.of_kind("ladder") if t.latest is not None)
+        told = coverage(
+            test.name,
+            test.card.title,
+            ladders.get(test.name, {}).values(),
+            len(test.of_kind("break_point")),
+            len(test.maps),
+            test.card.stages,
+            test.card.lacks,
+        )
+        rows.append((told, address(test)))
+    context = {"rows": rows, "headings": HEADINGS, "summary": summary([told for told, _ in rows])}
+    return Page("coverage.html", "coverage.html", "Coverage", "What is known of every scene.", context)
 
 
 def regressions(book: Book, causes: Sequence[Cause]) -> Page:

@@ -58,6 +58,7 @@ def pages(
     yield Planned("index.html", "Tonight", partial(index, book, causes))
     yield Planned("error-time.html", "Error against run time", partial(page_overviews.error_time, book))
     yield Planned("stability.html", "Stability", partial(page_overviews.stability, book, events))
+    yield Planned("coverage.html", "Coverage", partial(page_overviews.covered, book))
     if module:
         yield Planned("live.html", "Live", partial(live_page, module))
     yield Planned("engines.html", "Engines", partial(page_engines.engines, book))

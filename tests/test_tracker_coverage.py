@@ -1,0 +1,88 @@
+"""What is known of every scene is told: what is not known stands as an empty cell, or with a reason of the world's own."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import get_args
+
+import pytest
+from click.testing import CliRunner
+
+from spook_tracker.scalar_tests.case import Part, Reason
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.tracker.cli.main import main
+from spook_tracker.tracker.cli.report_catalogue import coverage_rows, coverage_table
+from spook_tracker.tracker.document.coverage import HEADINGS, Rungs, rungs
+from spook_tracker.tracker.website.nights import book
+from spook_tracker.tracker.website.page_overviews import covered
+from tests.synthetic_history import history, sample, series
+
+MOST_REASONS = 8  # scenes that stand with a reason instead
+
+
+def test_reasons_are_few_and_stand_only_where_something_is_lacking() -> None:
+    excused = {name: test for name, test in CATALOGUE.items() if test.lacks}
+
+    assert len(excused) <= MOST_REASONS
+    for name, test in excused.items():
+        assert set(test.lacks) <= set(get_args(Part)), name
+        assert set(test.lacks.values()) <= set(get_args(Reason)), name
+        assert not ("ladder" in test.lacks and test.ladders), name
+        assert not ("stability" in test.lacks and test.stability), name
+
+
+def test_a_cell_is_what_there_is_or_the_reason_or_empty() -> None:
+    test = CATALOGUE["pendulum"]
+    bare = replace(test, ladders=(), stability=())
+    excused = replace(bare, lacks={"ladder": "exact at every step"})
+
+    rows = coverage_rows({"full": test, "bare": bare, "excused": excused}, None)
+
+    assert [row.cells for row in rows] == [
+        ("length: 3 configurations; angle: 6 configurations", "7 break points, 1 map", ""),
+        ("", "", ""),
+        ("exact at every step", "", ""),
+    ]
+    assert coverage_table(rows).splitlines()[-1] == (
+        "3 scenes: 1 without error against run time, 2 without stability, 3 without leaving out; 1 with a reason"
+    )
+
+
+@pytest.mark.parametrize(
+    ("errors", "told"),
+    [
+        ([1e-2, 3e-3], "rolled: 1 configuration, down to 0.003 m, not 1e-4"),
+        ([1e-2, -5e-5], "rolled: 1 configuration, down to 5×10⁻⁵ m"),
+        ([float("nan")], "rolled: 1 configuration"),
+    ],
+)
+def test_the_least_error_is_read_off_the_rungs(errors: list[float], told: str) -> None:
+    ladder = [
+        series("log", "ladder:rolled", kind="ladder", unit="m", time_step=h)
+        for h in (0.1 / 2**k for k in range(len(errors)))
+    ]
+    found = rungs((one, sample(one, error)) for one, error in zip(ladder, errors, strict=True))
+
+    assert {name: str(one) for name, one in found["log"].items()} == {"rolled": told}
+    assert isinstance(found["log"]["rolled"], Rungs)
+
+
+def test_list_prints_it_and_gives_it_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    answer = CliRunner().invoke(main, ["list", "--coverage", "--json"])
+
+    rows = {row["test"]: row for row in json.loads(answer.output)}
+    assert set(rows) == set(CATALOGUE)
+    assert rows["falling_object"][HEADINGS[0]] == "position: 2 configurations"
+    assert not list(tmp_path.iterdir()), "asking makes no database"
+
+
+def test_the_page_has_a_row_for_every_test_of_the_night() -> None:
+    told = book(history(2))
+    context = covered(told).context
+
+    assert [row.test for row, _ in context["rows"]] == [test.name for test in told.tests]
+    assert all("down to" in row.cells[0] for row, _ in context["rows"] if row.test == "beam")
+    assert context["summary"].startswith(f"{len(told.tests)} scenes: ")

@@ -1,0 +1,87 @@
+"""What is known of every scene: error against run time, where it breaks, what leaving out saves, or why not.
+
+A cell that is empty is work to be done, and is shown empty.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, StageChoice
+from spook_tracker.tracker.document.wording import number
+
+SMALL = 1e-4  # an error that every ladder should come down to, in its own unit
+HEADINGS = ("Error against run time", "Stability", "Leaving out")
+
+
+@dataclass(frozen=True, slots=True)
+class Rungs:
+    """The configurations of a scene's ladder, and the least error that any of its rungs reached."""
+
+    name: str
+    unit: str
+    configurations: int
+    least: float | None = None  # in `unit`; None: not measured
+
+    def __str__(self) -> str:
+        many = f"{self.name}: {self.configurations} configuration{'s' * (self.configurations != 1)}"
+        if self.least is None:
+            return many
+        unit = "" if self.unit in ("", "1") else f" {self.unit}"
+        return f"{many}, down to {number(self.least, 2)}{unit}{', not 1e-4' * (self.least > SMALL)}"
+
+
+@dataclass(frozen=True, slots=True)
+class Coverage:
+    """The three cells of a scene's row, in the order of HEADINGS; "" where nothing is known."""
+
+    test: str
+    title: str
+    cells: tuple[str, str, str]
+    explained: bool  # some cell is a reason
+
+
+def coverage(
+    test: str,
+    title: str,
+    ladders: Iterable[Rungs],
+    break_points: int,
+    maps: int,
+    stages: Sequence[StageChoice],
+    lacks: Mapping[str, str],
+) -> Coverage:
+    """One scene's row."""
+    sweep = "; ".join(map(str, ladders)) or lacks.get("ladder", "")
+    found = [f"{n} {what}{'s' * (n != 1)}" for n, what in ((break_points, "break point"), (maps, "map")) if n]
+    out = [stage for stage in stages if not stage.kept]
+    timed = sum(stage.saved_seconds_per_step is not None for stage in out)
+    saving = f"{timed} of {len(out)} stages timed" if timed else ""
+    return Coverage(
+        test, title, (sweep, ", ".join(found) or lacks.get("stability", ""), saving), explained=bool(lacks)
+    )
+
+
+def rungs(pairs: Iterable[tuple[SeriesDefinition, Sample]]) -> dict[str, dict[str, Rungs]]:
+    """By test and ladder, from the samples of a run."""
+    found: dict[tuple[str, str], tuple[str, set[str], list[float]]] = {}
+    for series, sample in pairs:
+        if series.kind != "ladder":
+            continue
+        place = series.test, series.metric.removeprefix("ladder:")
+        _, configurations, errors = found.setdefault(place, (series.unit, set(), []))
+        configurations.add(series.configuration)
+        if sample.outcome == "value" and math.isfinite(sample.value):
+            errors.append(abs(float(sample.value)))
+    told: dict[str, dict[str, Rungs]] = {}
+    for (test, name), (unit, configurations, errors) in found.items():
+        told.setdefault(test, {})[name] = Rungs(name, unit, len(configurations), min(errors, default=None))
+    return told
+
+
+def summary(rows: Sequence[Coverage]) -> str:
+    """How many cells of each column are empty, and how many scenes stand with a reason."""
+    empty = [sum(not row.cells[column] for row in rows) for column in range(len(HEADINGS))]
+    told = ", ".join(f"{many} without {what.lower()}" for many, what in zip(empty, HEADINGS, strict=True))
+    return f"{len(rows)} scenes: {told}; {sum(row.explained for row in rows)} with a reason"
