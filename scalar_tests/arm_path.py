@@ -378,6 +378,9 @@ TEST = ScalarTest(
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 480)),
             configurations=(
                 Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 480, 1 / 120)),
+                Configuration(
+                    name="half-step", method=Method(half_step_velocities=True), expected_order=None
+                ),
             ),
             error=ladder_error,
             run=ladder_run,

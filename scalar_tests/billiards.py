@@ -7,9 +7,13 @@ import math
 import numpy as np
 
 from spook_tracker.engine import (
+    PLAIN,
     AngularVelocity,
     Final,
+    Method,
     Plane,
+    Position,
+    Result,
     RigidBody,
     Scene,
     SimulationFailed,
@@ -20,10 +24,12 @@ from spook_tracker.engine.bodies import Material
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
+    Configuration,
     Curve,
     Drawing,
     Example,
     Figure,
+    Ladder,
     ScalarTest,
     Simulate,
     StabilityStudy,
@@ -95,6 +101,22 @@ def shot_errors(
         float(np.linalg.norm(result["v"][2] - other)),
         float(np.linalg.norm(rolls)),
     )
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """A cue ball with back spin after a full hit, with nothing observed."""
+    return simulate(table(-1.0, 0.0), time_step=time_step, duration=DURATION, method=method)
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """How far it is from where it should have come back to [m]: v0 t + a t²/2 while it slides, then v1 t."""
+    observe = {"x": Final(quantity=Position("cue"))}
+    result = simulate(
+        table(-1.0, 0.0), time_step=time_step, duration=DURATION, method=method, observe=observe
+    )
+    first, last = SPEED - 0.5 * (1.0 + RESTITUTION) * SPEED, float(expected_shot(-1.0, 0.0)[0][0])
+    sliding = abs(last - first) / (CLOTH * GRAVITY)
+    return abs(float(result["x"][0]) - 0.5 * (first + last) * sliding - last * (DURATION - sliding))
 
 
 def catching_spin() -> float:
@@ -328,6 +350,22 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=table(1.0, 0.5), time_step=TIME_STEP, duration=2.0),
     figures=(Figure(name="follow-and-draw", title="Speed after a full hit against spin", draw=_draw),),
+    ladders=(
+        Ladder(
+            name="draw",
+            description="place of a cue ball with back spin 1.5 s after a full hit, against the closed form",
+            unit="m",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 480, 1920)),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=1.0),
+                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=1.0),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-3,
+            target_seconds=0.003,
+        ),
+    ),
     stability=(
         StabilityStudy(
             name="heaviest-hit",

@@ -321,7 +321,10 @@ TEST = ScalarTest(
             description="largest relative error of the first five heights, of 16 drops",
             unit="1",
             time_steps=(4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4),
-            configurations=(Configuration(name="plain", method=PLAIN, expected_order=2.0),),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=2.0),
+                Configuration(name="half-step", method=Method(half_step_velocities=True), expected_order=2.0),
+            ),
             error=ladder_error,
             run=ladder_run,
             target_error=0.05,

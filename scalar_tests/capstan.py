@@ -309,7 +309,10 @@ TEST = ScalarTest(
             description="way of the heavy weight in half a second against ½ a t²",
             unit="m",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480)),
-            configurations=(Configuration(name="plain", method=PLAIN, expected_order=1.0),),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=1.0),
+                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=1.0),
+            ),
             error=ladder_error,
             run=ladder_run,
             target_error=1e-2,

@@ -223,7 +223,10 @@ TEST = ScalarTest(
             description="way up the slope in a second against ½ a t²",
             unit="m",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
-            configurations=(Configuration(name="direct", method=PLAIN, expected_order=1.0),),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=1.0),
+                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=1.0),
+            ),
             error=ladder_error,
             run=ladder_run,
             target_error=0.01,

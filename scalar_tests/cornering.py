@@ -347,7 +347,10 @@ TEST = ScalarTest(
             description="yaw rate after a tenth of a second against the bicycle model's; its chassis cannot lean",
             unit="rad/s",
             time_steps=tuple(1.0 / n for n in (120, 240, 480, 960, 1920)),
-            configurations=(Configuration(name="plain", method=PLAIN, expected_order=1.0),),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=1.0),
+                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=1.0),
+            ),
             error=ladder_error,
             run=ladder_run,
             target_error=1e-3,

@@ -4,9 +4,32 @@ from __future__ import annotations
 
 import math
 
-from spook_tracker.engine import AngularVelocity, Box, Final, RigidBody, Scene, Sphere, Velocity
+from spook_tracker.engine import (
+    PLAIN,
+    AngularVelocity,
+    Box,
+    Final,
+    Method,
+    Result,
+    RigidBody,
+    Scene,
+    Sphere,
+    Velocity,
+)
 from spook_tracker.engine.bodies import Material
-from spook_tracker.scalar_tests.case import Curve, Drawing, Example, Figure, ScalarTest, Simulate
+from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.case import (
+    BreakPoint,
+    Configuration,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.sweep import apart
 
@@ -18,6 +41,7 @@ RUN_UP = 0.123  # m
 SLOW, FAST = 0.3, 1.2  # m/s; the centre leaves in a straight line above √(g r) = 0.99
 ROUGH = 50.0  # coefficient of friction: no slip until the force has all but ended
 DURATION = 0.9  # s
+PUSHED = 0.01  # of the level speed
 
 
 def scene(speed: float, rolling: bool) -> Scene:
@@ -84,6 +108,51 @@ def _measure(simulate: Simulate) -> dict[str, float]:
         "fast_speed_error": max((abs(speed) for speed, _ in fast)),
         "fast_spin_error": max((abs(spin) for _, spin in fast)),
     }
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """A smooth ball that slides off slowly, with nothing observed."""
+    return simulate(scene(SLOW, False), time_step=time_step, duration=DURATION, method=method)
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Error of its level speed in flight [m/s]."""
+    observe = {"v": Final(quantity=Velocity("ball"))}
+    result = simulate(
+        scene(SLOW, False), time_step=time_step, duration=DURATION, method=method, observe=observe
+    )
+    angle, leaving = departure(SLOW, False)
+    return abs(float(result["v"][0]) - leaving * math.cos(angle))
+
+
+def gain(speed: float) -> float:
+    """What the edge adds to the level speed of a smooth ball, over that speed (closed form)."""
+    angle, leaving = departure(speed, False)
+    return leaving * math.cos(angle) / speed - 1.0
+
+
+def fastest_pushed(simulate: Simulate) -> BreakPoint:
+    """Highest speed [m/s] at which the edge pushes a smooth ball on by PUSHED of its level speed."""
+
+    def is_pushed(speed: float) -> bool:
+        observe = {"v": Final(quantity=Velocity("ball"))}
+        result = simulate(scene(speed, False), time_step=TIME_STEP, duration=DURATION, observe=observe)
+        return float(result["v"][0]) > speed * (1.0 + PUSHED)
+
+    return break_point(is_pushed, SLOW, FAST, resolution=0.005, walk=6)
+
+
+def expected_pushed() -> tuple[float, float]:
+    """Where the closed form gains PUSHED [m/s]; a last hop may move the level speed by g h, and the search has a step."""
+    bounds = []
+    for shift in (1.0, -1.0):
+        low, high = SLOW, math.sqrt(GRAVITY * RADIUS)
+        for _ in range(60):
+            middle = 0.5 * (low + high)
+            wanted = PUSHED + shift * GRAVITY * TIME_STEP / middle
+            low, high = (middle, high) if gain(middle) > wanted else (low, middle)
+        bounds.append(low * (0.995 if shift > 0.0 else 1.005))
+    return bounds[0], bounds[1]
 
 
 def _draw(simulate: Simulate) -> Drawing:
@@ -168,4 +237,32 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=scene(SLOW, True), time_step=4.0 * TIME_STEP, duration=DURATION),
     figures=(Figure(name="speed", title="Level speed in flight against speed on the table", draw=_draw),),
+    ladders=(
+        Ladder(
+            name="sliding",
+            description="level speed in flight of a ball that slides off at 0.3 m/s, against the closed form",
+            unit="m/s",
+            time_steps=(4e-3, 1e-3, 2.5e-4, 6.25e-5),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),  # where the last hop ends
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-3,
+            target_seconds=0.01,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="fastest-pushed",
+            title="Fastest smooth ball that the edge pushes on by a hundredth",
+            configuration="plain",
+            definition="it gains a hundredth of its level speed at the edge",
+            study=fastest_pushed,
+            unit="m/s",
+            expected=expected_pushed(),
+            expected_source="energy and the end of the contact force; g h of level speed for the last hop, and the half per cent of the search",
+        ),
+    ),
 )

@@ -347,7 +347,10 @@ TEST = ScalarTest(
             description="momentum of a chain of three that came from nowhere: none is right",
             unit="1",
             time_steps=tuple(1.0 / n for n in (30, 45, 60)),
-            configurations=(Configuration(name="direct", method=PLAIN, expected_order=None),),  # rounding
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+            ),  # rounding
             error=ladder_error,
             run=ladder_run,
             target_error=1e-9,

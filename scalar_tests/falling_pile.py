@@ -13,9 +13,11 @@ from spook_tracker.engine import (
     Box,
     Energy,
     Material,
+    Maximum,
     Method,
     Penetration,
     Plane,
+    Result,
     RigidBody,
     Scene,
     Sphere,
@@ -23,10 +25,12 @@ from spook_tracker.engine import (
 )
 from spook_tracker.engine.method import PLAIN
 from spook_tracker.scalar_tests.case import (
+    Configuration,
     Curve,
     Drawing,
     Example,
     Figure,
+    Ladder,
     Measurement,
     Metric,
     ScalarTest,
@@ -46,6 +50,8 @@ STEPS = 120  # 2 s
 PILES = range(10)  # seeds
 RESTITUTIONS = (0.0, 0.1)
 SWEEPS = Method(solver="iterative", iterations=200)
+TALLEST = 3  # seed of the ladder's pile
+LADDER_DURATION = 2.0  # s
 REACH = 0.5 * float(np.linalg.norm(EDGES))  # m, of a box's corners
 
 
@@ -117,6 +123,23 @@ def measure(simulate: Simulate, restitution: float, friction: float, method: Met
         "deepest": max(float(fall.depth.max()) for fall in falls),
         "energy_rise": max(fall.energy_rise for fall in falls),
     }
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Deepest overlap [m] at any sample of the pile with most bodies, frictional and without restitution."""
+    result = simulate(
+        scene(TALLEST, 0.0),
+        time_step=time_step,
+        duration=LADDER_DURATION,
+        method=method,
+        observe={"depth": Maximum(quantity=Penetration())},
+    )
+    return float(result["depth"].max())
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same with nothing observed."""
+    return simulate(scene(TALLEST, 0.0), time_step=time_step, duration=LADDER_DURATION, method=method)
 
 
 def _draw(simulate: Simulate) -> Drawing:
@@ -209,4 +232,20 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=scene(PILES[-1], RESTITUTIONS[0]), time_step=TIME_STEP, duration=2.0),
     figures=(Figure(name="overlap", title="Deepest overlap of a falling pile", draw=_draw),),
+    ladders=(
+        Ladder(
+            name="overlap",
+            description="deepest overlap of any two bodies in two seconds",
+            unit="m",
+            time_steps=(1.0 / 30.0, 1.0 / 60.0, 1.0 / 120.0, 1.0 / 240.0),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(name="iterative, 200 sweeps", method=SWEEPS, expected_order=None),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-6,
+            target_seconds=0.1,
+        ),
+    ),
 )

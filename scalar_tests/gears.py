@@ -318,6 +318,12 @@ TEST = ScalarTest(
                 Configuration(
                     name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 3840, 1 / 960)
                 ),
+                Configuration(
+                    name="half-step",
+                    method=Method(half_step_velocities=True),
+                    expected_order=2.0,
+                    order_range=(1 / 3840, 1 / 960),
+                ),
             ),
             error=ladder_error,
             run=ladder_run,

@@ -239,7 +239,12 @@ TEST = ScalarTest(
             description="relative error of the horizontal force at an end after a second, ten links",
             unit="1",
             time_steps=tuple(1.0 / n for n in (30, 60, 120)),
-            configurations=(Configuration(name="direct", method=PLAIN, expected_order=None),),  # exact
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(
+                    name="half-step", method=Method(half_step_velocities=True), expected_order=None
+                ),
+            ),  # exact
             error=pull_error,
             run=run,
             target_error=1e-9,

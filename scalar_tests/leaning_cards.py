@@ -214,7 +214,10 @@ TEST = ScalarTest(
             description="relative error of a foot's friction after half a second",
             unit="1",
             time_steps=tuple(1.0 / n for n in (30, 60, 120)),
-            configurations=(Configuration(name="direct", method=PLAIN, expected_order=None),),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+            ),
             error=ladder_error,
             run=ladder_run,
         ),

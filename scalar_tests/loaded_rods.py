@@ -30,9 +30,11 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_point, cell, is_stable, table
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
+    Configuration,
     Drawing,
     Example,
     Figure,
+    Ladder,
     Measurement,
     Metric,
     ScalarTest,
@@ -43,6 +45,7 @@ from spook_tracker.scalar_tests.case import (
 from spook_tracker.scalar_tests.sweep import line
 
 STIFF = Method(string_stiffness=True)
+STIFF_HALF = Method(string_stiffness=True, half_step_velocities=True)
 RODS = 10
 LENGTH, MASS = 1.0, 1.0  # m, kg
 ACROSS = MASS * LENGTH**2 / 12.0  # kg m², of a thin rod about its centre
@@ -53,6 +56,7 @@ TILT = 0.01  # rad
 ZIGZAG = 1e-9  # rad, left and right in turn: wakes the fastest mode
 TIME_STEP = 1.0 / 60.0  # s
 DURATION = 40.0  # s
+LADDER_DURATION = 20.0  # s, three swings
 MAP_SECONDS = 13.0  # two swings
 MAP_LOADS = tuple(float(m) for m in np.geomspace(30.0, 3e8, 8))  # kg
 MAP_STEPS = tuple(float(h) for h in np.geomspace(1.0 / 480.0, 0.1, 8))  # s
@@ -129,6 +133,20 @@ def swing(simulate: Simulate) -> dict[str, float]:
         "width_change": float(abs(width[-span:].max() / width[:span].max() - 1.0)),
         "joint_violation": float(result["joint"].max()),
     }
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The swing under the heavy load with nothing observed."""
+    return simulate(scene(), time_step=time_step, duration=LADDER_DURATION, method=method)
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """How far the load is from its swing at most [m], of 0.1 m."""
+    observe = {"load": Trace(quantity=Position("load"))}
+    result = simulate(scene(), time_step=time_step, duration=LADDER_DURATION, method=method, observe=observe)
+    rate = rates(HEAVY)[0] / (1.0 + TILT**2 / 16.0)
+    exact = RODS * LENGTH * math.sin(TILT) * np.cos(rate * result.sample_times["load"])
+    return float(np.abs(result["load"][:, 0] - exact).max())
 
 
 def _kind(
@@ -291,6 +309,27 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=scene(), time_step=TIME_STEP, method=STIFF),
     figures=(Figure(name="swing", title="The load sideways", draw=_draw),),
+    ladders=(
+        Ladder(
+            name="place",
+            description="load from its swing at most, in 20 s: the slowest mode, with its width in the period",
+            unit="m",
+            time_steps=tuple(1.0 / n for n in (15, 30, 60, 120, 240, 480)),
+            configurations=(
+                Configuration(name="string", method=STIFF, expected_order=1.0, order_range=(1 / 480, 1 / 30)),
+                Configuration(
+                    name="string, half-step",
+                    method=STIFF_HALF,
+                    expected_order=2.0,
+                    order_range=(1 / 120, 1 / 15),  # beyond, the rods' share of the start, 1e-5 of it
+                ),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-3,
+            target_seconds=0.01,
+        ),
+    ),
     stability=(
         StabilityStudy(
             name="heaviest-load-plain",

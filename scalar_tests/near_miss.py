@@ -213,6 +213,7 @@ TEST = ScalarTest(
     conclusion="Green: a contact exists where bodies touch. Red: bodies hit what they do not touch, or edges that "
     "are none.",
     source="ours",
+    lacks={"ladder": "exact at every step"},
     measurements=(
         ask(_measure_passes, tuple(_untouched(name) for name in SHAPES), "Bodies that pass.", TIME_STEP),
         ask(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from spook_tracker.engine import (
     PLAIN,
@@ -16,7 +17,9 @@ from spook_tracker.engine import (
     Sphere,
 )
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Example,
     Ladder,
@@ -24,6 +27,7 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 
 RADIUS = 0.5  # m
@@ -60,6 +64,19 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
 def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     """The same with nothing observed."""
     return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
+
+
+def heaviest(simulate: Simulate) -> BreakPoint:
+    """Largest mass [kg] whose weight the plane is told to carry."""
+
+    def carries(mass: float) -> bool:
+        floor, ball = scene().bodies
+        built = replace(scene(), bodies=(floor, replace(ball, mass=mass)))
+        observe = {"force": Final(quantity=ContactForce("ball", "floor"))}
+        result = simulate(built, time_step=TIME_STEP, duration=DURATION, observe=observe)
+        return abs(float(result["force"][2]) / (mass * GRAVITY) - 1.0) < 1e-9
+
+    return break_point(carries, MASS, 1e12, walk=13)
 
 
 TEST = ScalarTest(
@@ -125,6 +142,18 @@ TEST = ScalarTest(
             run=ladder_run,
             target_error=1e-3,
             target_seconds=0.1,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="heaviest",
+            title="Heaviest ball whose weight is told",
+            configuration="plain",
+            definition="the force is the weight to 1e-9 of it after two seconds",
+            study=heaviest,
+            unit="kg",
+            expected=(1e12, 1e12),
+            expected_source="one contact, one row: mass scales out of it; the search ends at 1e12 kg",
         ),
     ),
 )

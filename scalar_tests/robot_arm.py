@@ -404,6 +404,9 @@ TEST = ScalarTest(
                 Configuration(
                     name="plain", method=PLAIN, expected_order=1.0, order_range=(3.125e-4, 1.25e-3)
                 ),
+                Configuration(
+                    name="half-step", method=Method(half_step_velocities=True), expected_order=None
+                ),
             ),
             error=ladder_error,
             run=ladder_run,

@@ -18,7 +18,9 @@ from spook_tracker.engine import (
     Velocity,
 )
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Curve,
     Drawing,
@@ -29,6 +31,7 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.sweep import apart
 
@@ -82,6 +85,18 @@ def _measure(simulate: Simulate) -> dict[str, float]:
         values[f"{name}_speed_error"] = speed / (linear * seconds) - 1.0
         values[f"{name}_spin_error"] = spin / (angular * seconds) - 1.0
     return values
+
+
+def steepest_rolled(simulate: Simulate) -> BreakPoint:
+    """Steepest slope (its tangent) down which the sphere rolls without slip."""
+
+    def rolls(slope: float) -> bool:
+        observe = {"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))}
+        result = simulate(scene(slope), time_step=TIME_STEP, steps=STEPS, observe=observe)
+        speed = float(result["v"][0])
+        return abs(speed - RADIUS * float(result["w"][1])) <= 1e-9 * speed
+
+    return break_point(rolls, 0.1, 2.0, resolution=0.002, walk=8)
 
 
 def _draw(simulate: Simulate) -> Drawing:
@@ -192,6 +207,18 @@ TEST = ScalarTest(
             run=ladder_run,
             target_error=0.05,
             target_seconds=0.01,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="steepest-rolled",
+            title="Steepest slope down which a sphere rolls",
+            configuration="plain",
+            definition="no slip after two seconds, to 1e-9 of the speed",
+            study=steepest_rolled,
+            unit="1",
+            expected=(0.998 * 3.5 * FRICTION, 3.5 * FRICTION),
+            expected_source="7/2 µ, to the resolution of the search",
         ),
     ),
 )

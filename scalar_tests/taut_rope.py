@@ -217,7 +217,10 @@ TEST = ScalarTest(
             description="relative error of the third mode's frequency of the taut rope against that of links",
             unit="1",
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 480)),
-            configurations=(Configuration(name="direct", method=PLAIN, expected_order=2.0),),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=2.0),
+                Configuration(name="half-step", method=Method(half_step_velocities=True), expected_order=2.0),
+            ),
             error=wave_error,
             run=wave_run,
             target_error=1e-3,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Iterable
+from dataclasses import replace
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -21,7 +22,9 @@ from spook_tracker.engine import (
     Scene,
     Trace,
 )
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -29,6 +32,7 @@ from spook_tracker.scalar_tests.case import (
     Ladder,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.sweep import line, told
@@ -94,6 +98,30 @@ def turn_error(simulate: Simulate, time_step: float = TIME_STEP, method: Method 
     """By how much it has turned wrongly at the end [rad]."""
     right, turn = landing(), ladder_run(simulate, time_step, method).final_state["die"][3:7]
     return float(2.0 * np.linalg.norm(turn * np.sign(turn @ right) - right))
+
+
+def fastest(simulate: Simulate) -> BreakPoint:
+    """How many times as fast the die may spin and keep its energy."""
+    parabola = MASS * GRAVITY * 0.5 * TIME_STEP * GRAVITY * DURATION  # J, of the step's own fall
+
+    def keeps(times: float) -> bool:
+        spin = np.array(SPIN) * times
+        x, y, z = spin.tolist()
+        die = RigidBody(
+            name="die",
+            mass=MASS,
+            shape=Box(SIZE),
+            position=(0.0, 0.0, 0.0),
+            velocity=VELOCITY,
+            angular_velocity=(x, y, z),
+        )
+        observe = {"e": MaximumAbsolute(quantity=Energy(), from_start=True)}
+        result = simulate(
+            replace(scene(), bodies=(die,)), time_step=TIME_STEP, duration=DURATION, observe=observe
+        )
+        return abs(float(result["e"]) - parabola) < 1e-9 * 0.5 * float(moments() @ spin**2)
+
+    return break_point(keeps, 1.0, 1e4, resolution=0.1, walk=9)
 
 
 def measure(simulate: Simulate) -> dict[str, float]:
@@ -182,6 +210,18 @@ TEST = ScalarTest(
             run=ladder_run,
             target_error=1e-2,
             target_seconds=0.01,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="fastest",
+            title="How many times as fast the die may spin at h = 1/60 s",
+            configuration="plain",
+            definition="energy kept to 1e-9 of that of the spin",
+            study=fastest,
+            unit="1",
+            expected=(1e4, 1e4),
+            expected_source="a turn has no limit; the search ends at 1e4, 18 600 radians a step",
         ),
     ),
 )

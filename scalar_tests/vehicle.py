@@ -350,7 +350,12 @@ TEST = ScalarTest(
             description="stopping way from 5 m/s against v²/(2 µ g)",
             unit="m",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480)),
-            configurations=(Configuration(name="direct", method=PLAIN, expected_order=1.0),),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=1.0),
+                Configuration(
+                    name="half-step", method=Method(half_step_velocities=True), expected_order=None
+                ),
+            ),
             error=ladder_error,
             run=ladder_run,
             target_error=0.03,

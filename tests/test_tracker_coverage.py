@@ -5,13 +5,15 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 from click.testing import CliRunner
 
+from spook_tracker import engine
 from spook_tracker.scalar_tests.case import Part, Reason
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.scalar_tests.oscillator.scene import decay, growth, run_map, stiffness_of_period
 from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.cli.report_catalogue import coverage_rows, coverage_table
 from spook_tracker.tracker.document.coverage import HEADINGS, Rungs, rungs
@@ -86,3 +88,35 @@ def test_the_page_has_a_row_for_every_test_of_the_night() -> None:
     assert [row.test for row, _ in context["rows"]] == [test.name for test in told.tests]
     assert all("down to" in row.cells[0] for row, _ in context["rows"] if row.test == "beam")
     assert context["summary"].startswith(f"{len(told.tests)} scenes: ")
+
+
+@pytest.mark.parametrize("finer", [2, 3, 7])
+@pytest.mark.parametrize(
+    "name",
+    [
+        name
+        for name, test in CATALOGUE.items()
+        if test.lacks.get("ladder") == "exact at every step" and name != "oscillator_filter"
+    ],
+)
+def test_what_is_called_exact_keeps_its_gates_at_every_step(name: str, finer: int) -> None:
+    """Limits of rounding: an error that depends on the step would not keep them."""
+
+    def simulate(scene: Any, *, time_step: float, steps: int | None = None, **rest: Any) -> Any:
+        more = None if steps is None else steps * finer
+        return engine.simulate(scene, time_step=time_step / finer, steps=more, **rest)
+
+    for measurement in CATALOGUE[name].measurements:
+        values = measurement.measure(simulate)
+        for metric in measurement.metrics:
+            assert metric.role != "gate" or metric.passes(values[metric.name]), (metric.name, values)
+
+
+@pytest.mark.parametrize("time_step", [0.1, 1.0 / 60.0, 1e-3])
+def test_the_filter_is_exact_at_every_step(time_step: float) -> None:
+    """It is asked in steps, so that its damping and its period go with the step."""
+    for period in (50, 7, 2):
+        stiffness, damping = stiffness_of_period(period, time_step), 2.0 * time_step
+        found = growth(run_map(engine.simulate, stiffness, damping, time_step, 10))
+
+        assert found == pytest.approx(decay(stiffness, damping, time_step) ** 10, rel=1e-10)

@@ -9,7 +9,9 @@ from __future__ import annotations
 import math
 
 from spook_tracker.engine import ContactForce, Final, Method, Result
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Curve,
     Drawing,
@@ -20,6 +22,7 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.inclined_plane.scene import (
     BOX,
@@ -37,6 +40,7 @@ from spook_tracker.scalar_tests.sweep import told
 
 DIRECTIONS = tuple(2.0 * math.pi * i / 36.0 for i in range(36))
 LADDER_DIRECTIONS = DIRECTIONS[:9:3] + DIRECTIONS[1:9:3]
+STILL = 1e-9  # m/s
 SLIDING = 0.6  # tan θ, above the friction coefficient
 
 
@@ -67,6 +71,16 @@ def _measure_anisotropy(method: Method) -> object:
         return {"anisotropy": max(values) - min(values)}
 
     return measure
+
+
+def steepest(simulate: Simulate) -> BreakPoint:
+    """Steepest slope (its tangent) on which the box stands for a second, whatever the direction."""
+
+    def stands(slope: float) -> bool:
+        runs = (slide(simulate, slope, alpha) for alpha in LADDER_DIRECTIONS)
+        return all(math.hypot(*map(float, run["velocity"])) < STILL for run in runs)
+
+    return break_point(stands, 0.1, 2.0, resolution=0.0005, walk=8)
 
 
 def _draw_polar(slope: float) -> object:
@@ -263,6 +277,18 @@ TEST = ScalarTest(
             run=ladder_run,
             target_error=0.2,
             target_seconds=0.1,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="steepest",
+            title="Steepest slope on which the box stands",
+            configuration="cone",
+            definition="no faster than 1e-9 m/s after a second, in six directions",
+            study=steepest,
+            unit="1",
+            expected=(0.9995 * FRICTION, FRICTION),
+            expected_source="tan θ = µ, to the resolution of the search",
         ),
     ),
 )
