@@ -23,7 +23,9 @@ from spook_tracker.engine import (
     Scene,
     Velocity,
     simulate,
+    start,
 )
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
 
 STEP = 1 / 60
 G = 9.81
@@ -94,6 +96,17 @@ def test_what_stands_on_legs_is_solved_at_every_step(seed):
     assert run.residual <= 5e-3  # m/s, of the worst solve
     assert run.counters["factorisations"] <= 60 * steps
     assert run.counters["sweeps"] <= 100 * steps
+
+
+def test_no_step_of_a_body_that_comes_to_lie_takes_many_rounds():
+    """It lies on more points than it needs: where Newton's steps gain nothing they end, 500 of them or not."""
+    run = start(CATALOGUE["falling_chain"].example().scene, time_step=STEP)
+    rounds = [0]
+    for _ in range(round(2.0 / STEP)):
+        run.step(1)
+        rounds.append(run.result().counters["friction_rounds"])
+    assert max(np.diff(rounds)) <= 300
+    assert run.result().residual <= 5e-5  # m/s, of the worst solve
 
 
 def frame(mu: float, half_angle: float) -> Scene:

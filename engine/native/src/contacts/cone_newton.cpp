@@ -20,10 +20,11 @@ constexpr double narrow = 0.03;     // a step so short has lost the path
 // Of a unit's own inverse mass: dz/dv is at most its mass over hold. The loosest leaves the matrix well conditioned
 // however redundant the points; with the tightest, what holding leaves is rounding soon after.
 constexpr double loosest_hold = 3e-4, tightest_hold = 1e-10;
-constexpr double behind = 10.0, slow = 0.1;     // of the blur, and of itself: what holding back leaves
-constexpr double far = 1e-3;                    // a residual, of the speeds, from which the path may crawl
-constexpr int backoff = 3, long_patience = 12;  // iterations without half the residual, or much less blur
-constexpr int max_jumps = 3;                    // without half the least they met
+constexpr double hardest_hold = 0.1, brief = 0.3;  // beside joints, after a step so short
+constexpr double behind = 10.0, slow = 0.1;        // of the blur, and of itself: what holding back leaves
+constexpr double far = 1e-3;                       // a residual, of the speeds, from which the path may crawl
+constexpr int backoff = 3, long_patience = 12;     // iterations without half the residual, or much less blur
+constexpr int max_jumps = 3;                       // without half the least they met
 // The path is sought again
 constexpr double back = 10.0;   //   so many blurs away,
 constexpr double nearer = 0.1;  //   and kept so much nearer to
@@ -421,6 +422,9 @@ ConeNewton::Left ConeNewton::follow_frozen(MixedSystem& system, ConeReport& repo
                 const Left left = worst();
                 if (left.map > behind * found.blur && left.map > slow * before.map)
                     hold_ = std::max(0.1 * hold_, tightest_hold);
+                // A short step tries too much at once: units are held harder, and let go again.
+                if (found.length < brief) hold_ = std::min(10.0 * hold_, hardest_hold);
+                else hold_ = std::max(0.1 * hold_, std::min(hold_, loosest_hold));
                 before = left;
                 blur = found.blur;
                 if (!frozen && left.speed < best.speed) best = left, keep();

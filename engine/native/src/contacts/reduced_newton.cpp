@@ -10,6 +10,7 @@ namespace spook {
 namespace {
 
 constexpr int polish_steps = 24;
+constexpr int patience = 5;      // steps without half the best residual: those that end do so sooner
 constexpr double relief = 1e-9;  // of a row's own entry of W, in Newton's matrix only: redundant points
 
 }  // namespace
@@ -142,8 +143,12 @@ void ReducedContacts::take_step() {
 /// long: load goes from one to another until that carries all. Keeps the best point in best_; ends on the last.
 void ReducedContacts::polish(Report& report, double goal) {
     pinned_.assign(static_cast<std::size_t>(rows_), 0);
+    int stalled = 0;
     for (int k = 0; k < polish_steps; ++k) {
+        const double best = best_residual_;
         if (keep_best() <= goal) return;
+        stalled = best_residual_ < 0.5 * best ? 0 : stalled + 1;
+        if (stalled > patience) return;
         double worst = 0.0;
         ++report.newton_steps;
         if (!find_step(worst)) return;
