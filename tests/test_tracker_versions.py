@@ -186,5 +186,7 @@ def test_a_version_as_pages_print_it_is_one_commits_or_refused() -> None:
     runs = runs_of(*(commit(git_hash, version=name) for git_hash, name in zip((A, B, C), whole, strict=True)))
 
     assert found(runs, "0.1.dev7").engine.git_hash == A
-    with pytest.raises(UnknownName, match=r"could be 0\.1\.dev8\+g2b2b2b2, 0\.1\.dev8\+g3c3c3c3; write it whole"):
+    with pytest.raises(
+        UnknownName, match=r"could be 0\.1\.dev8\+g2b2b2b2, 0\.1\.dev8\+g3c3c3c3; write it whole"
+    ):
         found(runs, "0.1.dev8")
