@@ -91,7 +91,7 @@ def test_a_contact_without_friction_shows_the_weight_it_carries() -> None:
 
 
 def test_a_stranger_s_ten_lines_give_the_same_numbers() -> None:
-    """A fall, a speed and a bounce from the package's own interface, without our adapter: equal to the last digit."""
+    """Place and speed of a pushed box from the package's own interface, without our adapter: equal to the last digit."""
     world = rapier.PhysicsWorld(gravity=(0.0, 0.0, -9.81))
     world.integration_parameters.dt = 1 / 60
     made = rapier.RigidBodyBuilder(rapier.RigidBodyType.DYNAMIC).can_sleep(False).translation((0.0, 0.0, 0.5))
