@@ -224,7 +224,7 @@ double JointSet::one_sided(double inwards, double violation, double rate, const 
 /// coordinate is then. Impacts act along one direction, and the joint's own rows are linear in the step: this is exact.
 double JointSet::fold(double inwards, double violation, double approach, double restitution, State& state,
                       StopRow& stop) noexcept {
-    constexpr double most_impacts = 1e4;  // of those that lose speed
+    constexpr int most_impacts = 10000;  // of those that lose speed
     double way = inwards, speed = restitution * approach;
     double left = time_step_ - std::max(0.0, inwards * violation) / approach;  // s
     if (restitution == 1.0) {
@@ -232,7 +232,7 @@ double JointSet::fold(double inwards, double violation, double approach, double 
         left = std::max(0.0, left - impacts * (stop.range / speed));
         if (std::fmod(impacts, 2.0) != 0.0) way = -way;
     } else {
-        for (double impacts = 0.0; left * speed > stop.range && impacts < most_impacts; ++impacts) {
+        for (int impacts = 0; left * speed > stop.range && impacts < most_impacts; ++impacts) {
             left -= stop.range / speed;
             speed *= restitution;
             way = -way;
