@@ -198,3 +198,9 @@ def test_no_file_is_longer_than_contributing_says() -> None:
     assert len(files) > 500
     assert {".js", ".css", ".html"} <= {path.suffix for path in files}
     assert {path.name: n for path in files if (n := len(path.read_text().splitlines())) > most} == {}
+
+
+def test_any_becomes_rarer_in_the_tracker() -> None:
+    """What is `Any` is checked by no tool; sixty are meant to be left. A change that removes some lowers the number."""
+    sources = (path.read_text(encoding="utf-8") for path in (ROOT / "tracker").rglob("*.py"))
+    assert sum(len(re.findall(r"\bAny\b", source)) for source in sources) <= 538
