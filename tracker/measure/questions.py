@@ -94,7 +94,10 @@ class _Limited:
         theirs, setup = None, 0.0
         try:
             result = self.simulate(scene, **options)
-            theirs, setup = result.seconds, result.stage_seconds.get("setup", 0.0)  # compiling is no running
+            theirs, setup = (
+                result.seconds,
+                getattr(result, "stage_seconds", {}).get("setup", 0.0),
+            )  # compiling is no running
         finally:
             # Whichever is known: an engine in a process of its own takes none of this one's time, and what raises tells
             # no seconds, so that the clock has to do.
