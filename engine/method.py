@@ -32,7 +32,8 @@ class Method:
     corrections        curved constraints: 0 (linearised), 1 or 2 extra back-substitutions per step, or solves where contacts or
                        bounds take part; each takes an order of the violation, and closed loops with redundant joints move
                        without compliance. What spins off its joint keeps its energy with 2, and loses it with 0: with
-                       half_step_velocities to 1 % at a third of a radian a step
+                       half_step_velocities to 1 % at a third of a radian a step. Beside contacts or bounds, what steps that are
+                       too long make of them, above a twentieth of the largest kinetic energy, is "unsettled"
     correction_cap     largest curvature correction, as a fraction of the rest length or of a joint's arms, or rad
     half_step_velocities  velocities live at mid-step: half-kick start, mid-step read-out. Order 2, with contacts as long
                        as they last on flat ground: rolling, sliding in a line, gripping; or without friction on round

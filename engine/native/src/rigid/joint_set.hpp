@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <limits>
 #include <span>
@@ -155,6 +156,15 @@ public:
     double spring_energy(std::span<const BodyState> bodies) const noexcept;
 
     void set_speed(int joint, double speed) noexcept { axials_[joints_[joint].axial].speed = speed; }
+    /// Whether some motor or spring gives energy that no book has: it has a speed or a force of its own, or a rest that moves, or
+    /// gives way where ½ k d² goes on.
+    bool drives() const noexcept {
+        for (const Axial& axial : axials_)
+            if (axial.pushes || (axial.has_motor && axial.speed != 0.0) || axial.rest_moves ||
+                (axial.has_spring && std::isfinite(axial.spring_impulse)))
+                return true;
+        return false;
+    }
     /// A new target of a motor whose force stays bounded or unbounded, as it was. Whether it is another.
     bool set_motor(int joint, double speed, double max_force);
     /// What a motor pushes with, or the most it may [N or N m].

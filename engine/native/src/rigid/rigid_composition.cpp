@@ -24,8 +24,6 @@ namespace spook {
 namespace {
 
 constexpr int DIFFERENCES = 8;        // of a stage's forces from step to step, the zeroth included
-constexpr double MOST_GAINED = 0.05;  // of the largest kinetic energy
-constexpr double ROUNDING = 1e-9;     // of the energy, which counts heights from anywhere
 constexpr double MOST_OF_RATE = 2.0;  // of τ² times the tension's rate: a stage τ is unstable above 4
 constexpr int MOST_PARTS = 1024;
 constexpr double NEAR = 1.0 / 64.0;              // of that: nearer than this tension is looked at often
@@ -57,7 +55,7 @@ void RigidSystem::compose(std::int64_t steps) {
         for (int part = 0; part < live_.parts; ++part) composed_step(h_ / live_.parts, 0);
         live_.halved_steps += live_.parts - 1;
         joints_.follow(live_.bodies);
-        live_.most_kinetic = std::max(live_.most_kinetic, kinetic_energy());
+        live_.energy.most_kinetic = std::max(live_.energy.most_kinetic, kinetic_energy());
     }
 }
 
@@ -109,32 +107,6 @@ void RigidSystem::look_at_tension() {
     live_.stage_steps = 0;
     std::fill(live_.history.begin(), live_.history.end(), 0.0);
     std::fill(live_.guess_order.begin(), live_.guess_order.end(), 0);
-}
-
-/// Whether a composition has made energy out of nothing, as where light bodies carry more tension than its steps can take: rows hold,
-/// and a solution is found in every step. Asked once the final state was read.
-void RigidSystem::judge_energy(RunReport& report) const {
-    if (!composed_ || report.status != Status::completed || constrained_.empty()) return;
-    for (int i = 0; i < bodies(); ++i) {
-        const bool driven = !constants_[i].moves() &&
-                            !(is_zero(live_.bodies[i].velocity) && is_zero(live_.bodies[i].angular_velocity));
-        if (driven || !is_zero(constants_[i].force) || !is_zero(constants_[i].torque)) return;
-    }
-    const double kinetic = kinetic_energy(), gained = kinetic + potential_energy() - live_.energy_begun;
-    const double most = std::max(live_.most_kinetic, kinetic);
-    if (!(gained > MOST_GAINED * most + ROUNDING * std::abs(live_.energy_begun))) return;
-    report.status = Status::unsettled;
-    report.failed_step = report.steps;
-    report.failed_body = *std::min_element(constrained_.begin(), constrained_.end(), [this](int a, int b) {
-        return constants_[a].mass < constants_[b].mass;
-    });
-    char said[200];
-    std::snprintf(
-        said, sizeof said,
-        "was found to move with %.3g J that came out of nothing, of %.3g J at most; where light bodies carry much "
-        "tension, T h²/(m l) above 0.3, take smaller steps or no composition",
-        gained, most);
-    report.reason = said;
 }
 
 /// One step of length h. Where the equations have no solution near, the step is taken back and done in two halves,

@@ -230,11 +230,8 @@ void RigidSystem::reset(StageClock* clock) {
     undelivered_ = false;
     mixed_ = MixedSystem{};
     mixed_values_ = solver_ != RigidSolver::block;
-    if (composed_) {
-        start_composition();
-        live_.most_kinetic = kinetic_energy();
-        live_.energy_begun = live_.most_kinetic + potential_energy();
-    }
+    if (composed_) start_composition();
+    if (composed_ || curved_) begin_energy();
     if (stiff_) find_tensions();
     const bool may_touch = contacts_ && contacts_->possible();  // or the stage is only forced in
     if (half_step_ || method_.corrections > 0) {

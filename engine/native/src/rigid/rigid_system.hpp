@@ -92,7 +92,7 @@ public:
     std::vector<double> final_state();
     /// The same without a solve: velocities are NaN.
     std::vector<double> places() const;
-    void judge_energy(RunReport& report) const;
+    void judge_energy(RunReport& report) const;  // energy_made.cpp
 
     // What can be observed:
     int bodies() const noexcept { return static_cast<int>(constants_.size()); }
@@ -194,6 +194,10 @@ private:
     void violations_at(const LargeArray<BodyState>& at, double* out) const;
     double row_speed(int block, int row, bool solved) const;
     void curve_rows(bool solved);
+    // energy_made.cpp:
+    void begin_energy();
+    bool has_power() const noexcept;
+    void note_energy();
     void take_solution(int k, BodyState& s) const noexcept;
     double bend(std::size_t row) const noexcept { return bend_.empty() ? 0.0 : bend_[row]; }
     void bend_rows_back();

@@ -41,12 +41,15 @@ struct RigidState {
     bool velocity_ready = false;         // the velocities of the coming step are found already
     LargeArray<BodyMomenta> before;      // those of the step before
     std::vector<double> last_violation;  // per row, where the step before began
+    struct Energy {                      // see energy_made.cpp
+        double begun = 0.0, most = 0.0, most_kinetic = 0.0;  // J
+        bool is_powered = false;  // some came, or may have come, from what is in no book
+    } energy;
     // Compositions:
-    double pending = 0.0;                           // s: half a stage still to be kicked
-    double energy_begun = 0.0, most_kinetic = 0.0;  // J
-    int locked = -1;  // a body of redundant rows that contradict each other by now
-    int lost = -1;    // a body of rows that no motion satisfies
-    struct Watched {  // of the redundant rows of a loop, see rigid_locking.cpp
+    double pending = 0.0;  // s: half a stage still to be kicked
+    int locked = -1;       // a body of redundant rows that contradict each other by now
+    int lost = -1;         // a body of rows that no motion satisfies
+    struct Watched {       // of the redundant rows of a loop, see rigid_locking.cpp
         double work = 0.0, motion = 0.0, last = 0.0;  // J: taken so far; the largest, and the last
         double held = 0.0, load = 0.0;                // √(2 J): what they held back, and what the loads gave
         double given = 0.0;                           // 2 J: what the loads gave at the last look
