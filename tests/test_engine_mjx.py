@@ -26,6 +26,6 @@ def test_a_pendulum_gains_what_mujoco_s_gains_and_keeps_its_length(configuration
 
 def test_what_our_adapter_cannot_ask_is_refused_before_anything_compiles() -> None:
     ball = Particle(name="ball", mass=1.0, position=(1.0, 0.0, 0.0))
-    pulled = Scene(bodies=(ball,), forces=(CentralGravity(centre=(0.0, 0.0, 0.0), strength=1.0),))
+    pulled = Scene(bodies=(ball,), forces=(CentralGravity(name="sun", centre=(0.0, 0.0, 0.0), strength=1.0),))
     with pytest.raises(NotSupported, match="our adapter cannot ask mjx for the force central gravity"):
         find("mjx").simulate(pulled, time_step=0.01, steps=1)
