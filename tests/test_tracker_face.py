@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from spook_tracker import tracker
+from spook_tracker.tracker import library
 
 NIGHT = """
 from pathlib import Path
@@ -37,6 +38,7 @@ def test_every_public_name_works_after_every_other(tmp_path: Path) -> None:
         [sys.executable, "-c", NIGHT], cwd=tmp_path, capture_output=True, text=True, check=False
     )
 
+    assert tracker.__all__ == library.__all__
     assert ran.stdout.split() == ["0", "True", "()", "False", "[]"], ran.stderr
 
 

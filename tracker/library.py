@@ -23,7 +23,7 @@ from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.series_history import Told
 from spook_tracker.tracker.judge.tonight import Finding, to_be_timed_again
 from spook_tracker.tracker.store.history import History
-from spook_tracker.tracker.website.options import PLAIN, SiteOptions
+from spook_tracker.tracker.website.options import DEFAULTS, SiteOptions
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.measure.limits import Limits
@@ -275,7 +275,7 @@ def publish(
     out: Path,
     accepted: Sequence[Accepted] = (),
     database: str = "",
-    options: SiteOptions = PLAIN,
+    options: SiteOptions = DEFAULTS,
 ) -> Report:
     """Build the website in the folder `out`; returns how many files were written.
 
@@ -334,7 +334,7 @@ def nightly(
     accepted: Sequence[Accepted] = (),
     watch: Watch | None = None,
     tell: Callable[[RunDocument | list[Finding]], None] = lambda news: None,
-    site: SiteOptions = PLAIN,
+    site: SiteOptions = DEFAULTS,
     **asked: Unpack[RunOptions],
 ) -> NightlyReport:
     """Measure everything, record it, judge it against the history, publish the website.

@@ -18,4 +18,4 @@ class SiteOptions:
     with_database: bool = False  # readers can load the SQLite file of the history
 
 
-PLAIN = SiteOptions()
+DEFAULTS = SiteOptions()

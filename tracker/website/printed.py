@@ -17,7 +17,7 @@ from pathlib import Path
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.website.nights import Records
-from spook_tracker.tracker.website.options import PLAIN, SiteOptions
+from spook_tracker.tracker.website.options import DEFAULTS, SiteOptions
 from spook_tracker.tracker.website.publish import publish
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
@@ -32,7 +32,7 @@ class PrintError(TrackerError):
 def one_file(
     history: Records,
     accepted: Sequence[Accepted] = (),
-    options: SiteOptions = PLAIN,
+    options: SiteOptions = DEFAULTS,
 ) -> str:
     """The newest night's document as one HTML file: style inside, no script, no reference to another file."""
     with tempfile.TemporaryDirectory() as folder:

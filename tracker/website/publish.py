@@ -40,7 +40,7 @@ from spook_tracker.tracker.website.events import Event, all_events
 from spook_tracker.tracker.website.folder import FolderError, digest, replacing
 from spook_tracker.tracker.website.live_module import built_module, module_script
 from spook_tracker.tracker.website.nights import Book, Records, TestHistory, book
-from spook_tracker.tracker.website.options import PLAIN, SiteOptions
+from spook_tracker.tracker.website.options import DEFAULTS, SiteOptions
 from spook_tracker.tracker.website.page_index import health
 from spook_tracker.tracker.website.page_mutants import read_mutants
 from spook_tracker.tracker.website.page_rows import Page
@@ -98,7 +98,7 @@ def publish(
     out: Path,
     accepted: Sequence[Accepted] = (),
     database: bytes | None = None,
-    options: SiteOptions = PLAIN,
+    options: SiteOptions = DEFAULTS,
 ) -> Report:
     """Write the website of a history to the folder `out`. FolderError if the folder is somebody else's.
 
