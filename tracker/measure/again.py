@@ -60,4 +60,7 @@ def _point(h: float, rungs: Mapping[float, tuple[SeriesDefinition, Sample]]) -> 
     if h not in rungs:
         return ErrorPoint(h, float("nan"), "missing", "not measured", {}, "")
     _, sample = rungs[h]
-    return ErrorPoint(h, sample.value, sample.outcome, sample.failure, sample.counters, sample.state_hash)
+    took = min(sample.timing.seconds) if sample.timing and sample.timing.seconds else 0.0
+    return ErrorPoint(
+        h, sample.value, sample.outcome, sample.failure, sample.counters, sample.state_hash, took
+    )
