@@ -122,3 +122,18 @@ def driver() -> Iterator[Any]:
     with browser(*found) as opened:
         opened.set_script_timeout(90)
         yield opened
+
+
+@pytest.fixture
+def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An empty folder to stand in, the toys importable, and nothing of the environment that commands would listen to."""
+    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    monkeypatch.chdir(tmp_path)
+    for name in (
+        "TRACKER_DB",
+        "TRACKER_ENGINE",
+        "TRACKER_CATALOGUE",
+        "GITHUB_STEP_SUMMARY",
+        "GITHUB_ACTIONS",
+    ):
+        monkeypatch.delenv(name, raising=False)

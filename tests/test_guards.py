@@ -204,3 +204,12 @@ def test_any_becomes_rarer_in_the_tracker() -> None:
     """What is `Any` is checked by no tool; sixty are meant to be left. A change that removes some lowers the number."""
     sources = (path.read_text(encoding="utf-8") for path in (ROOT / "tracker").rglob("*.py"))
     assert sum(len(re.findall(r"\bAny\b", source)) for source in sources) <= 538
+
+
+def test_what_marks_a_module_is_said_once() -> None:
+    """A second `pytestmark` replaces the first: tests that should stand in a folder of their own wrote into this one."""
+    twice = [
+        path.name for path in (ROOT / "tests").glob("*.py") if path.read_text().count("\npytestmark = ") > 1
+    ]
+
+    assert twice == []

@@ -21,7 +21,7 @@ QUESTIONS = "from toy_questions import CATALOGUE\n"
 NIGHT = ("nightly", "--quick")
 GATES = [("run",), NIGHT, ("ci", "night", "--quick"), ("ci", "change")]
 DECIDES = "imported by the process that decides"
-pytestmark = pytest.mark.timeout(120)  # a gate that never ends is no gate
+pytestmark = [pytest.mark.usefixtures("desk"), pytest.mark.timeout(120)]  # a gate that never ends is no gate
 
 ENDS_THE_PROCESS = {
     "sys.exit()": "import sys; sys.exit()",
@@ -43,20 +43,6 @@ WHERE = {
         + act.replace("\n", "\n  ") + "\nbuild_info = BuildInfo()\n", "catalogue": QUESTIONS,
     },
 }  # fmt: skip
-
-
-@pytest.fixture(autouse=True)
-def _desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(HERE))
-    monkeypatch.chdir(tmp_path)
-    for name in (
-        "TRACKER_DB",
-        "TRACKER_ENGINE",
-        "TRACKER_CATALOGUE",
-        "GITHUB_STEP_SUMMARY",
-        "GITHUB_ACTIONS",
-    ):
-        monkeypatch.delenv(name, raising=False)
 
 
 def gate(command: tuple[str, ...], **modules: str) -> Result:

@@ -17,6 +17,7 @@ from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.series_history import judge_history
 from tests.test_tracker_analyse import SERIES, history, sample, states
 
+pytestmark = pytest.mark.usefixtures("desk")
 HERE = Path(__file__).parent
 LOST = "fall/plain/position_error"
 ENGINE = """
@@ -34,20 +35,6 @@ removed = true
 who = "Ada"
 why = "the team gave it up"
 """
-
-
-@pytest.fixture(autouse=True)
-def _desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(HERE))
-    monkeypatch.chdir(tmp_path)
-    for name in (
-        "TRACKER_DB",
-        "TRACKER_ENGINE",
-        "TRACKER_CATALOGUE",
-        "GITHUB_STEP_SUMMARY",
-        "GITHUB_ACTIONS",
-    ):
-        monkeypatch.delenv(name, raising=False)
 
 
 def tracker(*command: str, lacks: str = "False", error: str = "") -> Result:
