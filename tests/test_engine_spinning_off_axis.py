@@ -181,7 +181,7 @@ def hanging(**axle: object) -> Scene:
 GIVEN = {
     "a motor": hanging(motor=Motor(speed=5.0, max_force=30.0)),
     "a force": hanging(motor=Motor(force=-12.0), limit=Limit(lower=-9.0, upper=9.0)),
-    "a spring that gives way": hanging(spring=JointSpring(stiffness=40.0, rest=-0.5, max_force=12.0)),
+    "a spring that gives way": hanging(spring=JointSpring(stiffness=40.0, rest=0.0, max_force=2.0)),
     "a limit begun beyond": hanging(limit=Limit(lower=-9.0, upper=-0.1)),
 }
 
