@@ -14,6 +14,7 @@ none, the page says so.
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import sys
 import textwrap
@@ -28,6 +29,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 import bench.engine_kinds as engine_kinds
 import bench.engine_places as engine_places
+import bench.recorded as recorded
 import spook_tracker.engine.find as find
 import spook_tracker.tracker as tracker
 import spook_tracker.tracker.judge.rank as ranks
@@ -35,6 +37,7 @@ from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.document.wording import instant, number, quantity, seconds, version
 from spook_tracker.tracker.measure.timing import Repeats
 from spook_tracker.tracker.store.database import session_on
+from spook_tracker.tracker.website.recorded import Occasion
 
 OURS = engine_places.OURS
 FACTS = "bench.engine_facts:FACTS"
@@ -69,7 +72,7 @@ def measure(names: Sequence[str], database: str, facts: str, limit: float, tests
     Of `tests` alone if there are any, and no facts then.
     """
     for name in names:
-        begin = time.perf_counter()
+        begin, load = time.perf_counter(), os.getloadavg()[0]
         document = tracker.run(
             tests,
             sweep=True,
@@ -83,6 +86,14 @@ def measure(names: Sequence[str], database: str, facts: str, limit: float, tests
         tracker.record(document, database)
         if not tests:
             measure_facts([name], facts)
+            took = time.perf_counter() - begin
+            recorded.add_occasion(
+                database,
+                Occasion(
+                    engine=name, started=document.started, seconds=round(took, 1),
+                    load=(round(load, 2), round(os.getloadavg()[0], 2)), limit=limit,
+                ),
+            )  # fmt: skip
         outcomes = Counter(sample.outcome for sample in document.samples)
         told = ", ".join(f"{count} {word.replace('_', ' ')}" for word, count in outcomes.most_common())
         print(f"{name}: {time.perf_counter() - begin:.0f} s; {told}", flush=True)

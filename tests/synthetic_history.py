@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from datetime import UTC, datetime, timedelta
 from typing import Any
 
 import msgspec
 
-from spook_tracker.tracker.document.json_form import Number, encode
+from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import (
     Curve,
     DrawnLink,
@@ -19,17 +19,15 @@ from spook_tracker.tracker.document.run_document import (
     FigureData,
     Machine,
     MapData,
-    Point,
     RunDocument,
     Sample,
     SceneDrawing,
     SeriesDefinition,
-    SeriesHistory,
     StageChoice,
     TestCard,
     Timing,
-    Trajectory,
 )
+from spook_tracker.tracker.store.documents import DocumentHistory
 
 HOSTILE = "<img src=x onerror=alert(1)></script><script>alert('x')</script> {{7*7}} %{x} =cmd() ../ \u202egnp.exe\x00 🚀"
 START = datetime(2025, 10, 1, 3, 17, tzinfo=UTC)
@@ -271,87 +269,6 @@ def _maps(worse: bool) -> Iterable[MapData]:
         cells=tuple(tuple(words[min(4, max(0, (j - i + worse) // 2 + 1))] for i in range(12)) for j in range(8)),
         prediction=tuple(tuple(1.0 + 0.1 * (j - i) for i in range(12)) for j in range(8)), note="Damping below one step grows.",
     )  # fmt: skip
-
-
-class DocumentHistory:
-    """The reading interface of `tracker.store.history.History` over documents in memory, oldest first."""
-
-    def __init__(self, documents: Sequence[RunDocument]) -> None:
-        self.documents = {d.id: d for d in documents}
-        self.bare: dict[int, list[Sample]] = {}
-        made = {id(d.samples): d for d in documents}  # many nights may have the same
-        self.made = {
-            samples: hashlib.sha256(encode((d.series, d.samples))).hexdigest() for samples, d in made.items()
-        }
-
-    def content(self, run_id: str) -> str:
-        return self.made[id(self.documents[run_id].samples)]
-
-    def runs(self, engine: str | None = None) -> list[RunDocument]:
-        return [d for d in self.documents.values() if engine in (None, d.engine.name)]
-
-    def series(
-        self, keys: Iterable[str] | None = None, *, evidence: bool = True
-    ) -> Mapping[str, SeriesHistory]:
-        points: dict[str, list[Point]] = {}
-        newest: dict[str, SeriesDefinition] = {}
-        for run in self.documents.values():
-            newest |= {d.key: d for d in run.series}
-            for found in run.samples if evidence else self._bare(run):
-                points.setdefault(found.series, []).append(
-                    Point(run, found, newest[found.series].test_version)
-                )
-        chosen = points.keys() if keys is None else points.keys() & set(keys)
-        return {key: SeriesHistory(newest[key], tuple(points[key])) for key in sorted(chosen)}
-
-    def _bare(self, run: RunDocument) -> list[Sample]:
-        """The samples of a run without what stands behind them."""
-        place = id(run.samples)  # many nights may have the same
-        if place not in self.bare:
-            self.bare[place] = [
-                Sample(
-                    series=s.series, value=s.value, outcome=s.outcome, passed=s.passed,
-                    set_point_held=s.set_point_held,
-                )
-                for s in run.samples
-            ]  # fmt: skip
-        return self.bare[place]
-
-    def samples(self, run_id: str) -> dict[str, tuple[SeriesDefinition, Sample]]:
-        run = self.documents[run_id]
-        definitions = {d.key: d for d in run.series}
-        return {s.series: (definitions[s.series], s) for s in run.samples}
-
-    def samples_of(
-        self, run_ids: Sequence[str], tests: set[str] | None = None, keys: Iterable[str] | None = None
-    ) -> dict[str, dict[str, tuple[SeriesDefinition, Sample]]]:
-        chosen = None if keys is None else set(keys)
-        return {
-            run_id: {
-                key: pair
-                for key, pair in self.samples(run_id).items()
-                if (tests is None or pair[0].test in tests) and (chosen is None or key in chosen)
-            }
-            for run_id in run_ids
-        }
-
-    def answered(self, run_ids: Sequence[str]) -> dict[str, set[tuple[str, str]]]:
-        return {run_id: {(d.test, d.kind) for d, _ in self.samples(run_id).values()} for run_id in run_ids}
-
-    def cards(self, run_id: str) -> tuple[TestCard, ...]:
-        return self.documents[run_id].tests
-
-    def figures(self, run_id: str) -> tuple[FigureData, ...]:
-        return self.documents[run_id].figures
-
-    def maps(self, run_id: str) -> tuple[MapData, ...]:
-        return self.documents[run_id].maps
-
-    def with_maps(self) -> set[str]:
-        return {run_id for run_id, document in self.documents.items() if document.maps}
-
-    def trajectories(self, run_id: str) -> tuple[Trajectory, ...]:
-        return self.documents[run_id].trajectories
 
 
 def history(nights: int = 24, *, broken: int = 10**9, hostile: bool = False) -> DocumentHistory:

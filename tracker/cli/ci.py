@@ -24,6 +24,7 @@ from spook_tracker.tracker.cli.options import (
     executor_option,
     limit_option,
     mutants_option,
+    recorded_option,
     recorded_runs,
     refuse_unwritable,
     source_options,
@@ -61,6 +62,7 @@ def ci() -> None:
 @limit_option
 @website_options
 @mutants_option
+@recorded_option
 @documents_option
 @accepted_option
 @source_options

@@ -28,6 +28,7 @@ from spook_tracker.tracker.cli.options import (
     limit_option,
     mutants_option,
     recorded,
+    recorded_option,
     refuse_unwritable,
     site_options,
     source_options,
@@ -176,6 +177,7 @@ def _of_engine(file: Path, name: str, names: list[str]) -> Path:
 @with_database_option
 @website_options
 @mutants_option
+@recorded_option
 @documents_option
 @accepted_option
 @source_options
@@ -212,6 +214,10 @@ def nightly(
     site = site_options()
     if site.mutants:
         read_mutants(site.mutants)  # before the other engines are measured, too
+    if site.recorded:
+        from spook_tracker.tracker.website.recorded import read_files
+
+        read_files(site.recorded)
     first, *others = engine.split(",")
     for other in others:
         asked = Request(
@@ -293,6 +299,7 @@ def engines() -> None:
 @with_database_option
 @website_options
 @mutants_option
+@recorded_option
 @documents_option
 @accepted_option
 @database_option

@@ -210,6 +210,18 @@ def mutants_option(command: Command) -> Command:
     )(command)
 
 
+def recorded_option(command: Command) -> Command:
+    """--recorded DIR: nights of other engines, measured elsewhere."""
+    return click.option(
+        "--recorded",
+        metavar="DIR",
+        expose_value=False,
+        callback=_kept(),
+        type=click.Path(exists=True, file_okay=False, path_type=Path),
+        help="Recorded nights of other engines, as `make recorded` writes them, for pages of the website.",
+    )(command)
+
+
 def _with_first_page(folder: Path | None) -> None:
     if folder is not None and not (folder / "index.html").is_file():
         raise click.BadParameter(f"{folder} has no index.html; build the documentation first")

@@ -189,13 +189,7 @@ def _ladder_pairs(
     version = _version(ladder, configuration)
     common = _series(name, test, ladder, configuration, version)
     for point, timing in zip(points.points, timed, strict=True):
-        series = replace_series(
-            common,
-            metric=f"ladder:{ladder.name}",
-            description=ladder.description,
-            kind="ladder",
-            time_step=point.time_step,
-        )
+        series = _rung(common, ladder, point.time_step)
         if isinstance(timing, Outcome):
             point, timing = _failed_when_timed(point, timing), None
         yield (
@@ -213,6 +207,25 @@ def _ladder_pairs(
             ),
         )
     yield from _scalars(ladder, configuration, common, points, timed, lost)
+
+
+def _rung(common: SeriesDefinition, ladder: Ladder, time_step: float) -> SeriesDefinition:
+    return replace_series(
+        common,
+        metric=f"ladder:{ladder.name}",
+        description=ladder.description,
+        kind="ladder",
+        time_step=time_step,
+    )
+
+
+def rung_series(name: str, test: ScalarTest) -> Iterator[SeriesDefinition]:
+    """The series of every rung of a test's ladders, nothing being measured."""
+    for ladder in test.ladders:
+        for configuration in ladder.configurations:
+            common = _series(name, test, ladder, configuration, _version(ladder, configuration))
+            for time_step in ladder.steps_of(configuration):
+                yield _rung(common, ladder, time_step)
 
 
 def _failed_when_timed(point: ErrorPoint, failed: Outcome) -> ErrorPoint:

@@ -90,6 +90,16 @@ def _measured(run: RunDocument) -> RunDocument:
     return msgspec.structs.replace(run, figures=(), maps=(), trajectories=())
 
 
+def write_runs(path: Path, runs: Iterable[RunDocument]) -> None:
+    """Write these runs as one such file, as they come, without drawings and motions. DocumentError if it cannot."""
+    _write(path, [encode(checked(_measured(run))) for run in runs])
+
+
+def read_runs(path: Path) -> list[RunDocument]:
+    """The runs in such a file. DocumentError if it cannot be read or a run in it is not valid."""
+    return [decoded(line, str(path)) for line in _lines(path)]
+
+
 def is_month(path: Path) -> bool:
     """Whether a file is named as those that are written here."""
     return NAME.fullmatch(path.name) is not None

@@ -7,13 +7,16 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
+from typing import TypeVar
 
 from packaging.version import InvalidVersion, Version
 
-from spook_tracker.tracker.store.versions import RunInfo
+from spook_tracker.tracker.document.run_document import Run
+
+AnyRun = TypeVar("AnyRun", bound=Run)
 
 
-def in_release_order(runs: Sequence[RunInfo]) -> list[RunInfo]:
+def in_release_order(runs: Sequence[AnyRun]) -> list[AnyRun]:
     """The runs with those of each engine without commits by version, then as they stood.
 
     Every engine keeps the places it had among the others. One whose versions are no version numbers keeps all.

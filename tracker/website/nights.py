@@ -218,6 +218,12 @@ def book(history: Records, accepted: Sequence[Accepted] = ()) -> Book:
     return Book(*_chapter(history, first, accepted), [Chapter(*chapter) for chapter in chapters])
 
 
+def chapters(history: Records) -> list[Chapter]:
+    """A chapter for each engine of a history, whichever that is about."""
+    runs = list(history.runs())
+    return [Chapter(*_chapter(history, line, ())) for line in lines(runs)]
+
+
 def _chapter(
     history: Records, runs: Sequence[Any], accepted: Sequence[Accepted]
 ) -> tuple[list[Night], list[TestHistory], list[Earlier]]:

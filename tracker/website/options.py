@@ -14,6 +14,9 @@ class SiteOptions:
     home_page: str = ""  # address of the project
     colour: str = ""  # of links and buttons, #rrggbb
     mutants: Path | None = None  # the record that `make mutants` writes: engines wrong on purpose
+    recorded: Path | None = (
+        None  # a folder that `make recorded` writes: nights of other engines, measured elsewhere
+    )
     documents: Path | None = None  # a folder of HTML files, published as docs/
     with_database: bool = False  # readers can load the SQLite file of the history
 

@@ -44,7 +44,9 @@ from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.diagrams import ladder_charts, trend_chart, view
 from spook_tracker.tracker.website.nights import Book, Chapter, TestHistory, Trend
 from spook_tracker.tracker.website.page_rows import Page
+from spook_tracker.tracker.website.recorded import Recorded
 
+ENGINES, RECORDED = "engines.html", "recorded.html"
 MOST_RELEASES = 200  # in the table of an engine's versions
 MOST_CHARTS = 24  # of series that changed over the versions
 MOST_CHANGES = 6  # named for one version
@@ -61,9 +63,9 @@ class Cell:
     best: bool = False
 
 
-def engine_address(name: str, root: str = "") -> str:
-    """Where the page of another engine is."""
-    return f"{root}engines/{slug(name)}.html"
+def engine_address(name: str, folder: str = "engines") -> str:
+    """Where the page of another engine is: as asked tonight, or as recorded."""
+    return f"{folder}/{slug(name)}.html"
 
 
 def samples_of(chapter: Chapter, *, timed: bool = True) -> dict[str, tuple[SeriesDefinition, Sample]]:
@@ -82,44 +84,91 @@ def _untimed(sample: Sample) -> Sample:
     return msgspec.structs.replace(sample, timing=None)
 
 
-def engines(book: Book) -> Page:
-    """Who answers what, and who is ahead at equal error."""
-    machine = book.tonight.machine.fingerprint
+def engines(book: Book, recorded: Recorded | None = None, path: str = ENGINES, beside: str = "") -> Page:
+    """Who answers what, and who is ahead at equal error: tonight, or in the recorded night with ours of tonight beside.
+
+    `beside` is the other of the two pages, where there are both.
+    """
+    chapters = book.engines if recorded is None else [*recorded.chapters, book]
+    machine = chapters[0].tonight.machine.fingerprint
+    titles = [_title(chapter) for chapter in chapters]
+    if recorded is not None:
+        titles[-1] += " tonight"
     asked: dict[str, Samples] = {
-        _title(chapter): samples_of(chapter, timed=chapter.tonight.machine.fingerprint == machine)
-        for chapter in book.engines
+        title: samples_of(chapter, timed=_alike(chapter, machine, book if recorded else None))
+        for title, chapter in zip(titles, chapters, strict=True)
     }
     gates = [(test, trend.definition) for test in book.tests for trend in test.gates()]
     told = answers([definition for _, definition in gates], asked)
     found = standings(asked)
-    untimed = [_title(c) for c in book.others if c.tonight.machine.fingerprint != machine]
+    untimed = [
+        title
+        for title, chapter in zip(titles, chapters, strict=True)
+        if not _alike(chapter, machine, book if recorded else None)
+    ]
+    folder = "engines" if recorded is None else "recorded"
     context = {
-        "engines": [_card(chapter, book, told, found) for chapter in book.engines],
+        "engines": [
+            _card(
+                title,
+                chapter,
+                "index.html" if chapter.name == book.name else engine_address(chapter.name, folder),
+                told,
+                found,
+            )
+            for title, chapter in zip(titles, chapters, strict=True)
+        ],
+        "recorded": None if recorded is None else _occasion(recorded),
+        "beside": beside,
         "matrix": [
             _line(test, definition, of_gate)
             for (test, _), (definition, of_gate) in zip(gates, told, strict=True)
         ],
         "ranks": list(_ranks(found, book, untimed)),
-        "behind": _behind(found, _title(book), book),
+        "behind": _behind(found, titles[0], book),
         "elsewhere": untimed,
     }
-    return Page("engines.html", "engines.html", "Engines", "The same questions to other engines.", context)
+    return Page(path, "engines.html", "Engines", "The same questions to other engines.", context)
+
+
+def _alike(chapter: Chapter, machine: str, tonight: Book | None) -> bool:
+    """Whether the run times of a chapter stand beside those of the machine; tonight's never beside recorded ones."""
+    return chapter is not tonight and chapter.tonight.machine.fingerprint == machine
+
+
+def _occasion(recorded: Recorded) -> dict[str, object]:
+    """What has to be known of a recorded night: when, on which machine, how busy, and what is left out."""
+    nights = [chapter.tonight for chapter in recorded.chapters]
+    machine = nights[0].machine
+    loads = [load for one in recorded.occasions for load in one.load]
+    return {
+        "first": day(min(night.started for night in nights)),
+        "last": day(max(night.finished for night in nights)),
+        "processor": machine.processor,
+        "cores": machine.cores,
+        "count": len(nights),
+        "loads": [number(min(loads), 2), number(max(loads), 2)] if loads else [],
+        "limits": sorted({one.limit for one in recorded.occasions}),
+        "minutes": number(sum(one.seconds for one in recorded.occasions) / 60.0, 3),
+        "stale": recorded.stale,
+    }
 
 
 def _title(chapter: Chapter) -> str:
     return clean(f"{chapter.name} {version(chapter.tonight.engine)}")
 
 
-def _card(chapter: Chapter, book: Book, told: Sequence[Any], found: Sequence[Standing]) -> dict[str, Any]:
+def _card(
+    name: str, chapter: Chapter, address: str, told: Sequence[Any], found: Sequence[Standing]
+) -> dict[str, Any]:
     """One engine: what it answers, and how often nobody is quicker."""
-    name = _title(chapter)
     mine = [answer for _, of_gate in told for answer in of_gate if answer.engine == name]
     supported = [a for a in mine if a.sample is not None and a.sample.outcome != "not_supported"]
     first = Counter(race.error for race in races(found) if race.order[0][1] == name)
     reached = Counter(race.error for race in races(found))
     return {
         "name": name,
-        "address": "index.html" if chapter is book else engine_address(chapter.name),
+        "address": address,
         "measured": day(chapter.tonight.started),
         "nights": len(chapter.nights),
         "kept": sum(a.stands == "pass" for a in mine),
@@ -129,7 +178,7 @@ def _card(chapter: Chapter, book: Book, told: Sequence[Any], found: Sequence[Sta
     }
 
 
-def _line(test: TestHistory, gate: SeriesDefinition, told: Sequence[Answer]) -> dict[str, Any]:
+def _line(test: TestHistory, gate: SeriesDefinition, told: Sequence[Answer]) -> dict[str, object]:
     return {
         "title": test.card.title,
         "address": page_of(test.name),
@@ -226,8 +275,9 @@ def _behind(found: Sequence[Standing], ours: str, book: Book) -> list[dict[str, 
     return sorted(places, key=lambda one: -one["times"])
 
 
-def engine_page(book: Book, chapter: Chapter) -> Page:
-    """One other engine: its answers in every configuration, and what its versions changed."""
+def engine_page(book: Book, chapter: Chapter, recorded: Recorded | None = None) -> Page:
+    """One other engine: its answers in every configuration, and what its versions changed, tonight's or recorded ones."""
+    history = chapter if recorded is None else recorded.releases.get(chapter.name, chapter)
     ours = {test.name: test for test in book.tests}
     gates = {question(t.definition): t.definition for test in book.tests for t in test.gates()}
     cells: dict[tuple[object, ...], dict[str, Cell]] = {place: {} for place in gates}
@@ -248,14 +298,16 @@ def engine_page(book: Book, chapter: Chapter) -> Page:
         for place, gate in gates.items()
         if cells[place]
     ]
-    steps = _steps(chapter)
+    steps = _steps(history)
     night = chapter.tonight
     context = {
         "engine": night.engine,
         "shown": _title(chapter),
         "measured": night.started,
         "machine": night.machine,
-        "nights": len(chapter.nights),
+        "nights": len(history.nights),
+        "recorded": recorded is not None,
+        "all_engines": RECORDED if recorded is not None and book.others else ENGINES,
         "configurations": names,
         "rows": rows,
         "counts": [
@@ -269,13 +321,13 @@ def engine_page(book: Book, chapter: Chapter) -> Page:
             )
             if chart.name.endswith("-seconds")
         ],
-        "versions": _folded(list(reversed(_versions(chapter, steps))))[:MOST_RELEASES],
+        "versions": _folded(list(reversed(_versions(history, steps))))[:MOST_RELEASES],
         "trends": [
-            view(trend_chart(trend, chapter.nights, (), ours_title(ours, trend), "version"))
-            for trend in _moving(chapter, steps)
+            view(trend_chart(trend, history.nights, (), ours_title(ours, trend), "version"))
+            for trend in _moving(history, steps)
         ],
     }
-    path = engine_address(chapter.name)
+    path = engine_address(chapter.name, "engines" if recorded is None else "recorded")
     return Page(path, "engine.html", _title(chapter), "Another engine's answers.", context, plotly=True)
 
 

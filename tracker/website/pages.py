@@ -17,6 +17,7 @@ from spook_tracker.tracker.website.page_index import index
 from spook_tracker.tracker.website.page_mutants import PATH, Mutant, mutants_page
 from spook_tracker.tracker.website.page_rows import Page, address
 from spook_tracker.tracker.website.page_test import test_page
+from spook_tracker.tracker.website.recorded import Recorded
 
 NAVIGATION = (  # in the order of need
     ("index.html", "Tonight"),
@@ -47,6 +48,7 @@ def pages(
     compared: Callable[[], Comparisons],
     module: str = "",
     mutants: Sequence[Mutant] = (),
+    recorded: Recorded | None = None,
 ) -> Iterator[Planned]:
     """Every page of the website, from the first to the pages of the tests; `module` is the live engine's script."""
     if not book.nights:
@@ -61,7 +63,20 @@ def pages(
     yield Planned("coverage.html", "Coverage", partial(page_overviews.covered, book))
     if module:
         yield Planned("live.html", "Live", partial(live_page, module))
-    yield Planned("engines.html", "Engines", partial(page_engines.engines, book))
+    if recorded is None or book.others:
+        beside = page_engines.RECORDED if recorded is not None else ""
+        yield Planned(page_engines.ENGINES, "Engines", partial(page_engines.engines, book, beside=beside))
+    if recorded is not None:
+        path, beside = (
+            (page_engines.RECORDED, page_engines.ENGINES) if book.others else (page_engines.ENGINES, "")
+        )
+        yield Planned(path, "Engines", partial(page_engines.engines, book, recorded, path, beside))
+        for chapter in recorded.chapters:
+            if chapter.name != book.name:
+                path = page_engines.engine_address(chapter.name, "recorded")
+                yield Planned(
+                    path, clean(chapter.name), partial(page_engines.engine_page, book, chapter, recorded)
+                )
     for chapter in book.others:
         path = page_engines.engine_address(chapter.name)
         yield Planned(path, clean(chapter.name), partial(page_engines.engine_page, book, chapter))

@@ -45,6 +45,8 @@ from spook_tracker.tracker.website.page_index import health
 from spook_tracker.tracker.website.page_mutants import read_mutants
 from spook_tracker.tracker.website.page_rows import Page
 from spook_tracker.tracker.website.pages import NAVIGATION, pages
+from spook_tracker.tracker.website.recorded import read_files
+from spook_tracker.tracker.website.recorded import told as told_beside
 from spook_tracker.tracker.website.replays import replay_files
 from spook_tracker.tracker.website.templates import environment
 
@@ -113,6 +115,7 @@ def publish(
     making = digest(*(path.read_bytes() for path in sorted([*templates.iterdir(), *_sources()])))
     made = environment(templates)
     told = book(history, accepted)
+    beside = told_beside(read_files(options.recorded), told) if options.recorded and told.nights else None
     failed: list[str] = []
     documents, mutants = options.documents, read_mutants(options.mutants) if options.mutants else ()
     whose = {
@@ -155,7 +158,7 @@ def publish(
                 return source, b""
             return source, made.get_template(page.template).render(context).encode("utf-8", "replace")
 
-        for planned in pages(told, events, causes, compared, module, mutants):
+        for planned in pages(told, events, causes, compared, module, mutants, beside):
             charts: dict[str, bytes] = {}
             try:
                 made_page = planned.make()
