@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.document.middle import median, median_of_sorted
 from spook_tracker.tracker.judge.normal_nights import exceeded
-from spook_tracker.tracker.judge.segments import NORMAL, Boundary, Standing
+from spook_tracker.tracker.judge.segments import NORMAL, Boundary, Standing, inner_split
 from spook_tracker.tracker.judge.shifts import BASE, CLIP, FEWEST_BASE, clusters, remembered, standard_error
 from spook_tracker.tracker.judge.slower import LEAST, worse_by
 
@@ -161,6 +161,36 @@ class PresentLevel:
             del self.reached[:-REACHED]
         self.now.places += places
         self._told = None
+
+    def _split_inside(self) -> None:
+        """Nights of an older level leave the segment: they say nothing of its noise."""
+        count = len(self.now.places)
+        if count < FEWEST_BASE or count % FEWEST:
+            return
+        if inner_split(self._costs(self.now.places[-BASE:]), 1.0) is None:
+            return  # nearly always
+        base = self._base()
+        costs = base.tolist()
+        split = inner_split(costs, 1.0)
+        if split is None:
+            return
+        import numpy as np
+
+        low, high = base[:split], base[split:]
+        memory = remembered(np.concatenate([low - low.mean(), high - high.mean()]))
+        if memory and inner_split(costs, (1.0 - memory) / (1.0 + memory)) is None:
+            return
+        nights = self.now.places
+        cut = len(nights) - len(base) + split
+        self.now.places = nights[cut:]
+        self._reach_again()
+
+    def _reach_again(self) -> None:
+        """What the segment's nights reached, of other nights than before."""
+        self._told = None
+        level = self._level()[0]
+        self.reached = [self._worse_by(level, self.values[i]) for i in self.now.places[-REACHED:]]
+        self._told = self._outer = None
 
     def _base(self) -> Values:
         """Nights of the segment; what lies far off, accidents and an older level, counts as if it lay nearer."""

@@ -16,22 +16,27 @@ from functools import partial
 from msgspec.structs import replace
 
 from spook_tracker.tracker.document.middle import median
+from spook_tracker.tracker.judge.drift import DriftingLevel
 from spook_tracker.tracker.judge.level import (
-    CREEP,
-    FEWEST,
     FLOOR,
-    REACHED,
     SIGMAS,
     WINDOW,
     Growing,
-    PresentLevel,
     Reference,
     exponent_of,
     times_two_to,
 )
 from spook_tracker.tracker.judge.noisy import Noisy
-from spook_tracker.tracker.judge.segments import Segment, boundary, inner_split, spread_of
-from spook_tracker.tracker.judge.shifts import BASE, FEWEST_BASE, RARE, SPANS, Shift, remembered, shift
+from spook_tracker.tracker.judge.segments import Segment, boundary, spread_of
+from spook_tracker.tracker.judge.shifts import (
+    BASE,
+    FEWEST_BASE,
+    RARE,
+    SPANS,
+    Shift,
+    drawn_anew,
+    shift,
+)
 from spook_tracker.tracker.judge.slower import LEAST, Usual, change_in_words, slower
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import with_recoveries
@@ -40,7 +45,6 @@ MENDED = 0.25  # of its size: a red level that is left of it is none
 SETTLED = 30  # nights of a segment after which its boundary is known
 BACK, WEIGHT = 9.0, 6.0  # log likelihoods: to believe that a red level was left; of one night at most
 OFTEN = 2  # times left before: such a level is flaky,
-LONG = 3  # times the nights whose middle tells a drift, before it is gone
 LONGER = 2  # until it lasts so many times its longest
 
 
@@ -82,17 +86,13 @@ def judged_and_segments(
 
 
 @dataclass
-class _Walk(PresentLevel):
+class _Walk(DriftingLevel):
     """What is known of a series, night after night."""
 
     ages: Sequence[int] = ()
     off: list[int] = field(default_factory=list)  # the last nights in a row that stand clear, on one side
     reference: Reference | None = None  # while red or flaky
     over: list[Segment] = field(default_factory=list)
-    anchor: list[int] = field(default_factory=list)  # the nights at the last release
-    anchored: float = math.nan  # the middle of these
-    crept: float = 0.0  # the largest drift since it is red; zero while it is not
-    crept_at: int = 0  # the night when that was told
     first: tuple[int, int] | None = None  # of the red: last good and first bad night
     broken: bool = False  # no finite value last night
 
@@ -118,6 +118,8 @@ class _Walk(PresentLevel):
         self.broken = False
         self._see(place, change, threshold)
         found = self._begins()
+        if not accepted and (mixed := self._of_two_levels(value, found)) is not None:
+            return self._drawn_anew(place, mixed)
         if found is not None:
             return self._new_segment(place, found, accepted)
         if accepted and (self._red or (self.off and not self.better)):
@@ -228,6 +230,47 @@ class _Walk(PresentLevel):
             if total < -BACK:
                 return None
         return None
+
+    def _of_two_levels(self, value: float, found: tuple[int, Shift | None] | None) -> int | None:
+        """The first of nights that are drawn anew from two levels, where such nights would begin or keep a segment."""
+        if found is None:
+            if self.reference is None or self.now.standing != "red":
+                return None
+            if self._worse_by(self.reference.level, value) > 0.5 * self.now.size:
+                return None  # as red as before
+        elif found[1] is not None:
+            return None  # more of them than chance draws from one
+        import numpy as np
+
+        level = [s.first for s in self.over if s.first >= self.start and s.standing in ("usual", "accepted")]
+        begun = [*level, self.now.places[0]]
+        for first in begun[: None if found else -1]:
+            costs = self._costs(
+                [i for i in range(max(first, self.until - BASE), self.until) if self._number(i)]
+            )
+            within = not self.off or min(costs[-len(self.off) :]) <= max(costs[: -len(self.off)], default=0.0)
+            if within and len(costs) >= FEWEST_BASE and drawn_anew(np.array(costs)):
+                return first
+        return None
+
+    def _drawn_anew(self, place: int, first: int) -> Noisy:
+        """Segments that nights drawn anew from two levels seemed to make are one."""
+        held, _ = self.held_to()
+        nights = [i for i in range(self.start, self.until) if self._number(i)]
+        joined = [segment for segment in self.over if segment.first >= first]
+        if joined:
+            self.over = self.over[: -len(joined)]
+            before = [i for i in nights if i < first][-WINDOW:]
+            self.now = Growing([], joined[0].standing, before, joined[0].boundary)
+            self.reference, self.first = None, None
+        self.now.places, self.off = [i for i in nights if i >= first], []
+        self._reach_again()
+        if self.now.standing == "red":
+            return self._red_night(news=False)
+        value = self.values[place]
+        words = f"{change_in_words(self._worse_by(held, value))}, of two levels that nights are drawn from"
+        verdict = Verdict(word="same", sentence=words)
+        return Noisy(verdict=verdict, state="green", against=self.now.places[0], levels=(held, value))
 
     # A new segment.
 
@@ -409,76 +452,6 @@ class _Walk(PresentLevel):
         self._start(place)
         self.now.standing = "accepted"
         return Noisy(verdict=verdict, state="accepted", against=good, levels=(held, self.values[place]))
-
-    def _split_inside(self) -> None:
-        """Nights of an older level leave the segment: they say nothing of its noise."""
-        count = len(self.now.places)
-        if count < FEWEST_BASE or count % FEWEST:
-            return
-        if inner_split(self._costs(self.now.places[-BASE:]), 1.0) is None:
-            return  # nearly always
-        base = self._base()
-        costs = base.tolist()
-        split = inner_split(costs, 1.0)
-        if split is None:
-            return
-        import numpy as np
-
-        low, high = base[:split], base[split:]
-        memory = remembered(np.concatenate([low - low.mean(), high - high.mean()]))
-        if memory and inner_split(costs, (1.0 - memory) / (1.0 + memory)) is None:
-            return
-        nights = self.now.places
-        cut = len(nights) - len(base) + split
-        self.now.places, self._told = nights[cut:], None
-        level = self._level()[0]
-        self.reached = [self._worse_by(level, self.values[i]) for i in self.now.places[-REACHED:]]
-        self._told = self._outer = None
-
-    # Drift.
-
-    def _anchors(self, place: int, release: bool) -> None:
-        if release and len(self.anchor) >= CREEP:
-            self.anchor, self.crept = [place], 0.0
-        elif len(self.anchor) < CREEP and place not in self.anchor:
-            self.anchor = [*self.anchor, place]
-            self.anchored = median(self.values[i] for i in self.anchor)
-
-    def _ends(self) -> tuple[float, float] | None:
-        """The middle of the nights at the last release, and of the last ones."""
-        last = self.now.places[-CREEP:]
-        if len(self.anchor) < CREEP or len(last) < CREEP:
-            return None
-        return self.anchored, median([self.values[i] for i in last])
-
-    def _crept(self) -> tuple[float, float] | None:
-        """Drift against the last release, where both ends have nights enough: red until half of it is gone."""
-        ends = self._ends()
-        if ends is None:
-            return None
-        old, recent = ends
-        change, threshold = self._worse_by(old, recent), self._level()[2]
-        enough = min(threshold, 0.5 * self.crept) if self.crept else threshold
-        if self.crept and change <= enough:  # a few fast nights do not end it
-            recent = median([self.values[i] for i in self.now.places[-LONG * CREEP :]])
-            change = self._worse_by(old, recent)
-        if change <= enough or (not self.crept and change * abs(old) <= self._wanders()):
-            self.crept = 0.0
-            return None
-        self.crept = max(self.crept, change)
-        return old, recent
-
-    def _drifted(self, old: float, recent: float, news: bool) -> Noisy:
-        change = self._worse_by(old, recent)
-        words = f"{change_in_words(change)}, little by little since the last release"
-        verdict = Verdict(word="regressed", sentence=words, name="drift")
-        if news:
-            self.crept_at = self.until - 1
-        good, bad = self.anchor[-1], self.crept_at  # no commit did it: any since then may have a share
-        return Noisy(
-            verdict=verdict, state="detected", against=self.anchor[0], first_bad=bad, last_good=good,
-            worse_at=bad, news=news, accused=(good, bad), levels=(old, recent),
-        )  # fmt: skip
 
     def segments(self) -> list[Segment]:
         """All segments, the present one last; each lasts until the next begins."""

@@ -40,6 +40,9 @@ CHANCE = 2.6  # standard deviations of an autocorrelation that is none
 APART = (
     5.0  # standard deviations inside two clusters between their middles; noise of one hump cut in two shows 3
 )
+OFTEN_ENOUGH = (
+    1.645  # standard deviations: one in twenty of nights drawn anew change their cluster less often
+)
 FEWEST_CLUSTER, SMALLEST_CLUSTER = 6, 0.1  # nights, and share of all, in the smaller cluster
 
 
@@ -124,6 +127,17 @@ def clusters(base: Values) -> tuple[float, float] | None:
     inside = math.sqrt((_scatter(low) + _scatter(high)) / len(ordered))
     middles = median_of_sorted(low), median_of_sorted(high)
     return middles if middles[1] - middles[0] > APART * inside else None
+
+
+def drawn_anew(nights: Values) -> bool:
+    """Whether nights fall into two clusters at random: as often from one to the other as chance goes (Wald and Wolfowitz 1940)."""
+    if (split := clusters(nights)) is None:
+        return False
+    slow = nights - split[0] > split[1] - nights
+    count, of_them = len(slow), float(slow.sum())
+    changes = 2.0 * of_them * (count - of_them) / count
+    spread = math.sqrt(changes * (changes - 1.0) / (count - 1))
+    return float((slow[1:] != slow[:-1]).sum()) > changes - OFTEN_ENOUGH * spread
 
 
 def _scatter(values: Values) -> float:
