@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -100,17 +101,58 @@ def test_only_what_has_results_and_no_schema_is_short() -> None:
     assert not is_short(b"{" * 100_000)
 
 
-@pytest.mark.parametrize("gone", ["a", "c"])
-def test_a_run_time_that_stops_while_its_siblings_go_on_is_missing_and_red(tmp_path: Path, gone: str) -> None:
-    database = f"sqlite:///{tmp_path}/t.db"
-    for night in range(4):
-        names = [name for name in "abc" if night < 3 or name != gone]
+def import_nights(folder: Path, nights: Sequence[str]) -> str:
+    """A run a night, of one machine, imported night by night: each letter is a benchmark."""
+    database = f"sqlite:///{folder}/t.db"
+    for night, names in enumerate(nights):
         results = [{"test": name, "metric": "run_time", "unit": "s", "value": 1.0, "noisy": True} for name in names]  # fmt: skip
-        file = tmp_path / f"{night}.json"
+        file = folder / f"{night}.json"
         file.write_text(json.dumps({"engine": "e", "version": f"1.{night}", "started": f"2020-01-0{night + 1}T00:00:00+00:00", "machine": "m", "results": results}))  # fmt: skip
         assert call("import", str(file), "--db", database).exit_code == 0
+    return database
+
+
+@pytest.mark.parametrize("left", ["bc", "ab", "b", "c"])
+def test_run_times_that_stop_while_their_siblings_go_on_are_missing_and_red(
+    tmp_path: Path, left: str
+) -> None:
+    database = import_nights(tmp_path, ["abc", "abc", "abc", left, left])
 
     told = call("judge", "latest", "--db", database)
     assert told.exit_code == 1, told.output
-    assert f"{gone}/default/run_time" in told.output
+    for gone in {*"abc"} - {*left}:
+        assert f"{gone}/default/run_time" in told.output
     assert "its siblings were measured and it was not" in told.output
+    assert (
+        call("judge", "latest", "--db", import_nights(tmp_path, ["abc"] * 6)).exit_code == 0
+    )  # until it is back
+
+
+@pytest.mark.parametrize("nights", [["abc", "b"], ["abc", "b", "abc", "b"], ["abc", "abc", "abc", "bx"]])
+def test_a_run_of_some_benchmarks_misses_none_where_runs_were_of_some_before(
+    tmp_path: Path, nights: list[str]
+) -> None:
+    assert call("judge", "latest", "--db", import_nights(tmp_path, nights)).exit_code == 0
+
+
+@pytest.mark.parametrize(("days", "code"), [(0, 1), (3, 0)])
+def test_the_latest_night_is_that_of_every_machine(tmp_path: Path, days: int, code: int) -> None:
+    """The run that was recorded last is another machine's, and green: the red one of the same night is told, with where."""
+    database = f"sqlite:///{tmp_path}/t.db"
+    for night in range(24):
+        for hour, machine in ((1, "slower"), (2, "the other")):
+            slow = 1.5 if machine == "slower" and night > 21 else 1.0
+            result = {"test": "fall", "metric": "run_time", "unit": "s", "value": slow + 0.001 * (night % 3), "noisy": True}  # fmt: skip
+            begun = f"2020-01-{night + 1 + (days if hour == 2 else 0):02}T0{hour}:00:00+00:00"
+            file = tmp_path / f"{night}{hour}.json"
+            file.write_text(json.dumps({"engine": "e", "version": f"1.{night}", "started": begun, "machine": machine, "results": [result]}))  # fmt: skip
+    assert call("import", *map(str, sorted(tmp_path.glob("*.json"))), "--db", database).exit_code == 0
+
+    told = call("judge", "latest", "--db", database)
+    as_json = json.loads(call("judge", "latest", "--json", "--db", database).output)
+
+    assert told.exit_code == code, told.output
+    assert ("✗ fall/default/run_time: slower" in told.output and "on slower" in told.output) == (code == 1)
+    others = [(f["machine"][:6], f["red"]) for f in as_json if "machine" in f]
+    assert others == [("slower", True)][:code]
+    assert len(as_json) == 1 + code

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from spook_tracker.tracker.document.run_document import RunDocument
-from spook_tracker.tracker.measure.disappeared import Listed, with_missing
+from spook_tracker.tracker.measure.disappeared import LAST, Listed, with_missing
 from spook_tracker.tracker.measure.other_folders import beside
 from spook_tracker.tracker.measure.other_tools import of_other_tools
 from spook_tracker.tracker.measure.record_tables import is_table, meanings, of_tables
@@ -63,14 +63,15 @@ def record(session: Any, found: Read) -> tuple[int, int]:
     """Store them; how many are new, and how many were there before."""
     stored = History(session)
 
-    def before(run: RunDocument) -> RunDocument | None:
+    def before(run: RunDocument) -> list[RunDocument]:
         earlier: list[Any] = [
             other
             for other in stored.runs(run.engine.name)
             if other.machine.fingerprint == run.machine.fingerprint and other.started < run.started
         ]
-        last = max(earlier, key=lambda other: other.started, default=None)
-        return stored.document(last.id) if last else None
+        return [
+            stored.document(other.id) for other in sorted(earlier, key=lambda other: other.started)[-LAST:]
+        ]
 
     new = record_all(session, with_missing(found.runs, before))
     return sum(new), len(new) - sum(new)

@@ -189,10 +189,17 @@ def compare(
 
 @no_collection()
 def judge_run(history: History, run: str, accepted: Sequence[Accepted] = ()) -> list[Finding]:
-    """What became of a recorded run, against everything measured before it; red first."""
-    from spook_tracker.tracker.judge.tonight import tonight
+    """What became of a recorded run, against everything measured before it; red first.
 
-    return tonight(history, history.resolve(run), accepted)
+    `latest` is the latest night of every machine: what is red of the last runs of others within a day is among it.
+    """
+    from spook_tracker.tracker.judge.tonight import on_other_machines, tonight, worst_first
+
+    of_run = history.resolve(run)
+    findings = tonight(history, of_run, accepted)
+    if run.rpartition("@")[2] != "latest":
+        return findings
+    return worst_first([*findings, *on_other_machines(history, of_run, findings, accepted)])
 
 
 def idle_entries(

@@ -203,7 +203,8 @@ def judge_command(
 ) -> None:
     """Judge a recorded or imported run against everything measured before it.
 
-    RUN is named as for compare. What is red ends with exit code 1, a run that measured nothing with 3, as do old
+    RUN is named as for compare; latest is the latest night of every machine: what is red of the last runs of other
+    machines within a day is told, too. What is red ends with exit code 1, a run that measured nothing with 3, as do old
     questions some of whose values cannot be told.
     """
     from spook_tracker.tracker.cli.console import say

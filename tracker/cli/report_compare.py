@@ -320,6 +320,8 @@ def _finding_line(finding: Finding, site: str) -> str:
     parts.append(finding.verdict.sentence)
     if finding.blame:
         parts.append(("" if finding.news else "still red: ") + finding.blame)
+    if finding.machine:
+        parts.append(f"on {finding.machine}")
     parts.append(f"see {site}{page_of(finding.test)}")
     return clean("; ".join(parts))
 
@@ -353,6 +355,7 @@ def findings_json(findings: Sequence[Finding], then: Sequence[Any] = ()) -> str:
             "first_bad": finding.first_bad,
             "last_good": finding.last_good,
             **accused(finding.judged),
+            **({"machine": finding.machine} if finding.machine else {}),
         }
         for finding in findings
     ]

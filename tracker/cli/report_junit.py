@@ -60,7 +60,10 @@ def junit_of_night(findings: Sequence[Finding], then: Sequence[Any] = ()) -> str
         sample = finding.judged.night.sample if finding.judged else None
         crashed = sample is not None and sample.outcome == "crashed"
         said = f"recovered: {finding.verdict.sentence}" if finding.recovered else ""
-        cases[finding.test].append(Case(finding.series.partition("/")[2], failure, crashed, said=said))
+        where = f" on {finding.machine}" if finding.machine else ""
+        cases[finding.test].append(
+            Case(finding.series.partition("/")[2] + where, failure, crashed, said=said)
+        )
     for old in then:
         asked = f" as asked at {old.commit[:12] or 'no commit'}"
         for change in old.changes:

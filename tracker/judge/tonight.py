@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from datetime import timedelta
 from typing import Any
 
-from spook_tracker.tracker.document.run_document import SeriesDefinition
+from spook_tracker.tracker.document.about import started
+from spook_tracker.tracker.document.run_document import Run, SeriesDefinition
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.events import name_of
 from spook_tracker.tracker.judge.explaining import beside_findings
@@ -19,6 +21,7 @@ from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class, State
 
 MOST_NAMED = 8  # tests in one sentence
+NIGHT = timedelta(days=1)  # runs of several machines within it are of one
 HOW_TO_COMPARE = (
     "; to compare, put today's to the old commit: tracker backfill COMMIT, or the old ones to today's engine: "
     "tracker judge RUN --old-questions"
@@ -39,6 +42,7 @@ class Finding:
     good: Any = None  # of a map: the run it is compared with
     bad: Any = None  # of a map: the run it is of, or the first that has lost it
     state: State  # red, accepted, recovered …
+    machine: str = ""  # where another than the run's own measured it
 
     @property
     def name(self) -> str:
@@ -94,6 +98,25 @@ def tonight(records: Records, run: Any, accepted: Sequence[Accepted] = ()) -> li
     findings = of_run(judge_all(histories(records, line), accepted), run.id)
     findings += [_of_map(told) for told in told_maps(records, line, accepted) if told.tonight]
     return worst_first(findings)
+
+
+def on_other_machines(
+    records: Records, run: Run, findings: Sequence[Finding], accepted: Sequence[Accepted] = ()
+) -> list[Finding]:
+    """What is red of the last runs of other machines within the same day, as far as `findings` of a run do not say so."""
+    last = {other.machine.fingerprint: other for other in line_of(records.runs(), run)}
+    said = {finding.series for finding in findings if finding.red and not _of_a_clock(finding)}
+    return [
+        replace(finding, machine=f"{other.machine.processor} ({fingerprint[:8]})")
+        for fingerprint, other in last.items()
+        if fingerprint != run.machine.fingerprint and abs(started(other) - started(run)) < NIGHT
+        for finding in tonight(records, other, accepted)
+        if finding.red and finding.series not in said
+    ]
+
+
+def _of_a_clock(finding: Finding) -> bool:
+    return finding.definition is not None and finding.definition.kind == "time"
 
 
 def _of_map(told: ToldMap) -> Finding:

@@ -2,15 +2,15 @@
 
 Other tools store what they got and never say what they were asked for. A run is taken to be asked for what the last
 run like it had, of the same engine on the same machine: one with which it has at least half of both together in
-common. A run of some benchmarks alone, of another file or of another environment is like none of the others. Where the
-tool keeps a list of its benchmarks, what left the list was removed and is not missed; what is on the list without any
+common. A run of some benchmarks alone, of another file or of another environment is like none of the others; but where
+the last runs before all had the same ones, a run of a few of them has lost the rest. Where the tool keeps a list of its benchmarks, what left the list was removed and is not missed; what is on the list without any
 result is missed in the newest run, if that run is of the list's time: everything it measured is on it.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Set
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence, Set
 from itertools import groupby
 from typing import Any, NamedTuple
 
@@ -21,6 +21,7 @@ from spook_tracker.tracker.document.run_document import RunDocument, Sample, Ser
 from spook_tracker.tracker.measure.other_tools import asv_cases, asv_series
 
 Lane = tuple[str, str]  # engine, machine
+LAST = 3  # runs before: where these are alike, their lane is always asked for the same
 GONE = "its siblings were measured and it was not"
 NEVER = "the tool's list names it, and there is no result"
 
@@ -33,20 +34,24 @@ class Listed(NamedTuple):
 
 
 def with_missing(
-    read: Iterable[tuple[RunDocument, Listed]], before: Callable[[RunDocument], RunDocument | None]
+    read: Iterable[tuple[RunDocument, Listed]], before: Callable[[RunDocument], Sequence[RunDocument]]
 ) -> Iterator[RunDocument]:
     """The runs, oldest first in each lane, each with a missing value for what it ought to have and has not.
 
-    `before` is the run of the same lane that was stored earlier and comes next before one, or None.
+    `before` are the last runs of the same lane that were stored earlier, `LAST` at most, the oldest first.
     """
     ordered = sorted(read, key=lambda one: (lane_of(one[0]), one[0].started))
     for _, runs in groupby(ordered, key=lambda one: lane_of(one[0])):
         of_lane = list(runs)
-        earlier = before(of_lane[0][0])
-        kinds = [{d.key: d for d in earlier.series}] if earlier else []  # what the last run of each kind had
+        last = [{d.key: d for d in run.series} for run in before(of_lane[0][0])]  # what the last runs had
+        kinds: list[dict[str, SeriesDefinition]] = []  # what the last run of each kind had
+        for had in last:
+            kinds = [had, *(other for other in kinds if not _are_alike(had.keys(), other.keys()))]
         for run, listed in of_lane:
             here = {d.key: d for d in run.series}
             like = next((known for known in kinds if _are_alike(known.keys(), here.keys())), None)
+            if like is None and _is_left_of(here.keys(), last):
+                like = kinds[0]
             known = like or {}
             names = {_name(d) for d in run.series}
             missed = {
@@ -55,7 +60,9 @@ def with_missing(
             if run is of_lane[-1][0]:
                 missed |= {d.key: (d, NEVER) for d in _never_measured(run, listed, missed)}
             whole = _with(run, missed)
-            kinds = [{d.key: d for d in whole.series}, *(other for other in kinds if other is not like)]
+            had = {d.key: d for d in whole.series}
+            last = [*last, had][-LAST:]
+            kinds = [had, *(other for other in kinds if other is not like)]
             yield whole
 
 
@@ -66,6 +73,12 @@ def lane_of(run: RunDocument) -> Lane:
 
 def _are_alike(some: Set[str], others: Set[str]) -> bool:
     return 2 * len(some & others) >= len(some | others)
+
+
+def _is_left_of(here: Set[str], last: Sequence[Mapping[str, SeriesDefinition]]) -> bool:
+    """Whether a run has some of what the last ones had, all of them the same, and nothing else."""
+    alike = len(last) == LAST and all(_are_alike(last[-1].keys(), other.keys()) for other in last)
+    return alike and bool(here) and here < last[-1].keys()
 
 
 def _stays(definition: SeriesDefinition, names: Set[str], listed: Listed) -> bool:
