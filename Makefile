@@ -7,7 +7,7 @@ WORKERS ?= auto  # of the tests in Python: as many as there are cores
 BIN    := $(VENV)/bin
 export PIP_BUILD_CONSTRAINT ?= $(CURDIR)/.ci/build-constraints.txt
 
-.PHONY: help lint tools tidy tidy-deep engines wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-smooth bench-replay pictures looks heaps campaign campaign-wide mutants mutants-tonight past mutation detectors pairs aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-threads sanitize-python FORCE
+.PHONY: help lint tools tidy tidy-deep engines engine-releases recorded wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-smooth bench-replay pictures looks heaps campaign campaign-wide mutants mutants-tonight past mutation detectors pairs aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-threads sanitize-python FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -26,6 +26,8 @@ help:
 	@echo "make pictures  the pictures in docs/ again, of the nights in $(DB) and of a red night"
 	@echo "make looks     every page of the website in every width and theme, to axe"
 	@echo "make engines   every engine that can be had on every scene: docs/engines.md"
+	@echo "make engine-releases  the newest releases of MuJoCo, Exudyn and Rapier that are not measured yet"
+	@echo "make recorded  both as files that come with the sources, for the website of a fresh clone"
 	@echo "make heaps     piles of 1000 and 10 000 bodies as scalar tests, and their error against run time"
 	@echo "make campaign  2000 random heaps, others every week: does their energy ever rise?"
 	@echo "make campaign-wide  the same with every shape and ground, of 1e-6 to 1e9 kg"
@@ -48,7 +50,7 @@ help:
 	@echo "make clean     remove what was built (the database stays)"
 
 nightly: install
-	$(BIN)/tracker nightly --db $(DB) --out $(OUT) --mutants bench/mutants.json
+	$(BIN)/tracker nightly --db $(DB) --out $(OUT) --mutants bench/mutants.json --recorded bench/recorded
 
 # Each worker has a core of its own: linear algebra with threads beside them only waits for them.
 test: export OPENBLAS_NUM_THREADS = 1
@@ -90,7 +92,7 @@ crashes: develop
 RED := build/red-night
 pictures: develop
 	@! command -v clang++-19 >/dev/null || $(MAKE) --no-print-directory wasm
-	$(BIN)/tracker publish --db $(DB) --out $(OUT) --mutants bench/mutants.json
+	$(BIN)/tracker publish --db $(DB) --out $(OUT) --mutants bench/mutants.json --recorded bench/recorded
 	mkdir -p $(RED) && rm -f $(RED)/red.db
 	$(BIN)/python bench/red_night.py --keep $(RED)/measured --db sqlite:///$(RED)/red.db --out $(RED)/public
 	$(BIN)/python bench/pictures.py $(OUT) $(RED)/public
@@ -149,10 +151,21 @@ aa: develop
 bench: develop
 	$(BIN)/python bench/run.py
 
-# Every engine that can be had on every scene, and the page that says who is first where.
+# Every engine that can be had on every scene, and the page that says who is first where; TESTS="door pendulum": those alone.
+engines engine-releases: export TRACKER_NODE_MODULES ?= $(CURDIR)/build/engines/node_modules
 engines: develop
 	.ci/engines all
-	TRACKER_NODE_MODULES="$${TRACKER_NODE_MODULES:-build/engines/node_modules}" $(BIN)/python bench/engines.py
+	$(BIN)/python bench/engines.py $(TESTS:%=--test %) $(BUDGET:%=--minutes %)
+
+# Releases of MuJoCo, Exudyn and Rapier that are not measured yet, the newest of each.
+engine-releases: develop
+	$(BIN)/python bench/recorded.py --releases
+
+# Both as files in bench/recorded, which the website of `make nightly` shows; with TESTS the rest stays as it was.
+recorded: develop
+	$(if $(TESTS),$(BIN)/python bench/recorded.py --restore)
+	$(MAKE) engines $(if $(TESTS),,engine-releases)
+	$(BIN)/python bench/recorded.py
 
 bench-publish: develop
 	$(BIN)/python bench/bench_publish.py
@@ -191,7 +204,7 @@ formulas-font: develop
 	    --flavor=woff2 --layout-features=ssty --no-hinting --output-file=site/static/formulas.woff2
 
 site: install
-	$(BIN)/tracker publish --db $(DB) --out $(OUT) --mutants bench/mutants.json
+	$(BIN)/tracker publish --db $(DB) --out $(OUT) --mutants bench/mutants.json --recorded bench/recorded
 
 serve: install
 	$(BIN)/tracker serve $(OUT)

@@ -14,6 +14,7 @@ none, the page says so.
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import re
 import sys
@@ -35,12 +36,14 @@ import spook_tracker.tracker as tracker
 import spook_tracker.tracker.judge.rank as ranks
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.document.wording import instant, number, quantity, seconds, version
+from spook_tracker.tracker.measure.run import Interrupted
 from spook_tracker.tracker.measure.timing import Repeats
 from spook_tracker.tracker.store.database import session_on
 from spook_tracker.tracker.website.recorded import Occasion
 
 OURS = engine_places.OURS
 FACTS = "bench.engine_facts:FACTS"
+COMPILED = ("mjx",)  # takes seconds to compile each scene: asked last, where time is short
 FACT_LIMIT = 5.0  # s of one simulation
 # Of every engine, ours included: short runs are timed three times, what takes longer than this many seconds twice, visiting
 # all rungs before the second; most of the time goes into models that are built anew for each.
@@ -62,27 +65,51 @@ def installed() -> list[str]:
             print(f"left out: {reason}", flush=True)
             continue
         found.append(name)
-    return found
+    return sorted(found, key=lambda name: name in COMPILED)
 
 
-def measure(names: Sequence[str], database: str, facts: str, limit: float, tests: Sequence[str] = ()) -> None:
+def measure(
+    names: Sequence[str],
+    database: str,
+    facts: str,
+    limit: float,
+    tests: Sequence[str] = (),
+    minutes: float = math.inf,
+) -> None:
     """A run with ladders of each engine, and one of the facts, recorded each in its own; says how long both took.
 
     Ours and the others have one budget: `limit` [s] a simulation, and as much for those of a ladder in one setting.
-    Of `tests` alone if there are any, and no facts then.
+    Of `tests` alone if there are any, and no facts then. After so many minutes what is finished is recorded, and who is
+    left is named.
     """
-    for name in names:
+    ends = time.monotonic() + 60.0 * minutes
+
+    def watch(progress: object) -> None:
+        if time.monotonic() > ends:
+            raise KeyboardInterrupt
+
+    for place, name in enumerate(names):
+        if time.monotonic() > ends:
+            print(f"the {minutes:g} minutes are over; not asked: {', '.join(names[place:])}", flush=True)
+            return
         begin, load = time.perf_counter(), os.getloadavg()[0]
-        document = tracker.run(
-            tests,
-            sweep=True,
-            engine=name,
-            workers=2,
-            limit=limit,
-            patience=limit,
-            every_setting=False,
-            repeats=REPEATS,
-        )
+        try:
+            document = tracker.run(
+                tests,
+                watch=watch,
+                sweep=True,
+                engine=name,
+                workers=2,
+                limit=limit,
+                patience=limit,
+                every_setting=False,
+                repeats=REPEATS,
+            )
+        except Interrupted as ended:
+            if time.monotonic() <= ends:
+                raise
+            document = ended.document
+            print(f"{name}: the {minutes:g} minutes are over; of it only what was finished", flush=True)
         tracker.record(document, database)
         if not tests:
             measure_facts([name], facts)
@@ -420,6 +447,7 @@ def main(arguments: list[str]) -> int:
         default=0.5,
         help="s of one simulation of any engine, and of a ladder's together",
     )
+    parser.add_argument("--minutes", type=float, default=math.inf, help="in which all have to be asked")
     parser.add_argument("--missing", action="store_true", help="ask only whom the database has no run of")
     parser.add_argument(
         "--facts", action="store_true", help="ask for what kinds of engines do, and nothing else"
@@ -437,7 +465,7 @@ def main(arguments: list[str]) -> int:
         measure_facts(names, asked.facts_db)
     else:
         names = without_a_run(names, asked.db) if asked.missing else names
-        measure(names, asked.db, asked.facts_db, asked.limit, asked.test)
+        measure(names, asked.db, asked.facts_db, asked.limit, asked.test, asked.minutes)
     Path(asked.page).write_text(page(asked.db, asked.facts_db), encoding="utf-8")
     print(f"wrote {asked.page}")
     return 0

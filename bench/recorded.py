@@ -3,6 +3,7 @@
     python bench/recorded.py               write bench/recorded/ from what `make engines` and `make engine-releases` measured
     python bench/recorded.py --check       which tests are asked otherwise by now, and how many that is of all
     python bench/recorded.py --restore     the databases again from the files, so that single tests can be asked anew
+    python bench/recorded.py --releases    measure the newest releases of MuJoCo, Exudyn and Rapier that are not measured yet
 
 The files hold run documents without drawings and motions, of each engine the newest answer to every test. `make nightly`
 shows them on its website beside tonight's own. A test whose definition has changed since is left out there by name; too many
@@ -12,6 +13,7 @@ of them, and a test of the suite is red: `make recorded TESTS="door pendulum"` a
 from __future__ import annotations
 
 import argparse
+import subprocess
 import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
@@ -25,6 +27,7 @@ import spook_tracker.tracker as tracker
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.document.run_document import RunDocument, Sample, SeriesDefinition, Timing
 from spook_tracker.tracker.measure.ladder import rung_series
+from spook_tracker.tracker.measure.machine import machine as this_machine
 from spook_tracker.tracker.measure.question import metric_series
 from spook_tracker.tracker.store.database import session_on
 from spook_tracker.tracker.store.months import import_months, write_runs
@@ -35,6 +38,12 @@ FOLDER = ROOT / "bench" / "recorded"
 ENGINES_DB, RELEASES_DB = "sqlite:///build/engines.db", "sqlite:///build/engine-releases.db"
 OURS = "spook"
 MOST_STALE = 0.2  # of the tests: as many teams' changes as a site can leave out and still answer
+RELEASED = ("mujoco", "exudyn", "rapier")
+RELEASE_TESTS = (  # what its makers' changelogs speak of: docs/mujoco-releases.md
+    "blow", "double_pendulum", "edge_roll", "falling_object", "force_ratio", "friction", "hanging_chain", "loaded_rods",
+    "oscillator_spring", "overhang", "pendulum", "resting_stack", "rocking_block", "rolling_coin", "rolling_friction",
+    "rolling_sphere", "slip_angle", "spinning_top", "swinging_door",
+)  # fmt: skip
 CURE = 'ask them anew with: make recorded TESTS="{}"'
 
 
@@ -146,9 +155,15 @@ def main(arguments: list[str]) -> int:
     parser.add_argument(
         "--restore", action="store_true", help="record the files in databases that are not there"
     )
+    parser.add_argument("--releases", action="store_true", help="measure releases, and write nothing else")
+    parser.add_argument("--newest", type=int, default=12, help="of each engine")
+    parser.add_argument("--minutes", type=float, default=10.0, help="of each engine; the next call goes on")
     asked: Any = parser.parse_args(arguments)
     if asked.restore:
         restore(asked.folder, asked.db, asked.releases_db)
+        return 0
+    if asked.releases:
+        measure_releases(asked.releases_db, asked.newest, asked.minutes)
         return 0
     if not asked.check:
         import bench.engines as engines
@@ -159,8 +174,30 @@ def main(arguments: list[str]) -> int:
     return 0
 
 
+def measure_releases(database: str, newest: int, minutes: float) -> None:
+    """Of each engine those of the newest releases that the database has not."""
+    for name in RELEASED:
+        asked = [
+            f"--engine={name}",
+            f"--db={database}",
+            f"--newest={newest}",
+            f"--budget={minutes}",
+            "--limit=5",
+        ]
+        asked += [f"--test={test}" for test in RELEASE_TESTS]
+        subprocess.run(
+            [sys.executable, "-m", "spook_tracker", "backfill", *asked], check=False
+        )  # it names what it lacks
+
+
 def restore(folder: Path, engines: str, releases: str) -> None:
-    """Record the files in each database that is not there."""
+    """Record the files in each database that is not there. SystemExit on another machine than that of the night."""
+    night = recorded.read_files(folder).night[0].machine
+    if night.fingerprint != this_machine().fingerprint:
+        raise SystemExit(
+            f"the recorded night is of another machine ({night.processor}), beside whose run times those of here mean nothing; "
+            "measure all: make recorded"
+        )
     for database, name in ((engines, recorded.NIGHT), (releases, recorded.RELEASES)):
         file = Path(database.removeprefix("sqlite:///"))
         if file.exists() or not (folder / name).exists():
