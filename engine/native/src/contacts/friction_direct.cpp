@@ -464,7 +464,7 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
     if (system.velocity.size() == system.mass.size() && still_right(system, points, model)) return report;
     MixedSystem& start = work().start;
     const IterationBudget full_budget{max_rounds};
-    if (model == FrictionModel::cone && !points.empty() && ReducedContacts::takes(system)) {
+    if ((model == FrictionModel::cone || points.empty()) && ReducedContacts::takes(system)) {
         bool kept = false;
         if (!settle_quickly(system, points, model, direct, true, false, kept, report))
             solve_beside_joints(system, points, direct, report);
