@@ -108,7 +108,7 @@ def _answer(
 
 def standings(engines: Mapping[str, Samples]) -> list[Standing]:
     """Every engine on every ladder that at least one of them was asked, scene by scene."""
-    groups = {name: _ladders(samples) for name, samples in engines.items()}
+    groups = {name: ladders(samples) for name, samples in engines.items()}
     places = dict.fromkeys(place for found in groups.values() for place in found)
     return [
         _standing(place, name, found.get(place, {})) for place in places for name, found in groups.items()
@@ -167,8 +167,8 @@ def leads(found: Sequence[Standing], before: str, after: str) -> list[Lead]:
     return told
 
 
-def _ladders(samples: Samples) -> dict[tuple[str, str, str], dict[str, Rungs]]:
-    """(test, ladder, unit) -> configuration -> rungs."""
+def ladders(samples: Samples) -> dict[tuple[str, str, str], dict[str, Rungs]]:
+    """The rungs of an engine: (test, ladder, unit) -> configuration -> rungs."""
     found: dict[tuple[str, str, str], dict[str, Rungs]] = {}
     for definition, sample in samples.values():
         if definition.kind == "ladder" and definition.time_step is not None:
@@ -188,7 +188,7 @@ def _standing(place: tuple[str, str, str], engine: str, configurations: Mapping[
             outcomes.append(sample.outcome)
             if sample.outcome == "value" and abs(sample.value) < best:
                 best, chosen = abs(sample.value), name
-    soonest = [_soonest(configurations, error) for error in ERRORS]
+    times = [soonest(configurations, error) for error in ERRORS]
     none = "not run at this time step" if configurations else "not asked"
     outcome = "value" if chosen else (outcomes[0] if outcomes else none)
     return Standing(
@@ -198,13 +198,13 @@ def _standing(place: tuple[str, str, str], engine: str, configurations: Mapping[
         engine=engine,
         error=best if chosen else None,
         configuration=chosen,
-        seconds=tuple(seconds for seconds, _ in soonest),
-        settings=tuple(name for _, name in soonest),
+        seconds=tuple(seconds for seconds, _ in times),
+        settings=tuple(name for _, name in times),
         outcome=outcome,
     )
 
 
-def _soonest(configurations: Mapping[str, Rungs], error: float) -> tuple[float | None, str]:
+def soonest(configurations: Mapping[str, Rungs], error: float) -> tuple[float | None, str]:
     """Least run time at which some configuration reaches the error, and which that is."""
     times: list[tuple[float, str]] = []
     for name, rungs in configurations.items():

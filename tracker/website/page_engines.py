@@ -43,6 +43,7 @@ from spook_tracker.tracker.judge.standing import against_limit
 from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.diagrams import ladder_charts, trend_chart, view
 from spook_tracker.tracker.website.nights import Book, Chapter, TestHistory, Trend
+from spook_tracker.tracker.website.page_chooser import uses
 from spook_tracker.tracker.website.page_rows import Page
 from spook_tracker.tracker.website.recorded import Recorded
 
@@ -107,19 +108,27 @@ def engines(book: Book, recorded: Recorded | None = None, path: str = ENGINES, b
         if not _alike(chapter, machine, book if recorded else None)
     ]
     folder = "engines" if recorded is None else "recorded"
+    addresses = [
+        "index.html" if chapter.name == book.name else engine_address(chapter.name, folder)
+        for chapter in chapters
+    ]
+    chosen = uses(
+        {title: samples for title, samples in asked.items() if title not in untimed},
+        {
+            title: (address, chapter.name)
+            for title, address, chapter in zip(titles, addresses, chapters, strict=True)
+        },
+        {test.name: test.card.title for test in book.tests},
+    )
     context = {
         "engines": [
-            _card(
-                title,
-                chapter,
-                "index.html" if chapter.name == book.name else engine_address(chapter.name, folder),
-                told,
-                found,
-            )
-            for title, chapter in zip(titles, chapters, strict=True)
+            _card(title, chapter, address, told, found)
+            for title, chapter, address in zip(titles, chapters, addresses, strict=True)
         ],
         "recorded": None if recorded is None else _occasion(recorded),
         "beside": beside,
+        "uses": chosen,
+        "use_charts": [use.chart for use in chosen if use.chart is not None],
         "matrix": [
             _line(test, definition, of_gate)
             for (test, _), (definition, of_gate) in zip(gates, told, strict=True)
@@ -128,7 +137,7 @@ def engines(book: Book, recorded: Recorded | None = None, path: str = ENGINES, b
         "behind": _behind(found, titles[0], book),
         "elsewhere": untimed,
     }
-    return Page(path, "engines.html", "Engines", "The same questions to other engines.", context)
+    return Page(path, "engines.html", "Engines", "The same questions to other engines.", context, plotly=True)
 
 
 def _alike(chapter: Chapter, machine: str, tonight: Book | None) -> bool:

@@ -1,0 +1,236 @@
+"""Which engine for what: the scenes of one use together, and in what time each engine comes within an error on half of them.
+
+Counted are scenes that at least two engines can be asked. One that an engine cannot be asked, or on which it never comes
+so near, takes for ever: so all are measured on the same scenes, and a half has a time where the mean would have none.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from spook_tracker.tracker.document.addresses import page_of
+from spook_tracker.tracker.document.run_document import OutcomeClass
+from spook_tracker.tracker.document.wording import seconds
+from spook_tracker.tracker.judge.rank import Rungs, Samples, ladders, soonest
+from spook_tracker.tracker.website.charts import Chart, Line
+from spook_tracker.tracker.website.diagrams import View, view
+
+ERRORS = (1e-2, 1e-3, 1e-4)  # in the unit of a scene
+DRAWN = tuple(10.0 ** (-place / 2.0) for place in range(1, 15))
+FIRST = 3  # engines named at an error
+SEVERE: tuple[OutcomeClass, ...] = (
+    "crashed",
+    "not_finite",
+    "diverged",
+    "timed_out",
+    "unsettled",
+)  # the worst first
+Scene = tuple[str, str, str]  # test, ladder, unit
+USES: Mapping[str, tuple[str, ...]] = {  # every test of the catalogue that has a ladder stands in one
+    "Stacks and heaps": (
+        "resting_box", "resting_ball", "resting_stack", "overhang", "leaning_cards", "card_house", "pile", "falling_pile",
+        "masonry_arch", "stone_bridge", "rocking_block", "shaken_block",
+    ),
+    "Robots and chains of joints": (
+        "pendulum", "n_pendulum", "simple_pendulum", "double_pendulum", "swinging_door", "door", "motor", "robot_arm", "arm_path",
+        "loaded_rods", "hanging_chain", "spinning_top", "steady_turns",
+    ),
+    "Mechanisms with loops": (
+        "four_bars", "squeezer", "bricard", "governor", "slider_crank", "loose_bearing", "scissor_lift", "gears", "lock_ring",
+    ),
+    "Vehicles and rolling": (
+        "vehicle", "climb", "suspension", "cornering", "rolling_sphere", "rolling_friction", "rolling_coin", "rolling_log", "bowl",
+        "seams",
+    ),
+    "Gripping, sliding, conveying": (
+        "friction", "slip_angle", "force_ratio", "edge_roll", "grasp", "grain", "conveyor", "turntable", "sorting",
+    ),
+    "Ropes, springs, soft joints": (
+        "oscillator_spring", "oscillator_row", "oscillator_damped", "beam", "cantilever", "wires", "capstan", "hanging_cable",
+        "taut_rope", "rope", "falling_chain",
+    ),
+    "Flight and impacts": (
+        "falling_object", "planetarium", "rotating_box", "thrown_die", "bouncing_ball", "billiards", "floating_box",
+        "sinking_sphere",
+    ),
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Facts:
+    """What no measurement says of an engine, from its package."""
+
+    floats: str  # in which it counts as it is asked here
+    licence: str
+    language: str
+    devices: str
+
+
+FACTS: Mapping[str, Facts] = {
+    "spook": Facts("64 bits", "MIT", "C++, Python", "CPU"),
+    "box3d": Facts("32 bits", "MIT", "C", "CPU"),
+    "cannon": Facts("64 bits", "MIT", "JavaScript", "CPU"),
+    "dart": Facts("64 bits", "BSD-2-Clause", "C++, Python", "CPU"),
+    "drake": Facts("64 bits", "BSD and others", "C++, Python", "CPU"),
+    "exudyn": Facts("64 bits", "EXUDYN General License", "C++, Python", "CPU"),
+    "jolt": Facts("32 bits", "MIT", "C++, JavaScript", "CPU"),
+    "mjx": Facts("64 bits", "Apache-2.0", "Python (JAX)", "CPU, GPU, TPU"),
+    "mujoco": Facts("64 bits", "Apache-2.0", "C, Python", "CPU"),
+    "p2": Facts("64 bits", "MIT", "JavaScript", "CPU, in a plane"),
+    "pybullet": Facts("64 bits", "Zlib", "C++, Python", "CPU"),
+    "rapier": Facts("32 bits", "Apache-2.0", "Rust, JavaScript", "CPU"),
+    "rapier3d": Facts("32 bits", "Apache-2.0", "Rust, Python", "CPU"),
+    "sapien": Facts("32 bits", "MIT", "C++ (PhysX), Python", "CPU, GPU"),
+}
+
+
+@dataclass(frozen=True)
+class Row:
+    """One engine in one use."""
+
+    engine: str
+    address: str
+    times: tuple[
+        tuple[str, int], ...
+    ]  # for each of ERRORS: time for half of the scenes, or "", and on how many
+    worst: str
+    lacking: tuple[tuple[str, str], ...]  # scenes it cannot be asked, and where they stand
+    facts: Facts | None
+
+
+@dataclass(frozen=True)
+class Use:
+    """One use: who is soonest at each error, and every engine."""
+
+    title: str
+    anchor: str
+    count: int  # of scenes
+    first: tuple[
+        tuple[tuple[str, str, str], ...], ...
+    ]  # for each of ERRORS: engine, its page and time, soonest first
+    lines: tuple[Row, ...]
+    chart: View | None
+
+
+def uses(
+    asked: Mapping[str, Samples], addresses: Mapping[str, tuple[str, str]], titles: Mapping[str, str]
+) -> list[Use]:
+    """Every use of which two engines were asked a scene; `addresses` gives an engine's page and its plain name."""
+    groups = {name: ladders(samples) for name, samples in asked.items()}
+    found = []
+    for title, tests in USES.items():
+        scenes = _scenes(groups, tests)
+        if scenes:
+            found.append(_use(title, scenes, groups, addresses, titles))
+    return found
+
+
+def _scenes(groups: Mapping[str, Mapping[Scene, Mapping[str, Rungs]]], tests: Sequence[str]) -> list[Scene]:
+    able = Counter(
+        scene
+        for mine in groups.values()
+        for scene, found in mine.items()
+        if scene[0] in tests and _able(found)
+    )
+    return [scene for scene, count in able.items() if count > 1]
+
+
+def _able(found: Mapping[str, Rungs]) -> bool:
+    """Whether an engine can be asked a scene at all."""
+    return any(sample.outcome != "not_supported" for rungs in found.values() for _, sample in rungs)
+
+
+def half(times: Sequence[float | None]) -> float | None:
+    """The time within which half of the scenes are reached; None where fewer ever are."""
+    known = sorted(time for time in times if time is not None)
+    needed = math.ceil(len(times) / 2)
+    return known[needed - 1] if len(known) >= needed > 0 else None
+
+
+def _use(
+    title: str,
+    scenes: Sequence[Scene],
+    groups: Mapping[str, Mapping[Scene, Mapping[str, Rungs]]],
+    addresses: Mapping[str, tuple[str, str]],
+    titles: Mapping[str, str],
+) -> Use:
+    place = list(USES).index(title)
+    halves: dict[str, tuple[float | None, ...]] = {}
+    lines: list[Row] = []
+    drawn: list[Line] = []
+    for engine, mine in groups.items():
+
+        def times(error: float, mine: Mapping[Scene, Mapping[str, Rungs]] = mine) -> list[float | None]:
+            return [soonest(mine.get(scene, {}), error)[0] for scene in scenes]
+
+        reached = [times(error) for error in ERRORS]
+        halves[engine] = tuple(half(one) for one in reached)
+        address, plain = addresses[engine]
+        told = [
+            (seconds(h) if (h := half(one)) is not None else "", sum(t is not None for t in one))
+            for one in reached
+        ]
+        lacking = [scene for scene in scenes if not _able(mine.get(scene, {}))]
+        if len(lacking) == len(scenes):
+            continue
+        lines.append(
+            Row(
+                engine,
+                address,
+                tuple(told),
+                _worst(mine, scenes),
+                tuple(_named(lacking, titles)),
+                FACTS.get(plain),
+            )
+        )
+        curve = [(h, error) for error in DRAWN if (h := half(times(error))) is not None]
+        if curve:
+            drawn.append(
+                Line(
+                    name=engine, x=tuple(t for t, _ in curve), y=tuple(e for _, e in curve), colour=len(drawn)
+                )
+            )
+    lines.sort(
+        key=lambda one: [
+            (-many, h if h is not None else math.inf)
+            for (_, many), h in zip(one.times, halves[one.engine], strict=True)
+        ]
+    )
+    chart = Chart(
+        name=f"use-{place}", title=f"{title}: error on half of {len(scenes)} scenes against run time", x_label="run time [s]",
+        y_label="error", x_scale="log", y_scale="log", lines=tuple(drawn),
+    )  # fmt: skip
+    return Use(
+        title,
+        f"use-{place}",
+        len(scenes),
+        tuple(_first(halves, i, addresses) for i in range(len(ERRORS))),
+        tuple(lines),
+        view(chart) if drawn else None,
+    )
+
+
+def _first(
+    halves: Mapping[str, Sequence[float | None]], place: int, addresses: Mapping[str, tuple[str, str]]
+) -> tuple[tuple[str, str, str], ...]:
+    order = sorted((h, engine) for engine, found in halves.items() if (h := found[place]) is not None)
+    return tuple((addresses[engine][1], addresses[engine][0], seconds(h)) for h, engine in order[:FIRST])
+
+
+def _worst(mine: Mapping[Scene, Mapping[str, Rungs]], scenes: Sequence[Scene]) -> str:
+    """The worst that became of a rung, and on how many scenes."""
+    met = Counter(
+        outcome
+        for scene in scenes
+        for outcome in {s.outcome for rungs in mine.get(scene, {}).values() for _, s in rungs}
+    )
+    worst = next((outcome for outcome in SEVERE if met[outcome]), None)
+    return f"{worst.replace('_', ' ')} on {met[worst]}" if worst else "none failed"
+
+
+def _named(scenes: Sequence[Scene], titles: Mapping[str, str]) -> list[tuple[str, str]]:
+    found = dict.fromkeys(test for test, _, _ in scenes)
+    return [(titles.get(test, test), page_of(test) if test in titles else "") for test in found]
