@@ -223,6 +223,24 @@ def test_a_link_restores_the_zoom_of_a_chart(driver: Any, site: Path) -> None:
     assert ranges == [[1, 2], [0, 0.3]]
 
 
+def test_a_value_that_stands_still_is_drawn_on_to_tonight(driver: Any, site: Path) -> None:
+    """Its file ends where it last changed; the axis ends tonight, with the days of the nights."""
+    visit(driver, site, "tests/friction.html")
+    driver.execute_async_script(DRAWN)
+    kept, drawn, days, table = driver.execute_script("""
+        const box = document.querySelector('#broken figure.chart'), data = chartData.get(box.dataset.key);
+        const plot = box.querySelector('.plot');
+        box.querySelector('details').open = true;
+        return [data.data[0].x.at(-1), plot.data[0].x.at(-1), plot.layout.xaxis.ticktext, box.querySelector('summary').textContent];
+    """)
+
+    assert kept < drawn == 23
+    assert days[-1] == "2025-10-24"[5:]
+    assert table == "Data table"
+    rows = driver.find_elements("css selector", "#broken figure.chart tbody tr")
+    assert [rows[0].text.split()[0], "2025-10-01" in rows[0].text] == ["measured", True]
+
+
 def test_a_ladder_stands_beside_the_night_that_the_reader_chooses(driver: Any, site: Path) -> None:
     visit(driver, site, "tests/pendulum.html")
     driver.execute_async_script(DRAWN)
@@ -272,7 +290,7 @@ def test_charts_of_an_overview_are_loaded_as_they_are_seen(driver: Any, site: Pa
     visit(driver, site, "error-time.html", height=500)
     wait_for(driver, SEEN)
     counts = """const boxes = [...document.querySelectorAll('figure.chart')].filter((b) => b.checkVisibility());
-      return [boxes.length, boxes.filter((b) => chartData.has(b.dataset.key)).length]"""
+      return [boxes.length, boxes.filter((b) => b.classList.contains('drawn')).length]"""
 
     whole, first = driver.execute_script(counts)
     assert 0 < first < whole
@@ -283,16 +301,15 @@ def test_charts_of_an_overview_are_loaded_as_they_are_seen(driver: Any, site: Pa
     assert driver.execute_script(counts) == [whole, whole]
 
 
-def test_a_chart_whose_file_is_gone_keeps_its_picture(driver: Any, site: Path, tmp_path: Path) -> None:
+def test_a_chart_whose_file_is_gone_says_so(driver: Any, site: Path, tmp_path: Path) -> None:
     whole = shutil.copytree(site, tmp_path / "public")
     shutil.rmtree(whole / "charts")
     visit(driver, whole, "stability.html")
     wait_for(driver, "scripts.size === 0 && document.querySelectorAll('script[src*=\"charts/\"]').length > 0")
 
-    shown = driver.execute_script(
-        "return ['.static', '.plot'].map((s) => document.querySelector('figure.chart ' + s).checkVisibility())"
-    )
-    assert shown == [True, False]
+    notes = driver.find_elements("css selector", "figure.chart .chart-note")
+    assert any("could not be loaded" in note.text for note in notes)
+    assert not driver.find_element("css selector", "figure.chart .plot").is_displayed()
     driver.get_log("browser")  # says that files are missing
 
 
@@ -323,10 +340,15 @@ def test_the_keyboard_reaches_content_links_and_buttons(driver: Any, site: Path)
     assert {"Beam on two piles", "Friction", "Planetarium"} <= reached
 
 
-def test_without_scripts_tables_and_pictures_remain(driver: Any, site: Path) -> None:
+def test_without_scripts_tables_remain_and_the_page_says_where_the_pictures_are(
+    driver: Any, site: Path
+) -> None:
     driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": True})
     try:
         visit(driver, site, "tests/pendulum.html", scripts=False)
+        assert "report has the pictures" in driver.find_element("css selector", "noscript").text
+        assert driver.find_element("css selector", "#data tbody td").is_displayed()
+        visit(driver, site, "document.html", scripts=False)
         pictures = driver.find_elements("css selector", "main figure.chart .static svg")
         assert len(pictures) > 6
         assert all(picture.is_displayed() for picture in pictures[:3])
@@ -336,13 +358,13 @@ def test_without_scripts_tables_and_pictures_remain(driver: Any, site: Path) -> 
         driver.execute_cdp_cmd("Emulation.setScriptExecutionDisabled", {"value": False})
 
 
-def test_the_printed_report_hides_what_cannot_be_printed(driver: Any, site: Path) -> None:
+def test_a_printed_page_hides_what_cannot_be_printed(driver: Any, site: Path) -> None:
     visit(driver, site, "tests/pendulum.html")
     driver.execute_async_script(DRAWN)
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
     try:
         shown = driver.execute_script(
-            "return ['.bar', '.plot', '.static'].map((s) => document.querySelector(s).checkVisibility())"
+            "return ['.bar', '.theme', '.plot'].map((s) => document.querySelector(s).checkVisibility())"
         )
     finally:
         driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": ""})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from datetime import timedelta
 from pathlib import Path
@@ -10,7 +11,6 @@ from typing import Any
 
 import msgspec
 
-from spook_tracker.tracker.website.diagrams import ladder_charts, view
 from spook_tracker.tracker.website.earlier_nights import earlier_nights
 from spook_tracker.tracker.website.nights import book
 from spook_tracker.tracker.website.publish import publish
@@ -68,21 +68,14 @@ def test_a_night_without_ladders_is_not_offered_and_does_not_hide_an_older_one_t
     assert [(one.key, one.index) for one in told.earlier] == [("before", 10), ("week", 3)]
 
 
-def test_the_table_of_a_chart_has_tonights_points_before_any_earlier_ones() -> None:
-    told = book(history(40))
-    test = next(test for test in told.tests if test.of_kind("ladder"))
-    for chart in ladder_charts(test, earlier=told.earlier):
-        shown = view(chart)
-        assert not shown.left_out, "no point of tonight was thinned out"
-        assert not any("week" in row[0] or "month" in row[0] for row in shown.rows)
-
-
 def test_the_overview_offers_the_nights_that_are_there_and_speaks_of_no_other(tmp_path: Path) -> None:
     publish(history(1), tmp_path / "one")
     publish(history(24), tmp_path / "many")
-    one, many = ((tmp_path / name / "error-time.html").read_text() for name in ("one", "many"))
+    scripts = ((tmp_path / name / "tonight.js").read_text() for name in ("one", "many"))
+    one, many = (json.loads(re.fullmatch(r"const TONIGHT = (.*);\n", text)[1])["earlier"] for text in scripts)
 
-    assert "short dashes" not in one and 'id="night"' not in one
-    assert "Short dashes of the same colour are an earlier night" in many
-    assert re.findall(r'<option value="([^"]*)">', many)[:2] == ["before", "week"]
-    assert "short dashes" not in (tmp_path / "one" / "tests" / "pendulum.html").read_text()
+    assert one == []
+    assert [key for key, _ in many][:2] == ["before", "week"]
+    page = (tmp_path / "one" / "error-time.html").read_text()
+    assert 'id="earlier" hidden' in page, "shown by the script where there is a night to choose"
+    assert "short dashes" not in page.replace("Beside tonight, in short dashes of the same colour", "")

@@ -157,7 +157,9 @@ def side(told, whole, asked):
 def test_the_page_says_of_ten_thousand_pairs_what_the_judge_says():
     rng, texts = random.Random(20261122), Texts()
     asked = [question(rng, number, texts) for number in range(PAIRS)]
-    block = {"texts": list(texts.texts), "definitions": [json.loads(text) for text in texts.definitions]}
+    definitions = [json.loads(text) for text in texts.definitions]
+    fields = {"fields": list(definitions[0]), "definitions": [list(d.values()) for d in definitions]}
+    block = {"texts": list(texts.texts), **fields}
     keys = [given["key"] for given, _ in asked]
     whole = {
         "block": block,

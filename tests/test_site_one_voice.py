@@ -5,11 +5,14 @@ import random
 import re
 from html import unescape
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from click.testing import CliRunner
 
 from spook_tracker.tracker.cli.main import main
+from spook_tracker.tracker.library import record
+from spook_tracker.tracker.website.nights import book
 from spook_tracker.tracker.website.publish import publish
 from tests.synthetic_history import history
 
@@ -17,10 +20,22 @@ TODAY = 6
 
 
 @pytest.fixture(scope="module", params=["red", "green"])
-def site(tmp_path_factory, request):
-    out = tmp_path_factory.mktemp(request.param) / "public"
-    publish(history(TODAY, broken={"red": TODAY - 1, "green": 10**9}[request.param]), out)
+def nights(request):
+    return history(TODAY, broken={"red": TODAY - 1, "green": 10**9}[request.param])
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory, nights):
+    out = tmp_path_factory.mktemp("told") / "public"
+    publish(nights, out)
     return out
+
+
+@pytest.fixture(scope="module")
+def judged(nights):
+    """The record that every sentence has to be made from."""
+    told = book(nights)
+    return SimpleNamespace(tests=told.tests, documents=nights.documents.values())
 
 
 def plain(html: str) -> str:
@@ -95,6 +110,68 @@ def test_the_report_says_first_what_the_first_page_says_broke(site):
     signs = [plain(title).rsplit(" ", 1)[-1] for title in first]
     red = [sign in ("FAIL", "WATCH") for sign in signs]
     assert red == sorted(red, reverse=True)
+
+
+def signs_by_test(page: str) -> list[tuple[str, str]]:
+    """Every line of a table or a list that links to the page of a test, with each sign that stands in the line."""
+    lines = [line for line, _ in re.findall(r"(<(tr|li)\b.*?</\2>)", page, re.DOTALL)]
+    found = []
+    for line in lines:
+        tests = re.findall(r'href="(?:\.\./)?tests/([^"#]+)\.html', line)
+        found += [(test, sign) for test in tests for sign in re.findall(r'class="verdict is-(\w+)', line)]
+    return found
+
+
+def test_no_page_gives_a_test_a_worse_sign_than_its_own_page_which_has_the_judges(site, judged):
+    """Walks every page, the report among them; an entry of what is over (recovered, accepted) has a sign of its own."""
+    states = {test.name: test.state for test in judged.tests}
+    own = {path.stem: sign_of(read(path)).lower() for path in (site / "tests").glob("*.html")}
+    assert own == states
+    failed, walked = {name for name, state in states.items() if state == "fail"}, 0
+    for path in site.rglob("*.html"):
+        for test, sign in signs_by_test(read(path)):
+            walked += 1
+            assert sign != "fail" or test in failed, f"{path.name} says FAIL of {test}"
+            assert sign != "watch" or states[test] in ("fail", "watch"), f"{path.name} says WATCH of {test}"
+    assert walked > len(states)
+    shown = {test for test, sign in signs_by_test(read(site / "regressions.html")) if sign == "fail"}
+    assert shown == failed, "what fails stands among the regressions"
+
+
+def test_no_sentence_calls_all_well_where_the_judge_does_not_nor_the_other_way(site, judged):
+    whole = all(test.state == "pass" for test in judged.tests)
+    good = ("Every limit is kept", "Nothing became worse", "No open regressions")
+    bad = (
+        "is broken tonight",
+        "are broken tonight",
+        "What broke tonight",
+        "What is wrong tonight",
+        "It failed tonight",
+    )
+    states = {f"{test.name}.html": test.state for test in judged.tests}
+    for path in (*site.rglob("*.html"), site / "feed.xml", site / "badge.svg"):
+        words = plain(read(path))
+        well = whole or states.get(path.name) == "pass"
+        assert not [said for said in bad if well and said in words], path.name
+        assert not [said for said in good if not whole and said in words], path.name
+
+
+def test_feed_page_of_regressions_and_command_count_a_cause_alike(site, judged, tmp_path):
+    causes = re.findall(r'<details class="cause.*?</summary>', read(site / "regressions.html"), re.DOTALL)
+    entries = re.findall(
+        r"<title>red: \w+: (.*?) \((\d+ series of \d+ tests?)\)</title>", read(site / "feed.xml")
+    )
+    assert len(causes) == len(entries) == (0 if all(t.state == "pass" for t in judged.tests) else 1)
+    for cause, (damage, _) in zip(causes, entries, strict=True):
+        assert f": {damage} in " in plain(cause)
+    url = f"sqlite:///{tmp_path}/x.db"
+    for document in judged.documents:
+        record(document, url)
+    told = CliRunner().invoke(main, ["judge", "latest", "--db", url]).output
+    for _, series in entries:
+        assert f"  {series}; first bad commit" in told
+    fails = re.findall(r"^✗ (\w+)/.*see tests/", told, re.MULTILINE)
+    assert {test.name for test in judged.tests if test.state != "pass"} == set(fails)
 
 
 def test_what_is_told_first_tonight_is_new_for_the_judge_and_on_the_page(tmp_path: Path) -> None:

@@ -187,7 +187,7 @@ def test_the_days_under_a_trend_say_the_year_where_there_are_several_and_the_new
     def days(nights: list[RunDocument]) -> list[str]:
         told = book(DocumentHistory(nights))
         trend = next(trend for test in told.tests for trend in test.gates())
-        return [words for _, words in trend_chart(trend, told.nights, ()).x_ticks]
+        return [words for _, words in trend_chart(trend, told.nights, (), each="version").x_ticks]
 
     over_years, in_one = days(runs), days(runs[:12])
     assert over_years[-1] == "2026-06-05"

@@ -144,8 +144,15 @@ def test_the_csv_files_hold_every_digit_and_no_formula(site: Path) -> None:
     assert float(gates["beam"]["value"]) == 4.1e-16
     assert any(line["value"] == "nan" for line in lines)
     assert not [c for line in lines for c in line.values() if c.startswith(("=", "@", "+"))]
-    nights = list(csv.reader(io.StringIO((site / "data" / "friction-history.csv").read_text())))
-    assert len(nights) == 31
+    changes = list(csv.DictReader(io.StringIO((site / "data" / "friction.csv").read_text())))
+    gate = [(line["since"][:10], float(line["value"])) for line in changes if line["role"] == "gate"]
+    assert [value for _, value in gate] == [0.5 + 8e-14, 0.5003], (
+        "a line for the first night, and one for the change"
+    )
+    work = list(csv.DictReader(io.StringIO((site / "data" / "work.csv").read_text())))
+    assert all(float(line["count"]) >= 0.0 for line in work)
+    times = [csv.reader(io.StringIO(month.read_text())) for month in site.glob("data/run-times-*.csv")]
+    assert sum(len(list(month)) - 1 for month in times) == 30, "a line for each night"
 
 
 def test_the_json_files_are_strict_json(site: Path) -> None:
@@ -155,10 +162,12 @@ def test_the_json_files_are_strict_json(site: Path) -> None:
     whole = json.loads((site / "data" / "n_pendulum.json").read_text(), parse_constant=refuse)
 
     tonight = json.loads((site / "data" / "tonight.json").read_text(), parse_constant=refuse)
-    assert {"friction", "beam"} < {line["test"] for line in tonight}
-    values = [v for series in whole["series"] for v in series["values"]]
-    assert "nan" in values
-    assert len(whole["nights"]) == 30
+    at = tonight["columns"].index("test")
+    assert {"friction", "beam"} < {row[at] for row in tonight["rows"]}
+    changes = [change for series in whole["series"] for change in series["changes"]]
+    assert "nan" in [value for _, value, _ in changes]
+    assert {night for night, _, _ in changes} == set(whole["nights"])
+    assert all(whole["definitions"][series["definition"]]["metric"] for series in whole["series"])
 
 
 def test_feed_and_badge_tell_the_regressions(site: Path) -> None:
@@ -191,7 +200,8 @@ def test_plotly_accepts_every_figure(site: Path) -> None:
     texts = [page.read_text() for page in html_pages(site)]
     inside = [json.loads(data) for text in texts for data in Reader(text).data if data.strip()]
     files = [path.read_text() for path in site.glob("charts/*.js")]
-    loaded = [json.loads(re.fullmatch(r'charted\("\w+",(.*)\);\n', text)[1]) for text in files]
+    calls = [line for text in files for line in text.splitlines() if line.startswith("charted(")]
+    loaded = [json.loads(re.fullmatch(r'charted\("[\w/-]+",(.*)\);', line)[1]) for line in calls]
     drawn = [told for told in inside + loaded if "layout" in told]
     for told in drawn:
         layout = {k: v for k, v in told["layout"].items() if k not in ("shapes", "annotations")}
@@ -238,19 +248,31 @@ def test_the_bytes_do_not_depend_on_the_order_of_sets(tmp_path: Path) -> None:
     assert one == two
 
 
-def test_unchanged_pages_are_kept_and_a_new_night_changes_them(tmp_path: Path) -> None:
+def test_what_a_night_leaves_as_it_was_is_not_written_again(tmp_path: Path) -> None:
+    """The sixth night has other run times and the values of the fifth, the eighth has another value of friction."""
     out = tmp_path / "public"
     first = publish(history(5), out)
-    inode = (out / "tests" / "beam.html").stat().st_ino
     second = publish(history(5), out)
+    before = inodes(out)
     third = publish(history(6), out)
+    quiet = {name for name, inode in inodes(out).items() if before.get(name) != inode}
+    before = inodes(out)
+    publish(history(8, broken=7), out)
+    told = {name for name, inode in inodes(out).items() if before.get(name) != inode}
 
     assert first.skipped == 0
     assert (0, first.written) == (second.written, second.skipped)
-    assert third.written > 20
-    assert (out / "tests" / "beam.html").stat().st_ino != inode
+    assert third.written == len(quiet - {".tracker-site.json"}) <= 45
+    assert not {name for name in quiet if name.startswith("tests/") or name[5:-4] in SEVEN}
+    assert {"index.html", "tonight.js", "charts/nights.js", "data/tonight.csv", "data/nights.csv"} < quiet
+    assert {"tests/friction.html", "data/friction.csv"} < told
+    assert not {"tests/beam.html", "data/beam.csv"} & told
     assert (out / "tests" / "beam.html").stat().st_nlink == 1
     assert [path.name for path in tmp_path.iterdir()] == ["public"]
+
+
+def inodes(site: Path) -> dict[str, int]:
+    return {str(p.relative_to(site)): p.stat().st_ino for p in site.rglob("*") if p.is_file()}
 
 
 def test_a_strange_folder_is_not_touched(tmp_path: Path) -> None:

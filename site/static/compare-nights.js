@@ -7,11 +7,18 @@ const nightBlocks = new Map();
 // Called by each file of compare/.
 function comparedNights(name, block) { nightBlocks.set(name, block); }
 
+// The fields of all definitions stand once; those of one are put together when it is first asked for.
+function definitionAt(block, place) {
+  const told = block.definitions[place];
+  if (Array.isArray(told)) { block.definitions[place] = Object.fromEntries(block.fields.map((name, i) => [name, told[i]])); }
+  return block.definitions[place];
+}
+
 function decodedRow(block, row) {
   const number = (value) => (typeof value === "string" ? { nan: NaN, inf: Infinity, "-inf": -Infinity }[value] : value);
   const [definition, value, outcome = 0, flags = 0, hash = 0, failure = 0, usual = 0, suspected = 0, blame = 0] = row;
   return {
-    definition: block.definitions[definition], value: number(value), outcome: NIGHT_OUTCOMES[outcome], passed: (flags & 1) === 1, held: (flags & 2) === 2,
+    definition: definitionAt(block, definition), value: number(value), outcome: NIGHT_OUTCOMES[outcome], passed: (flags & 1) === 1, held: (flags & 2) === 2,
     hash: block.texts[hash], failure: block.texts[failure], usual: usual ? usual.map(number) : null, suspected: suspected === 1, blame: block.texts[blame],
   };
 }

@@ -82,7 +82,8 @@
       counts: Object.fromEntries(Object.entries(counts).sort(([a], [b]) => (a < b ? -1 : 1))),
       notes: ["Values, judged in this page by the command's rules. tracker compare judges the run times of whole ladders and the stability maps, too."],
       changes: shown.map((c) => {
-        const [title, series, page] = newest.series[c.key] || [c.definition.test, c.key, "index.html"];
+        const [title, page, named] = newest.series[c.definition.test] || [c.definition.test, "index.html", {}];
+        const series = named[c.key] || c.key;
         const { unit } = c.definition;
         return [c.word, c.red ? c.stands : "", page, title, series, words(c.before, unit), words(c.after, unit), c.name || c.word.replace(/_/g, " "), c.sentence, c.blame || c.accepted];
       }),

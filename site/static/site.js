@@ -40,6 +40,96 @@ const chartData = new Map();  // by key, as the files of charts/ hand them over
 // Called by each file of charts/.
 function charted(key, data) { chartData.set(key, data); }
 
+const parts = new Map();  // by test, what its page says of tonight's run times
+function told(test, text) { parts.set(test, text); }
+
+let nights = [];  // day and commit of each
+function nightsAre(all) {
+  let day = "";
+  nights = all.map(([own, commit]) => { day = own || day; return { day, commit }; });
+}
+
+// A chart over nights has what changed; what stands still is drawn on to tonight here.
+function untilTonight(data) {
+  const [first, end] = data.over, last = end === null ? nights.length - 1 : end;
+  const named = (at) => (nights[at] ? `${nights[at].day}, ${nights[at].commit}` : "");
+  const traces = data.data.map((trace) => {
+    const style = trace.meta.style, made = { ...trace };
+    if (style === "limit" || style === "reference") { return { ...made, x: [first, last] }; }
+    if (trace === data.data[0] && end === null && trace.x.length && trace.x.at(-1) < last) {
+      made.x = [...trace.x, last];
+      made.y = [...trace.y, trace.y.at(-1)];
+      if (trace.hovertext) { made.hovertext = [...trace.hovertext, trace.hovertext.at(-1).replace(/^[^\n]*/, named(last))]; }
+    }
+    if (!made.hovertext) {
+      made.hovertext = made.x.map((at, i) => `${named(at)}\n${made.y[i] === null ? "no value" : Number(made.y[i].toPrecision(5))}`);
+      made.hoverinfo = "text";
+    }
+    return made;
+  });
+  const count = Math.min(4, last - first + 1);
+  const ticks = [...new Set([...Array(count).keys()].map((i) => Math.round(first + (i * (last - first)) / Math.max(1, count - 1))))];
+  const days = ticks.map((at) => (nights[at] || { day: "" }).day), years = new Set(days.map((day) => day.slice(0, 4)));
+  const words = new Set(days).size < days.length ? ticks.map((at) => nights[at].commit) : days.map((day) => (years.size < 2 ? day.slice(5) : day));
+  const pad = 0.03 * (last - first) || 0.5;
+  const xaxis = { ...data.layout.xaxis, type: "linear", range: [first - pad, last + pad], tickvals: ticks, ticktext: words, tickangle: 0 };
+  return { data: traces, layout: { ...data.layout, xaxis } };
+}
+
+// The numbers of a chart as a table, made when a reader opens it.
+const TABLE_ROWS = 60;
+function tableOf(box, data) {
+  const details = document.createElement("details"), summary = document.createElement("summary");
+  summary.textContent = "Data table";
+  details.append(summary);
+  details.addEventListener("toggle", () => {
+    if (details.open && details.children.length < 2) { details.append(tableWith(box, data)); scrollers(); }
+  });
+  return details;
+}
+
+function tableWith(box, data) {
+  const { columns, rows } = data.data[0]?.type === "heatmap" ? cellsOf(data) : pointsOf(data);
+  const every = Math.ceil(rows.length / TABLE_ROWS) || 1;
+  const around = document.createElement("div"), table = document.createElement("table"), caption = table.createCaption();
+  const title = box.querySelector("h3").textContent;
+  around.className = "scroll";
+  around.setAttribute("role", "region");
+  around.setAttribute("aria-label", `Data: ${title} against ${columns[1]}`);
+  caption.textContent = title + (every > 1 ? `; every ${every}th point, all of them in the data files` : "");
+  const line = (part, cells, tag) => {
+    const row = part.insertRow();
+    for (const cell of cells) {
+      const made = document.createElement(tag);
+      made.className = "num";
+      if (tag === "th") { made.scope = "col"; }
+      made.textContent = cell;
+      row.append(made);
+    }
+  };
+  line(table.createTHead(), columns, "th");
+  const body = table.createTBody();
+  rows.filter((_, i) => i % every === 0).forEach((cells) => line(body, cells, "td"));
+  around.append(table);
+  return around;
+}
+
+function plainText(text) { return new DOMParser().parseFromString(String(text).replaceAll("<br>", " "), "text/html").body.textContent; }
+
+function pointsOf(data) {
+  const { xaxis, yaxis } = data.layout, number = (v) => (v === null ? "no value" : String(Number(v.toPrecision(6))));
+  const shown = data.data.filter((trace) => trace.meta.style !== "limit" && (!trace.meta.night || trace.meta.night === earlierNight()));
+  const name = (at) => (data.over ? nights[at]?.day || at : plainText(xaxis.ticktext?.[xaxis.tickvals.indexOf(at)] ?? number(at)));
+  const rows = shown.flatMap((trace) => trace.x.map((at, i) => [plainText(trace.name), name(at), number(trace.y[i])]));
+  return { columns: ["line", plainText(xaxis.title?.text || "x"), plainText(yaxis.title?.text || "value")], rows };
+}
+
+function cellsOf(data) {
+  const { xaxis, yaxis } = data.layout, cells = data.data[0];
+  const said = (text) => { const lines = text.split("\n"); return [lines[0], lines[1], lines[2]].map((one) => plainText(one).replace(/^.*: /, "")); };
+  return { columns: [xaxis.title.text, yaxis.title.text, "outcome"].map(plainText), rows: cells.text.flat().map(said) };
+}
+
 const CONFIG = {
   responsive: true, displaylogo: false, showSendToCloud: false, plotlyServerURL: "", displayModeBar: "hover",
   modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"], scrollZoom: false,
@@ -48,13 +138,14 @@ const CELLS = ["#0072b2", "#56b4e9", "#e69f00", "#d55e00", "#5b2333", "#8a939c"]
 
 // The earlier night that stands in short dashes beside tonight: the reader's choice, or the first that is offered.
 function earlierNight() {
-  const choice = document.getElementById("night"), offered = choice ? [...choice.options].map((o) => o.value) : ["before"];
+  const offered = [...TONIGHT.earlier.map(([key]) => key), "none"];
   return offered.includes(state.get("night")) ? state.get("night") : offered[0];
 }
 
 function dressTrace(trace) {
   const meta = trace.meta || {};
-  const dressed = { ...trace };
+  const dressed = { ...trace }, lines = (texts) => (Array.isArray(texts) ? texts.map(lines) : texts.replaceAll("\n", "<br>"));
+  for (const name of ["text", "hovertext"]) { if (trace[name]) { dressed[name] = lines(trace[name]); } }
   if (meta.role === "cells") {
     const last = CELLS.length - 1;
     dressed.colorscale = CELLS.flatMap((c, i) => [[i / CELLS.length, c], [(i + 1) / CELLS.length, c]]);
@@ -120,7 +211,7 @@ function rangesOf(name) {
 
 function drawChart(box) {
   const plot = box.querySelector(".plot");
-  const data = chartData.get(box.dataset.key);
+  const given = chartData.get(box.dataset.key), data = given.over ? untilTonight(given) : given;
   const layout = dressLayout(data.layout);
   const zoom = rangesOf(box.id);
   if (zoom) {
@@ -129,6 +220,7 @@ function drawChart(box) {
     freeTicks(layout);
   }
   plot.hidden = false;
+  if (!box.classList.contains("drawn")) { box.append(tableOf(box, { ...data, over: given.over })); }
   box.classList.add("drawn");
   Plotly.react(plot, data.data.map(dressTrace), layout, CONFIG).then(() => { box.dataset.drawn = ""; });
   if (!plot.dataset.live) {
@@ -145,11 +237,14 @@ function drawChart(box) {
 }
 
 function charts() {
-  const boxes = document.querySelectorAll("figure.chart");
+  const boxes = document.querySelectorAll("figure.chart[data-file]");
   if (!boxes.length || typeof Plotly === "undefined") { return; }
   const seen = new Set();
   const show = async (box) => {
-    try { await script(box.dataset.file); } catch { return; }  // its still picture stays
+    try {
+      await script(box.dataset.file);
+      if (chartData.get(box.dataset.key).over) { await script(box.dataset.file.replace(/[^/]*$/, "nights.js")); }
+    } catch { return missing(box); }
     seen.add(box);
     drawChart(box);
   };
@@ -163,15 +258,38 @@ function charts() {
   addEventListener("hashchange", () => seen.forEach(drawChart));
   const tools = document.getElementById("earlier"), choice = document.getElementById("night");
   if (tools) {
+    for (const [key, words] of [...TONIGHT.earlier, ["none", "none"]]) { choice.append(new Option(words, key)); }
     const restore = () => { choice.value = earlierNight(); };
     choice.addEventListener("change", () => {
       state.set("night", choice.selectedIndex ? choice.value : "");
       seen.forEach(drawChart);
     });
     addEventListener("hashchange", restore);
-    tools.hidden = false;
+    tools.hidden = !TONIGHT.earlier.length;
     restore();
   }
+}
+
+function missing(box) {
+  const note = document.createElement("p");
+  note.className = "chart-note";
+  note.textContent = "The file of this chart could not be loaded; reload the page.";
+  box.append(note);
+}
+
+// What is another every night stands in scripts, so that a page stands still as long as its values do.
+async function tonight() {
+  const measured = document.getElementById("measured"), times = document.getElementById("run-times");
+  if (measured) {
+    measured.textContent = TONIGHT.measured;
+    measured.hidden = false;
+  }
+  if (!times) { return; }
+  try { await script(times.dataset.file); } catch { return; }
+  const text = parts.get(times.dataset.test);  // made by the templates, as the page itself
+  if (text) { times.innerHTML = text; }
+  folds(times);
+  scrollers();
 }
 
 // --- tables ---
@@ -323,6 +441,7 @@ function scrollers() {
 }
 
 charts();
+tonight();
 scrollers();
 addEventListener("resize", scrollers);
 addEventListener("load", scrollers);

@@ -1,32 +1,74 @@
-"""The data of every chart in a file of its own, loaded when the chart is seen."""
+"""The data of every chart in a file, loaded when the chart is seen."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Any
+import json
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 
 from spook_tracker.tracker.website.diagrams import View
 from spook_tracker.tracker.website.folder import digest
-from spook_tracker.tracker.website.templates import embedded
+
+NIGHTLY = 16  # files of run times, which are others every night
 
 
-def chart_files(context: dict[str, Any]) -> dict[str, bytes]:
-    """Address and content of a script for each chart of a page; the charts are told where theirs is.
+def nightly_file(test: str) -> str:
+    """Address of the script with all that a test's page says of run times; few files, for every night writes all."""
+    return f"charts/tonight-{zlib.crc32(test.encode('utf-8', 'replace')) % NIGHTLY}.js"
 
-    The address comes from the content: what a browser has kept is never an old one, equal charts share a file,
-    and no name from outside becomes the name of a file. A script, because a page opened from a file may not fetch.
+
+@dataclass
+class ChartFiles:
+    """The scripts with the data of charts, as pages ask for them.
+
+    What stands still is addressed by its content: what a browser has kept is never an old one, equal charts share
+    a file, and no name from outside becomes the name of a file. Run times stand together in files that every night
+    writes again. Scripts, because a page opened from a file may not fetch.
     """
-    files = {}
-    for view in _views(list(context.values())):
-        data = embedded(view.figure)
-        view.key = digest(data.encode("utf-8", "replace"))
-        files[view.file] = f'charted("{view.key}",{data});\n'.encode("utf-8", "replace")
-    return files
+
+    nightly: dict[str, set[str]] = field(default_factory=dict)  # address to what it calls
+
+    def add(self, context: Mapping[str, object]) -> dict[str, bytes]:
+        """Address and content of the script of each chart of a page; the charts are told where theirs is."""
+        files = {}
+        for view in _views(list(context.values())):
+            data = _json(view.figure)
+            view.figure = {}  # a page is made from where its numbers are, not from the numbers
+            if view.nightly:
+                view.key = f"{view.nightly}/{view.name.removeprefix(view.nightly + '-')}"
+                view.file = nightly_file(view.nightly)
+                self._hand_over(view.file, f"charted({_json(view.key)},{data});\n")
+                continue
+            view.key = digest(data.encode("utf-8", "replace"))
+            view.file = f"charts/{view.key}.js"
+            files[view.file] = f'charted("{view.key}",{data});\n'.encode("utf-8", "replace")
+        return files
+
+    def add_part(self, test: str, text: str) -> None:
+        """What the page of a test says of run times in words."""
+        self._hand_over(nightly_file(test), f"told({_json(test)},{_json(text)});\n")
+
+    def _hand_over(self, address: str, call: str) -> None:
+        self.nightly.setdefault(address, set()).add(call)
+
+    def nightly_files(self) -> dict[str, bytes]:
+        """Address and content of the scripts of run times."""
+        return {
+            address: "".join(sorted(calls)).encode("utf-8", "replace")
+            for address, calls in sorted(self.nightly.items())
+        }
 
 
-def _views(things: list[Any] | tuple[Any, ...]) -> Iterator[View]:
+def _views(things: Iterable[object]) -> Iterator[View]:
     for thing in things:
         if isinstance(thing, View):
             yield thing
         elif isinstance(thing, list | tuple):
             yield from _views(thing)
+
+
+def _json(value: object) -> str:
+    """Nothing in it ends a script of its own file, but for two line ends that older browsers know."""
+    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    return text.replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")

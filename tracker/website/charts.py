@@ -60,6 +60,9 @@ class Chart:
     direct: bool = False  # horizontal lines carry their names, so no legend is needed
     reach: float = 1.0  # of a polar chart drawn flat: how far its axes go from the centre
     rings: tuple[float, ...] = ()  # of a polar chart drawn flat: radii of its grid
+    over: tuple[float, float | None] | None = (
+        None  # x is nights: the first, and the last; None: it goes on tonight
+    )
 
     def ends(self) -> tuple[tuple[float, float], tuple[float, float]]:
         """Ends of both axes that show every line and band, in decades where logarithmic."""

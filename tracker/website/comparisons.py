@@ -167,7 +167,7 @@ def page_files(told: Comparisons, book: Book, accepted: Sequence[Accepted]) -> b
             "frontiers": [[place(text) for text in line] for line in pair["frontiers"]],
         }
     series = described(book)
-    levels = accepted_fields(accepted, list(series))
+    levels = accepted_fields(accepted, [key for _, _, words in series.values() for key in words])
     gates = gates_of_engines(book)
     whole = {"pairs": pairs, "texts": list(texts), "series": series, "accepted": levels, "gates": gates}
     return f"comparedNewest({json.dumps(whole, separators=(',', ':'), allow_nan=False)});\n".encode()

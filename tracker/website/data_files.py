@@ -9,11 +9,12 @@ from __future__ import annotations
 import csv
 import io
 import json
-import math
-from array import array
-from collections.abc import Iterable, Sequence
-from itertools import repeat
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from functools import partial
+from itertools import groupby
 from typing import Any
+
+from msgspec import structs
 
 from spook_tracker.tracker.document.json_form import boxed, encode
 from spook_tracker.tracker.document.outside import escaped
@@ -24,7 +25,7 @@ FORMULA = ("=", "+", "-", "@", "\t", "\r")
 COLUMNS = (
     "test", "configuration", "metric", "time_step_s", "parameters", "role", "kind", "value", "unit", "outcome",
     "limit_low", "limit_high", "set_point_low", "set_point_high", "set_point_held", "seconds", "spread",
-    "instructions", "operations", "state_hash", "started", "engine", "version", "git_hash", "failure",
+    "instructions", "operations", "state_hash", "started", "failure",
 )  # fmt: skip
 
 
@@ -71,17 +72,44 @@ def records(columns: Sequence[str], lines: Iterable[Sequence[Any]]) -> bytes:
     return json.dumps(found, ensure_ascii=True, allow_nan=False, separators=(",", ":")).encode()
 
 
+def columnar(columns: Sequence[str], lines: Iterable[Sequence[object]]) -> bytes:
+    """The same table as JSON: names once, then a list for each line; non-finite numbers as strings."""
+    rows = [[boxed(cell) if isinstance(cell, float) else cell for cell in line] for line in lines]
+    whole = {"columns": list(columns), "rows": rows}
+    return json.dumps(whole, ensure_ascii=True, allow_nan=False, separators=(",", ":")).encode()
+
+
 Table = tuple[Sequence[str], list[list[Any]]]  # names of the columns, lines
 
 
 def newest(book: Book, tests: Sequence[TestHistory]) -> Table:
-    """Every series of some tests at its newest night, a line each."""
-    return COLUMNS, [_line(trend, book.nights) for test in tests for trend in test.trends]
+    """Every series of some tests at its newest night, a line each; work stands in a file of its own."""
+    return COLUMNS, [
+        _line(trend, book.nights)
+        for test in tests
+        for trend in test.trends
+        if trend.definition.kind != "work"
+    ]
 
 
-def newest_csv(book: Book, tests: Sequence[TestHistory]) -> bytes:
-    """`newest` as CSV."""
-    return table(*newest(book, tests))
+def work(book: Book) -> Table:
+    """Operations and iterations counted, of every configuration of every test: a line for the first night, and one
+    for each that changed it."""
+    columns = ("test", "configuration", "work", "count", "since")
+    return columns, [
+        [
+            t.definition.test, t.definition.configuration, t.definition.metric.removeprefix("work:"), _whole(t.values[i]),
+            book.nights[t.nights[i]].started,
+        ]
+        for test in book.tests
+        for t in test.trends
+        if t.definition.kind == "work"
+        for i in changed(t)
+    ]  # fmt: skip
+
+
+def _whole(value: float) -> float | int:
+    return int(value) if value.is_integer() else value
 
 
 def _line(trend: Trend, nights: Sequence[Night]) -> list[Any]:
@@ -95,8 +123,7 @@ def _line(trend: Trend, nights: Sequence[Night]) -> list[Any]:
         trend.value, d.unit, trend.outcomes[-1], low, high, *(d.set_point or (None, None)),
         trend.held[-1], quickest, max(timing.seconds) if timing and timing.seconds else None,
         timing.instructions if timing else None, sum(sample.counters.values()) if sample else None,
-        sample.state_hash if sample else "", night.started, night.engine.name, night.engine.version,
-        night.engine.git_hash, sample.failure if sample else "",
+        sample.state_hash if sample else "", night.started, sample.failure if sample else "",
     ]  # fmt: skip
 
 
@@ -111,33 +138,67 @@ def ends(limit: float | tuple[float, float] | None, better: str) -> tuple[float 
     return (None, limit) if better == "smaller" else (-limit, limit)
 
 
-def history_csv(book: Book, test: TestHistory) -> bytes:
-    """Scalars of one test over all nights: a line for each night, a column for each series."""
-    shown = [t for t in test.trends if t.definition.kind != "ladder"]
-    columns = ("started", "version", "git_hash", *(t.definition.key for t in shown))
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\r\n")
-    writer.writerow(map(inert, columns))
-    writer.writerows(_by_night(book.nights, shown))
-    return out.getvalue().encode("utf-8", "replace")
+CHANGES = (
+    "test", "configuration", "metric", "time_step_s", "parameters", "role", "kind", "unit",
+    "limit_low", "limit_high", "set_point_low", "set_point_high", "value", "outcome", "set_point_held",
+    "since", "version", "git_hash",
+)  # fmt: skip
 
 
-def _by_night(nights: Sequence[Night], trends: Sequence[Trend]) -> Iterable[list[str]]:
-    """The cells of each night in which any of these has a value; column by column, for there are many."""
-    facts = {n.index: [inert(n.started), inert(n.engine.version), inert(n.engine.git_hash)] for n in nights}
-    every = list(facts)
-    columns: list[Iterable[str]] = []
-    for trend in trends:
-        column = map(repr, trend.values)
-        if trend.nights != every:  # nights were left out
-            column = map(dict(zip(trend.nights, column, strict=True)).get, every, repeat(""))
-        columns.append(column)
-    lines = map(list, zip(*zip(*facts.values(), strict=True), *columns, strict=True))
-    if any(trend.nights == every for trend in trends):
-        yield from lines
-        return
-    shown = set().union(*(trend.nights for trend in trends))
-    yield from (line for place, line in zip(every, lines, strict=True) if place in shown)
+def changes_csv(book: Book, test: TestHistory) -> bytes:
+    """Every series of a test but run times: a line for its first night, and one for each that changed it.
+
+    A night without a change leaves the file as it is.
+    """
+    return table(CHANGES, (line for trend in steady(test) for line in _changes(trend, book.nights)))
+
+
+def steady(test: TestHistory) -> list[Trend]:
+    """The values of a test that the same engine answers alike every night: no run times; work has its own file."""
+    return [trend for trend in test.trends if trend.definition.kind not in ("time", "work")]
+
+
+def changed(trend: Trend) -> list[int]:
+    """The places at which a series begins, reads otherwise than before, or comes back after nights without it."""
+    told = list(zip(map(repr, trend.values), trend.outcomes, trend.held, strict=True))
+    return [
+        i
+        for i, now in enumerate(told)
+        if not i or now != told[i - 1] or trend.nights[i] != trend.nights[i - 1] + 1
+    ]
+
+
+def _changes(trend: Trend, nights: Sequence[Night]) -> Iterable[list[object]]:
+    d = trend.definition
+    low, high = ends(d.limit, d.better)
+    for i in changed(trend):
+        night = nights[trend.nights[i]]
+        yield [
+            d.test, d.configuration, d.metric, d.time_step,
+            " ".join(f"{key}={value:g}" for key, value in sorted(d.parameters.items())), d.role, d.kind, d.unit,
+            low, high, *(d.set_point or (None, None)), trend.values[i], trend.outcomes[i], trend.held[i],
+            night.started, night.engine.version, night.engine.git_hash,
+        ]  # fmt: skip
+
+
+def run_times(book: Book) -> Iterator[tuple[str, bytes, Callable[[], bytes]]]:
+    """A table for each month of nights: a line for each night, a column for each run time of every test. Month,
+    what the table is made from, and how: a month that is over is not made again."""
+    trends = [t for test in book.tests for t in test.trends if t.definition.kind == "time"]
+    keys = [t.definition.key for t in trends]
+    values: list[dict[int, float]] = [dict(zip(t.nights, t.values, strict=True)) for t in trends]
+    for month, group in groupby(book.nights if trends else (), key=lambda night: night.started[:7]):
+        lines = [
+            [
+                night.started,
+                night.engine.version,
+                night.engine.git_hash,
+                *(of.get(night.index) for of in values),
+            ]
+            for night in group
+        ]
+        columns = ("started", "version", "git_hash", *keys)
+        yield month, repr((columns, lines)).encode("utf-8", "replace"), partial(table, columns, lines)
 
 
 def regressions(events: Sequence[Event]) -> Table:
@@ -180,31 +241,49 @@ def _night_line(night: Night) -> list[Any]:
 
 
 def test_json(book: Book, test: TestHistory) -> bytes:
-    """Everything about one test: its card, and each series with its definition and all values."""
+    """Everything about one test but run times and work: its card, definitions, and each series with the place of its
+    definition, what it says beside, and what it was on the nights that changed it."""
+    definitions: dict[str, int] = {}
+    nights: dict[str, dict[str, str]] = {}
+    series = [_series(t, definitions, nights, book.nights) for t in steady(test)]
     whole = {
-        "test": test.card,
-        "nights": [
-            {"run": n.id, "started": n.started, "version": n.engine.version, "git_hash": n.engine.git_hash}
-            for n in book.nights
-        ],
-        "series": [
-            {
-                "definition": t.definition,
-                "nights": t.nights,
-                "values": _as_json(t.values),
-                "outcomes": t.outcomes,
-                "newest": t.latest,
-            }
-            for t in test.trends
-        ],
+        "test": structs.replace(
+            test.card, stages=tuple(structs.replace(s, saved_seconds_per_step=None) for s in test.card.stages)
+        ),
+        "nights": nights,
+        "definitions": [json.loads(text) for text in definitions],
+        "series": series,
         "figures": test.figures,
         "maps": test.maps,
     }
     return escaped(encode(whole).decode()).encode()
 
 
-def _as_json(values: Sequence[float]) -> Sequence[float | str]:
-    """Many values as JSON carries them; nearly always all are finite, which one sum tells."""
-    if math.isfinite(sum(values)):
-        return array("d", values).tolist()
-    return [boxed(value) for value in values]
+OWN = ("key", "time_step", "parameters")  # of a series: all else of its definition others share
+WHOLE = ("test", "title")  # what the card says
+
+
+def _series(
+    trend: Trend, definitions: dict[str, int], used: dict[str, dict[str, str]], nights: Sequence[Night]
+) -> dict[str, object]:
+    said = {
+        field.name: value
+        for field in structs.fields(trend.definition)
+        if (value := getattr(trend.definition, field.name)) != field.default and value not in ({}, (), "")
+    }
+    own = {name: said.pop(name) for name in OWN if name in said}
+    shared = encode({name: value for name, value in said.items() if name not in WHOLE}).decode()
+    changes = []
+    for i in changed(trend):
+        night = nights[trend.nights[i]]
+        used[night.id] = {
+            "started": night.started, "version": night.engine.version, "git_hash": night.engine.git_hash,
+        }  # fmt: skip
+        changes.append([night.id, boxed(trend.values[i]), trend.outcomes[i]])
+    newest = {"state_hash": trend.latest.state_hash, "failure": trend.latest.failure} if trend.latest else {}
+    return {
+        **own,
+        "definition": definitions.setdefault(shared, len(definitions)),
+        "changes": changes,
+        **{name: value for name, value in newest.items() if value},
+    }

@@ -9,7 +9,6 @@ from typing import Any, Literal
 
 from spook_tracker.tracker.document.run_document import FigureData, MapData, Sample
 from spook_tracker.tracker.document.wording import (
-    clean,
     conditions,
     day,
     named,
@@ -26,10 +25,11 @@ from spook_tracker.tracker.website.earlier_nights import Earlier
 from spook_tracker.tracker.website.events import Event
 from spook_tracker.tracker.website.figures import figure, grid_figure
 from spook_tracker.tracker.website.nights import Night, TestHistory, Trend
-from spook_tracker.tracker.website.svg import Picture, grid_picture, picture
+from spook_tracker.tracker.website.svg import describe
 
 MOST_NIGHTS = 1500  # points of one trend; a value that stands still costs two, so this is many years
-TABLE_ROWS = 60
+MOST_TIMES = 400  # of a run time, which never stands still
+FEWEST_NIGHTS = 3  # of a chart over nights
 WORDS = {
     "value": "inside",
     "out_of_limit": "out of limit",
@@ -44,57 +44,43 @@ BROKEN = {  # values that do not pass, and what their points are called
 
 @dataclass
 class View:
-    """A chart as the template wants it: static picture, data for the script, data table."""
+    """A chart as the template wants it: words for the page, data for the script, which makes the table, too."""
 
     name: str
     title: str
     thesis: str
     note: str
-    picture: Picture
+    description: str
     figure: dict[str, Any]
-    columns: tuple[str, ...]
-    rows: list[tuple[str, ...]]
-    left_out: int = 0
     tall: bool = False  # many names in the legend
-    key: str = ""  # of its file, once that is known
-
-    @property
-    def file(self) -> str:
-        """Address of the script with its data, below the root."""
-        return f"charts/{self.key}.js"
+    nightly: str = ""  # slug of the test whose run times it shows: every night has others
+    key: str = ""  # of its data, once that is known
+    file: str = ""  # address of the script with its data, below the root
 
 
-def view(chart: Chart, *, table: bool = True) -> View:
-    """The chart with everything drawn from it."""
+def view(chart: Chart, nightly: str = "") -> View:
+    """The chart with everything drawn from it; `nightly` names the test whose run times it shows."""
     shown = drawable(chart)
-    columns: tuple[str, ...] = ()
-    rows: list[tuple[str, ...]] = []
-    every = 0
-    lines = [line for line in chart.lines if line.style != "limit" and not line.waits] if table else []
-    if lines:
-        columns = ("line", chart.x_label, chart.y_label or "value")
-        points = [(line, i) for line in lines for i in range(len(line.x))]
-        every = math.ceil(len(points) / TABLE_ROWS) if len(points) > TABLE_ROWS else 0
-        labels = dict(chart.x_ticks)
-        for line, i in points[:: every or 1]:
-            at = labels.get(line.x[i]) or number(line.x[i], 6)
-            rows.append((clean(line.name), at, number(line.y[i], 6)))
     data = figure(chart, shown)
     return View(
-        chart.name, chart.title, chart.thesis, shown.note, picture(chart, shown), data, columns, rows, every,
-        data["layout"]["showlegend"] and sum(not line.quiet for line in chart.lines) > 5,
+        chart.name, chart.title, chart.thesis, shown.note, describe(chart), data,
+        data["layout"]["showlegend"] and sum(not line.quiet for line in chart.lines) > 5, nightly,
     )  # fmt: skip
 
 
 def grid_view(grid: Grid) -> View:
     """A map with everything drawn from it."""
-    columns = (f"{grid.y_label} \\ {grid.x_label}", *(number(x, 3) for x in grid.x))
-    rows = [
-        (number(grid.y[j], 3), *(word.replace("_", " ") for word in row)) for j, row in enumerate(grid.cells)
+    said = f"{grid.y_label} against {grid.x_label}, a cell each."
+    return View(grid.name, grid.title, grid.thesis, grid.note, said, grid_figure(grid))
+
+
+def moving(trends: Iterable[Trend]) -> list[Trend]:
+    """Those a chart over nights says something of: at least three nights, and not the same in all of them."""
+    return [
+        t
+        for t in trends
+        if len(t.nights) >= FEWEST_NIGHTS and (len(set(map(repr, t.values))) > 1 or len(set(t.outcomes)) > 1)
     ]
-    return View(
-        grid.name, grid.title, grid.thesis, grid.note, grid_picture(grid), grid_figure(grid), columns, rows
-    )
 
 
 def trend_chart(
@@ -104,16 +90,27 @@ def trend_chart(
     title: str = "",
     each: Literal["night", "version"] = "night",
 ) -> Chart:
-    """A series over versions, with its limit, set point, reference, and where it became worse."""
+    """A series over versions, with its limit, set point, reference, and where it became worse.
+
+    Over nights nothing in it names tonight unless the value changed tonight: site.js draws on to tonight what stands
+    still, so that the file of a series stays as it is for as long as the series does.
+    """
     definition = trend.definition
     values = trend.values[-MOST_NIGHTS * 4 :]
     at = trend.nights[-MOST_NIGHTS * 4 :]
     outcomes = trend.outcomes[-MOST_NIGHTS * 4 :]
     turned = {i for i, now in enumerate(outcomes) if i and now != outcomes[i - 1]}
     places = sorted({*turning(values), *turned})  # a class may change where the value stands still
-    places = [places[i] for i in thinned(len(places), MOST_NIGHTS)]
+    goes_on = each == "night" and at[-1] == nights[-1].index
+    if goes_on and len(places) > 1 and len(values) - 1 not in turned and repr(values[-1]) == repr(values[-2]):
+        places.pop()
+    places = [
+        places[i] for i in thinned(len(places), MOST_TIMES if definition.kind == "time" else MOST_NIGHTS)
+    ]
     told = {pair: _told(*pair, definition.unit) for pair in {(values[i], outcomes[i]) for i in places}}
-    notes = tuple(f"{nights[at[i]].label}\n{told[values[i], outcomes[i]]}" for i in places)
+    notes: tuple[str, ...] = ()
+    if definition.kind != "time":  # a run time is another every night: the script says day and value
+        notes = tuple(f"{nights[at[i]].label}\n{told[values[i], outcomes[i]]}" for i in places)
     x = tuple(float(at[i]) for i in places)
     y = tuple(values[i] for i in places)
     lines = [Line(name="measured", x=x, y=y, style="both", notes=notes)]
@@ -132,6 +129,8 @@ def trend_chart(
         lines.append(_beginnings(began, trend))
     scale, bounds, note = _axis_of(trend)
     ends = (float(at[0]), float(at[-1])) if len(at) > 1 else (at[0] - 0.5, at[0] + 0.5)
+    if goes_on:
+        ends = (float(at[0]), float(at[0]))  # to tonight, as the script knows
     for bound in bounds:
         lines.append(
             Line(
@@ -162,7 +161,8 @@ def trend_chart(
         y_scale=scale,
         bands=bands,
         direct=True,
-        x_ticks=_night_ticks(nights, list(dict.fromkeys(kept))),
+        x_ticks=() if each == "night" else _night_ticks(nights, list(dict.fromkeys(kept))),
+        over=(float(at[0]), None if goes_on else float(at[-1])) if each == "night" else None,
         note=note,
     )
 
@@ -446,9 +446,11 @@ def _ladder_line(
     for r in shown:
         spread = f" (slowest repeat {100 * (r.spread - 1):.0f} % more)" if math.isfinite(r.spread) else ""
         counted = f"{r.work:.0f} operations" + (f", {r.instructions} instructions" if r.instructions else "")
+        timed = of(r) == r.seconds
         error = r.failure if r.failure else f"error {quantity(r.error, unit, 5)}"
         took = f"{seconds(r.seconds)}{spread}" if math.isfinite(r.seconds) else "not timed"
-        notes.append(f"{name}\nh = {number(r.time_step, 6)} s\n{error}\n{took}\n{counted}")
+        cost = f"{took}\n{counted}" if timed else f"{r.work:.0f} operations"
+        notes.append(f"{name}\nh = {number(r.time_step, 6)} s\n{error}\n{cost}")
     return Line(
         name=name, x=tuple(of(r) for r in shown), y=tuple(abs(r.error) for r in shown), colour=colour,
         notes=tuple(notes), style="both",

@@ -8,7 +8,8 @@ sheet, so that a chart follows light and dark.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import chain
 from typing import Any
 
@@ -24,8 +25,9 @@ from spook_tracker.tracker.website.charts import (
     thinned,
     ticks,
 )
-from spook_tracker.tracker.website.svg import CELL_WORDS, describe
+from spook_tracker.tracker.website.svg import CELL_WORDS
 
+Cut = Callable[[float], float | None]
 DASHES = {"reference": "dash", "limit": "dot", "front": "longdash"}
 SYMBOLS = (
     "circle",
@@ -47,8 +49,8 @@ def plain(text: str) -> str:
 def _all_plain(texts: Sequence[str]) -> list[str]:
     """Many texts as Plotly shows them, ends of lines kept: in one go, where nothing in them is the mark between."""
     between = "⁂|"
-    found = plain(between.join(texts)).replace("\n", "<br>").split(between)
-    return found if len(found) == len(texts) else [plain(text).replace("\n", "<br>") for text in texts]
+    found = plain(between.join(texts)).split(between)
+    return found if len(found) == len(texts) else list(map(plain, texts))
 
 
 def figure(chart: Chart, shown: Chart | None = None) -> dict[str, Any]:
@@ -56,7 +58,9 @@ def figure(chart: Chart, shown: Chart | None = None) -> dict[str, Any]:
     chart = flattened(shown or drawable(chart))
     x_ends, y_ends = chart.ends()
     layout: dict[str, Any] = {
-        "xaxis": _axis(chart.x_label, chart.x_scale, x_ends),
+        "xaxis": {"title": {"text": plain(chart.x_label)}}
+        if chart.over
+        else _axis(chart.x_label, chart.x_scale, x_ends),
         "yaxis": _axis(chart.y_label, chart.y_scale, y_ends),
         "showlegend": not chart.direct and sum(not line.quiet for line in chart.lines) > 1,
         "shapes": [],
@@ -77,12 +81,30 @@ def figure(chart: Chart, shown: Chart | None = None) -> dict[str, Any]:
     for band in chart.bands:
         low = band.low if chart.y_scale == "linear" or band.low > 0.0 else None
         layout["shapes"].append({"meta": "band", "low": low, "high": band.high, "name": plain(band.name)})
-    return {
-        "data": [_trace(line) for line in chart.lines],
-        "layout": layout,
-        "title": plain(chart.title),
-        "description": plain(describe(chart)),
-    }
+    made: dict[str, Any] = {"layout": layout}
+    for given, ends in (("xaxis", x_ends), ("yaxis", y_ends)):
+        if "range" in layout[given] and not chart.polar:
+            layout[given]["range"] = [_cut(end, ends, "linear") for end in ends]
+    x_cut, y_cut = (
+        partial(_cut, ends=x_ends, scale=chart.x_scale),
+        partial(_cut, ends=y_ends, scale=chart.y_scale),
+    )
+    made["data"] = [_trace(line, x_cut, y_cut) for line in chart.lines]
+    if chart.over:
+        made["over"] = [None if end is None else int(end) for end in chart.over]
+    return made
+
+
+def _cut(value: float, ends: tuple[float, float], scale: Scale) -> float | None:
+    """A coordinate with the digits that can be seen: a hundred-thousandth of a linear axis, six digits of a
+    logarithmic one. None where there is no number."""
+    if not math.isfinite(value):
+        return None
+    if scale == "log":
+        value = float(f"{value:.6g}")
+    elif (span := ends[1] - ends[0]) > 0.0 and math.isfinite(span):
+        value = round(value, min(300, 5 - math.floor(math.log10(span))))
+    return int(value) if value.is_integer() and abs(value) < 1e15 else value
 
 
 def grid_figure(grid: Grid) -> dict[str, Any]:
@@ -91,8 +113,8 @@ def grid_figure(grid: Grid) -> dict[str, Any]:
     z = [[codes.get(word, len(CELL_WORDS)) for word in row] for row in grid.cells]
     told = [
         [
-            f"{plain(grid.x_label)}: {number(grid.x[i])}<br>{plain(grid.y_label)}: {number(grid.y[j])}"
-            f"<br>{plain(word.replace('_', ' '))}{_predicted(grid, i, j)}"
+            f"{plain(grid.x_label)}: {number(grid.x[i])}\n{plain(grid.y_label)}: {number(grid.y[j])}"
+            f"\n{plain(word.replace('_', ' '))}{_predicted(grid, i, j)}"
             for i, word in enumerate(row)
         ]
         for j, row in enumerate(grid.cells)
@@ -133,15 +155,13 @@ def grid_figure(grid: Grid) -> dict[str, Any]:
             "yaxis": _places(grid.y_label, grid.y),
             "showlegend": False,
         },
-        "title": plain(grid.title),
-        "description": plain(grid.note),
     }
 
 
 def _predicted(grid: Grid, i: int, j: int) -> str:
     if not grid.prediction or j >= len(grid.prediction) or i >= len(grid.prediction[j]):
         return ""
-    return f"<br>predicted growth per step: {number(grid.prediction[j][i], 6)}"
+    return f"\npredicted growth per step: {number(grid.prediction[j][i], 6)}"
 
 
 def _places(label: str, values: tuple[float, ...]) -> dict[str, Any]:
@@ -198,7 +218,7 @@ def _polar(layout: dict[str, Any], chart: Chart) -> None:
         layout["annotations"].append({"meta": "ring", "x": 0.0, "y": radius, "text": number(radius, 6)})
 
 
-def _trace(line: Line) -> dict[str, Any]:
+def _trace(line: Line, x_cut: Cut, y_cut: Cut) -> dict[str, Any]:
     drawn = {"points": "markers", "failed": "markers", "broken": "markers", "both": "lines+markers"}.get(
         line.style, "lines"
     )
@@ -206,8 +226,8 @@ def _trace(line: Line) -> dict[str, Any]:
         "type": "scatter",
         "mode": drawn,
         "name": plain(line.name),
-        "x": list(line.x),
-        "y": [y if math.isfinite(y) else None for y in line.y],
+        "x": list(map(x_cut, line.x)),
+        "y": list(map(y_cut, line.y)),
         "meta": {"colour": line.colour % 8, "style": line.style},
         "showlegend": not line.quiet,
     }
@@ -221,8 +241,8 @@ def _trace(line: Line) -> dict[str, Any]:
         own = {"failed": "x-thin", "broken": "circle-open"}.get(line.style)
         trace["marker"] = {"symbol": own or SYMBOLS[line.colour % 8]}
     if line.upto:
-        far = [end - x for x, end in zip(line.x, line.upto, strict=True)]
-        trace["error_x"] = {"type": "data", "symmetric": False, "array": far, "arrayminus": [0.0] * len(far),
+        far = [float(f"{end - x:.3g}") for x, end in zip(line.x, line.upto, strict=True)]
+        trace["error_x"] = {"type": "data", "symmetric": False, "array": far, "arrayminus": [0] * len(far),
                             "thickness": 1, "width": 0}  # fmt: skip
     if line.notes:
         trace |= {"hovertext": _all_plain(line.notes), "hoverinfo": "text"}

@@ -218,23 +218,30 @@ def _block(history: Records, name: str, nights: Sequence[Night], marks: Mapping[
                 rows.setdefault(key, []).append([place, *row])
                 last[key] = row
     definitions = [json.loads(text) for text in texts.definitions]
-    whole = {"texts": list(texts.texts), "definitions": definitions, "nights": sides, "rows": rows}
+    fields = list(definitions[0]) if definitions else []
+    whole = {
+        "texts": list(texts.texts), "fields": fields, "definitions": [list(d.values()) for d in definitions],
+        "nights": sides, "rows": rows,
+    }  # fmt: skip
     return f"comparedNights({_json(name)},{_json(whole)});\n".encode()
 
 
-def described(book: Book) -> dict[str, list[str]]:
-    """Title, words and page of every series; another engine's under the title and page of our test."""
+def described(book: Book) -> dict[str, tuple[str, str, dict[str, str]]]:
+    """Title and page of every test, and the words of each of its series by key; another engine's under the title and
+    page of our test."""
     ours = {test.name: test for test in book.tests}
-    return {
-        t.definition.key: [
-            clean(ours.get(test.name, test).card.title),
-            clean(f"{named(t.definition)[0]} ({conditions(t.definition)})"),
-            page_of(test.name) if test.name in ours else "engines.html",
-        ]
-        for chapter in reversed(book.engines)
-        for test in chapter.tests
-        for t in test.trends
-    }
+    found: dict[str, tuple[str, str, dict[str, str]]] = {}
+    for chapter in reversed(book.engines):
+        for test in chapter.tests:
+            title = clean(ours.get(test.name, test).card.title)
+            page = page_of(test.name) if test.name in ours else "engines.html"
+            words = found[test.name][2] if test.name in found else {}
+            words |= {
+                t.definition.key: clean(f"{named(t.definition)[0]} ({conditions(t.definition)})")
+                for t in test.trends
+            }
+            found[test.name] = (title, page, words)
+    return found
 
 
 def gates_of_engines(book: Book) -> list[list[Any]]:

@@ -323,7 +323,7 @@ def engine_page(book: Book, chapter: Chapter, recorded: Recorded | None = None) 
             _counts(name, [of_gate[name] for of_gate in cells.values() if name in of_gate]) for name in names
         ],
         "ladders": [
-            view(chart, table=False)
+            view(chart)
             for test in chapter.tests
             for chart in ladder_charts(
                 retitled(ours, test), f"{slug(test.name)}-", earlier=chapter.earlier[:1]

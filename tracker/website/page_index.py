@@ -86,6 +86,7 @@ def lead(book: Book, causes: Sequence[Cause]) -> dict[str, Any]:
     state, found = health(book)
     return {
         "state": state,
+        "night": book.tonight,
         "headline": _headline(state, found, tonight(book), _red_maps(book)),
         "summary": summary(book),
         "new": new,

@@ -19,6 +19,7 @@ from spook_tracker.tracker.website.diagrams import (
     grid_view,
     ladder_charts,
     map_grid,
+    moving,
     trend_chart,
     view,
 )
@@ -28,7 +29,7 @@ from spook_tracker.tracker.website.judged_nights import BLOCK, file_stem
 from spook_tracker.tracker.website.nights import Book, TestHistory
 from spook_tracker.tracker.website.page_index import RED, counts_by_night, health, lead
 from spook_tracker.tracker.website.page_rows import Page, address, row
-from spook_tracker.tracker.website.page_test import concluded, earlier_choices
+from spook_tracker.tracker.website.page_test import concluded, ladder_views
 from spook_tracker.tracker.website.scenery import scenery
 from spook_tracker.tracker.website.svg import grid_picture, picture
 
@@ -36,25 +37,20 @@ MOST_CAUSES = 200  # on the page of regressions; the file has all
 MOST_ROWS, FEW_ROWS = 500, 25  # series of all causes; of one that is over
 MOST_CHANGES = 100  # of a comparison read without scripts
 MOST_NIGHTS = 120
-MOST_EARLIER = 4  # nights to lay beside every ladder of all tests: each weighs as much as tonight
 
 
 def error_time(book: Book) -> Page:
     """What accuracy costs, for all tests."""
-    charts, drawn = [], []
-    for test in book.tests:
-        beside = book.earlier[:MOST_EARLIER]
-        for chart in ladder_charts(test, f"{slug(test.name)}-", book.peers(test.name), beside):
-            drawn.append(chart)
-            shown = view(chart, table=False)
-            axis = "work" if chart.name.endswith("-work") else "seconds"
-            charts.append((axis, shown, address(test)))
+    charts = [
+        ("work" if shown.name.endswith("-work") else "seconds", shown, address(test))
+        for test in book.tests
+        for shown in ladder_views(test, book, f"{slug(test.name)}-")
+    ]
     rows = {
         kind: [_row(t, test) for test in book.tests for t in test.of_kind(kind)] for kind in ("order", "time")
     }
     context = {
         "charts": charts,
-        "earlier": earlier_choices(book, drawn),
         "orders": rows["order"],
         "scalars": rows["time"],
     }
@@ -80,7 +76,11 @@ def stability(book: Book, events: Sequence[Event]) -> Page:
             for test in book.tests
             for m in test.maps
         ],
-        "trends": [view(trend_chart(t, book.nights, events, test.card.title)) for test, t in points],
+        "trends": [
+            view(trend_chart(t, book.nights, events, test.card.title))
+            for test in book.tests
+            for t in moving(test.of_kind("break_point"))
+        ],
     }
     return Page(
         "stability.html", "stability.html", "Stability", "Break points and maps.", context, plotly=True
@@ -191,6 +191,9 @@ def data(book: Book, events: Sequence[Event]) -> Page:
     _, found = health(book)
     context = {
         "badge": f"physics: {badge_words(found)}",
+        "months": list(dict.fromkeys(n.started[:7] for n in book.nights))
+        if any(test.of_kind("time") for test in book.tests)
+        else [],
         "tests": [{"title": t.card.title, "address": address(t), "slug": slug(t.name)} for t in book.tests],
     }
     return Page("data.html", "data.html", "Data", "Every number as CSV and JSON.", context)

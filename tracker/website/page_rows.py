@@ -42,6 +42,9 @@ class Page:
     description: str
     context: dict[str, Any] = field(default_factory=dict)
     plotly: bool = False
+    nightly: tuple[str, dict[str, object]] | None = (
+        None  # the test, and what `times.html` tells of its run times
+    )
 
 
 @dataclass

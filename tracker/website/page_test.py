@@ -8,12 +8,14 @@ from collections.abc import Sequence
 from spook_tracker.tracker.document.wording import clean, day, slug
 from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.broken import MOST_CARDS, MOST_CHARTS, broken, shown
-from spook_tracker.tracker.website.charts import Chart
+from spook_tracker.tracker.website.chart_files import nightly_file
 from spook_tracker.tracker.website.diagrams import (
+    View,
     figure_chart,
     grid_view,
     ladder_charts,
     map_grid,
+    moving,
     trend_chart,
     view,
 )
@@ -25,11 +27,16 @@ from spook_tracker.tracker.website.replays import replay
 from spook_tracker.tracker.website.scenery import scenery
 from spook_tracker.tracker.website.stage_times import stage_times
 
+NO_SPARK: dict[str, object] = {"path": "", "last": None, "failed": []}
+LARGE = 3  # charts over nights that are not folded
+
 
 def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
     """Everything about one test."""
     here = address(test)
     every = {id(t): row(t, test.card.title, here) for t in test.trends}
+    for steady in {id(t) for t in test.trends} - {id(t) for t in moving(test.trends)}:
+        every[steady].spark = NO_SPARK  # a level line grows every night and says nothing
     found = broken(test)
     cards = found[:MOST_CARDS]
     first = [one.trend for one in found if one.trend.definition.kind != "ladder"][:MOST_CHARTS]
@@ -38,13 +45,21 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
     break_points = test.of_kind("break_point")
     scalars = judged + test.reported()
     newest = max((t.nights[-1] for t in test.trends), default=book.tonight.index)
-    charts = ladder_charts(test, peers=book.peers(test.name), earlier=book.earlier)
+    ladders = ladder_views(test, book)
+    times = test.of_kind("time")
+    over = [
+        t
+        for t in moving([*judged, *break_points, *test.of_kind("order"), *test.reported()])
+        if t not in first
+    ]
+    first = moving(first)
     contents = [("broken", "What is wrong tonight")] if found else []
     history = model_history(test.trends)
     contents += [("releases", "What changed with which version")] if history else []
-    contents += [("scene", "The question"), ("versions", "Over versions")]
+    contents += [("scene", "The question")]
+    contents += [("versions", "Over versions")] if over else []
     contents += [("figures", "Figures")] if test.figures else []
-    contents += [("error-time", "Error against run time")] if charts else []
+    contents += [("error-time", "Error against run time")] if ladders else []
     contents += [("stability", "Stability")] if test.maps or break_points else []
     contents += [("stages", "Stages")] if test.card.stages else []
     contents += [("conclusion", "Conclusions")] if test.card.conclusion else []
@@ -52,7 +67,6 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
     context = {
         "card": test.card,
         "slug": slug(test.name),
-        "stage_times": stage_times(test),
         "replay": replay(book.motions[test.name]),
         "scenery": scenery(test.card.scene) if test.card.scene else None,
         "state": test.state,
@@ -64,31 +78,33 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
         "gates": gates,
         "model_history": history,
         "contents": contents,
-        "trends": [
-            view(trend_chart(t, book.nights, events)) for t in [*judged, *break_points] if t not in first
-        ],
-        "more_trends": [
-            view(trend_chart(t, book.nights, events))
-            for t in [*test.reported(), *test.of_kind("time")]
-            if t not in first
-        ],
+        "trends": [view(trend_chart(t, book.nights, events)) for t in over[:LARGE]],
+        "more_trends": [view(trend_chart(t, book.nights, events)) for t in over[LARGE:]],
+        "time_trends": [view(trend_chart(t, book.nights, events), slug(test.name)) for t in moving(times)],
         "figures": [view(figure_chart(f)) for f in test.figures],
-        "ladders": [view(c) for c in charts],
-        "earlier": earlier_choices(book, charts),
-        "orders": [every[id(t)] for t in [*test.of_kind("order"), *test.of_kind("time")]],
+        "ladders": ladders,
+        "run_times": nightly_file(slug(test.name)) if times or ladders else "",
+        "orders": [every[id(t)] for t in test.of_kind("order")],
         "maps": [grid_view(map_grid(m)) for m in test.maps],
         "break_points": [every[id(t)] for t in break_points],
         "conclusions": concluded(test.card.conclusion, test.state),
         "events": [event_row(e, book) for e in of_test(events, test)[:20]],
         "scalars": [every[id(t)] for t in scalars],
     }
-    return Page(here, "test.html", clean(test.card.title), clean(test.card.question), context, plotly=True)
+    told: dict[str, object] = {
+        "rows": [every[id(t)] for t in times],
+        "stage_times": stage_times(test),
+        "saved": [s for s in test.card.stages if not s.kept and s.saved_seconds_per_step],
+    }
+    page = Page(here, "test.html", clean(test.card.title), clean(test.card.question), context, plotly=True)
+    page.nightly = (slug(test.name), told) if context["run_times"] else None
+    return page
 
 
-def earlier_choices(book: Book, charts: Sequence[Chart]) -> list[tuple[str, str]]:
-    """The earlier nights that stand in some chart, as a list to choose from: key and words."""
-    drawn = {line.night for chart in charts for line in chart.lines if line.night}
-    return [(one.key, one.told(book.nights[one.index])) for one in book.earlier if one.key in drawn]
+def ladder_views(test: TestHistory, book: Book, prefix: str = "") -> list[View]:
+    """Error against run time, which every night measures anew, and against work, which stands still."""
+    charts = ladder_charts(test, prefix, peers=book.peers(test.name), earlier=book.earlier)
+    return [view(chart, "" if chart.name.endswith("-work") else slug(test.name)) for chart in charts]
 
 
 CONCLUSION = re.compile(r"(?:Green|If it passes): (.*?)\s+(?:Red|If it fails): (.*)", re.DOTALL)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import hashlib
-from array import array
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, partial
@@ -26,7 +25,7 @@ from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.resources import resource
 from spook_tracker.tracker.website import data_files, feed, judged_nights
 from spook_tracker.tracker.website.causes import causes_of
-from spook_tracker.tracker.website.chart_files import chart_files
+from spook_tracker.tracker.website.chart_files import ChartFiles
 from spook_tracker.tracker.website.colours import accent
 from spook_tracker.tracker.website.comparisons import (
     FILE,
@@ -39,7 +38,7 @@ from spook_tracker.tracker.website.comparisons import (
 from spook_tracker.tracker.website.events import Event, all_events
 from spook_tracker.tracker.website.folder import FolderError, digest, replacing
 from spook_tracker.tracker.website.live_module import built_module, module_script
-from spook_tracker.tracker.website.nights import Book, Records, TestHistory, book
+from spook_tracker.tracker.website.nights import Book, Records, book
 from spook_tracker.tracker.website.options import DEFAULTS, SiteOptions
 from spook_tracker.tracker.website.page_index import health
 from spook_tracker.tracker.website.page_mutants import read_mutants
@@ -49,6 +48,7 @@ from spook_tracker.tracker.website.recorded import read_files
 from spook_tracker.tracker.website.recorded import told as told_beside
 from spook_tracker.tracker.website.replays import replay_files
 from spook_tracker.tracker.website.templates import environment
+from spook_tracker.tracker.website.tonight import tonight_scripts
 
 __all__ = ["FolderError", "Report", "publish"]
 
@@ -144,11 +144,11 @@ def publish(
         causes = causes_of(told)
         levels = digest(making.encode(), repr(accepted).encode())
         compared = cache(lambda: comparisons(history, told, accepted, read_known(out, levels)))
-        night = told.nights[-1] if told.nights else None
+        drawn = ChartFiles()
 
         def render(page: Page) -> tuple[str, bytes]:
             """The page and what it is made from."""
-            context = _context(page, names, night) | {
+            context = _context(page, names, bool(told.nights)) | {
                 "database": database is not None,
                 "wrong_on_purpose": bool(mutants),
             }
@@ -162,9 +162,12 @@ def publish(
             charts: dict[str, bytes] = {}
             try:
                 made_page = planned.make()
-                drawn = chart_files(made_page.context)
+                found = drawn.add(made_page.context)  # what stands on the page is where the numbers are
                 source, text = render(made_page)
-                charts = drawn
+                charts = found
+                if made_page.nightly:
+                    test, times = made_page.nightly
+                    drawn.add_part(test, made.get_template("times.html").render(times))
             except Exception as error:  # whatever it is, the other pages are worth publishing
                 reason = f"{type(error).__name__}: {clean(str(error))[:300]}"
                 failed.append(f"{planned.path}: {reason}")
@@ -174,6 +177,10 @@ def publish(
             for address, content in charts.items():
                 if address not in folder.made:  # the overviews have charts of the tests again
                     folder.add(address, digest(content), partial(bytes, content))
+        for address, content in drawn.nightly_files().items():
+            folder.add(address, digest(content), partial(bytes, content))
+        for address, content in tonight_scripts(told).items() if told.nights else ():
+            folder.add(address, digest(content), partial(bytes, content))
         files = _data(told, events, causes, str(whose["site_title"]))
         if told.nights:
             files = chain(
@@ -215,17 +222,14 @@ def _data(told: Book, events: Sequence[Event], causes: Sequence[Cause], author: 
     """Files of numbers."""
     if not told.nights:
         return
-    every = [(night.id, night.started, night.engine.version, night.engine.git_hash) for night in told.nights]
-    newest = _bytes_of({"nights": every, "tonight": told.tonight})
     for test in told.tests:
-        facts = digest(newest, _bytes_of(_facts(test))).encode()
-        yield f"data/{slug(test.name)}.csv", facts, partial(data_files.newest_csv, told, [test])
-        yield (
-            f"data/{slug(test.name)}-history.csv",
-            facts,
-            partial(data_files.history_csv, told, test),
-        )
-        yield f"data/{slug(test.name)}.json", facts, partial(data_files.test_json, told, test)
+        for kind, content in (
+            ("csv", data_files.changes_csv(told, test)),
+            ("json", data_files.test_json(told, test)),
+        ):
+            yield f"data/{slug(test.name)}.{kind}", content, partial(bytes, content)
+    for month, source, make in data_files.run_times(told):
+        yield f"data/run-times-{month}.csv", source, make
     for path, content in replay_files(told.motions).items():
         yield path, content, partial(bytes, content)
     tables = {
@@ -238,7 +242,10 @@ def _data(told: Book, events: Sequence[Event], causes: Sequence[Cause], author: 
             {"lines": [[repr(c) if isinstance(c, float) else c for c in line] for line in lines]}
         )
         yield f"data/{name}.csv", source, partial(data_files.table, columns, lines)
-        yield f"data/{name}.json", source, partial(data_files.records, columns, lines)
+        as_json = data_files.columnar if name == "tonight" else data_files.records
+        yield f"data/{name}.json", source, partial(as_json, columns, lines)
+    counted = data_files.table(*data_files.work(told))
+    yield "data/work.csv", counted, partial(bytes, counted)
     news = feed.atom(told, causes, author)
     yield "feed.xml", news, partial(bytes, news)
     state, found = health(told)
@@ -247,16 +254,7 @@ def _data(told: Book, events: Sequence[Event], causes: Sequence[Cause], author: 
     yield "badge.json", (state + words).encode(), partial(feed.badge_json, state, words)
 
 
-def _facts(test: TestHistory) -> dict[str, Any]:
-    """What the files of a test are made from."""
-    trends = [
-        [t.definition, t.nights, array("d", t.values).tobytes(), t.outcomes, t.held[-1:], t.latest]
-        for t in test.trends
-    ]
-    return {"card": test.card, "trends": trends, "figures": test.figures, "maps": test.maps}
-
-
-def _context(page: Page, assets: dict[str, str], night: Any) -> dict[str, Any]:
+def _context(page: Page, assets: dict[str, str], any_night: bool) -> dict[str, Any]:
     return {
         "title": page.title,
         "description": page.description,
@@ -265,7 +263,7 @@ def _context(page: Page, assets: dict[str, str], night: Any) -> dict[str, Any]:
         "assets": assets,
         "plotly": page.plotly,
         "module": "",  # the live page has one
-        "night": night,
+        "any_night": any_night,
         **page.context,
     }
 

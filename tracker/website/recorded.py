@@ -15,7 +15,6 @@ import msgspec
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import RunDocument, SeriesDefinition
 from spook_tracker.tracker.store.documents import DocumentHistory
-from spook_tracker.tracker.store.months import read_runs
 from spook_tracker.tracker.store.release_order import in_release_order
 from spook_tracker.tracker.website.nights import Book, Chapter, chapters
 
@@ -57,6 +56,8 @@ class Recorded:
 
 def read_files(folder: Path) -> Files:
     """What `make recorded` wrote there. RecordedError if it is not there or cannot be read."""
+    from spook_tracker.tracker.store.months import read_runs  # a website without such a folder needs no SQLAlchemy
+
     try:
         night = read_runs(folder / NIGHT)
         releases = read_runs(folder / RELEASES) if (folder / RELEASES).exists() else []

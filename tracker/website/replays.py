@@ -21,11 +21,12 @@ def replay(motions: Sequence[Motion]) -> Replay | None:
     """The motions of a test, newest first, each once; None if none was recorded."""
     if not motions:
         return None
-    sources: dict[str, dict[str, str]] = {}
+    sources = {motions[0].key: {"key": motions[0].key, "address": motions[0].address, "label": ""}}
     for motion in motions:
         engine = motion.night.engine
         label = f"{day(motion.night.started)}, {short_hash(engine) or version(engine)}"
-        sources.setdefault(motion.key, {"key": motion.key, "address": motion.address, "label": label})
+        if motion.key != motions[0].key:  # tonight's needs none, and would be another every night
+            sources.setdefault(motion.key, {"key": motion.key, "address": motion.address, "label": label})
     tonight = motions[0].recorded
     place = next((c for c in tonight.channels if c.name == "position"), None)
     note = (
