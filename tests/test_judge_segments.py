@@ -62,14 +62,22 @@ def test_one_fast_night_ends_no_red_and_two_hundred_red_nights_are_news_once(
         assert told[-1].worse_at == 40
 
 
-def test_a_second_regression_on_a_red_run_time_is_news_and_blamed_on_its_own_commit() -> None:
+@pytest.mark.parametrize("second", [2.0, 10.0])
+def test_a_second_regression_on_a_red_run_time_is_news_and_blamed_on_its_own_commit(second: float) -> None:
+    """Said on its own night, ten after the first; news and blamed when another one confirms it."""
     for seed in range(10):
         values = noise(seed, 0.005, 43)
         values[30:] *= 1.1
-        values[40:] *= 10.0
+        values[40:] *= second
         told = told_of(values)
 
         assert [night.news for night in told[40:]] == [False, True, False]
+        on_top = re.search(
+            r"; tonight \+([\d.]+) % for the worse on top of that, to be", told[40].verdict.sentence
+        )
+        assert on_top is not None
+        assert float(on_top[1]) == pytest.approx(100.0 * (second - 1.0), rel=0.1)
+        assert not any("on top of that" in night.verdict.sentence for night in [*told[30:40], *told[41:]])
         assert (told[39].worse_at, told[-1].worse_at, told[-1].first_bad) == (30, 40, 30)
         assert told[-1].accused == (39, 40)
 

@@ -37,13 +37,14 @@ from spook_tracker.tracker.judge.shifts import (
     drawn_anew,
     shift,
 )
-from spook_tracker.tracker.judge.slower import LEAST, Usual, change_in_words, slower
+from spook_tracker.tracker.judge.slower import CONFIRM, LEAST, Usual, change_in_words, slower
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import with_recoveries
 
 MENDED = 0.25  # of its size: a red level that is left of it is none
 SETTLED = 30  # nights of a segment after which its boundary is known
 BACK, WEIGHT = 9.0, 6.0  # log likelihoods: to believe that a red level was left; of one night at most
+FEWEST_SPAN, LONGEST_SPAN = min(SPANS), max(SPANS)
 OFTEN = 2  # times left before: such a level is flaky,
 LONGER = 2  # until it lasts so many times its longest
 
@@ -187,13 +188,15 @@ class _Walk(DriftingLevel):
         if self.off and self.better:
             return None
         level = self._level()[0]
-        if level <= 0.0 or len(self.now.places) < FEWEST_BASE + min(SPANS) - len(self.off):
+        if level <= 0.0 or len(self.now.places) < FEWEST_BASE + FEWEST_SPAN - len(self.off):
             return None
-        last = [*self.now.places[-min(SPANS) :], *self.off][-min(SPANS) :]
+        last = self.now.places[-FEWEST_SPAN:]
+        if self.off:
+            last = [*last, *self.off][-FEWEST_SPAN:]
         mean = self._worse_by(level, sum([self.values[i] for i in last]) / len(last))
         if mean < LEAST:
             return None  # most nights: nothing to count
-        nights = [*self.now.places[-BASE - max(SPANS) :], *self.off]
+        nights = [*self.now.places[-BASE - LONGEST_SPAN :], *self.off]
         age = self.ages[nights[-1]] - self.ages[self.start]
         found = shift(self._costs(nights), mean < self._level()[1], age)
         return (found.span, found) if found is not None and found.change > self._tolerated(level) else None
@@ -202,12 +205,12 @@ class _Walk(DriftingLevel):
         """Several nights above both of two clusters that nights are drawn from at random, whatever segments they made."""
         if not self.over or self.now.standing == "red" or len(self.now.places) >= BASE:
             return None
-        level, last = self._level()[0], [*self.now.places[-min(SPANS) :], *self.off][-min(SPANS) :]
+        level, last = self._level()[0], [*self.now.places[-FEWEST_SPAN:], *self.off][-FEWEST_SPAN:]
         if self._worse_by(level, sum([self.values[i] for i in last]) / len(last)) < 0.5 * LEAST:
             return None
-        first = max(self.start, self.until - BASE - max(SPANS))
+        first = max(self.start, self.until - BASE - LONGEST_SPAN)
         nights = [i for i in range(first, self.until) if self._number(i)]
-        if len(nights) < FEWEST_BASE + min(SPANS):
+        if len(nights) < FEWEST_BASE + FEWEST_SPAN:
             return None
         found = shift(self._costs(nights), True, self.ages[nights[-1]] - self.ages[self.start])
         told = found is not None and found.apart and found.change > self._tolerated(level)
@@ -217,7 +220,9 @@ class _Walk(DriftingLevel):
         """Whether the last nights of a red segment are more probably of the level before it (Page's cumulative sum)."""
         assert self.reference is not None
         places = self.now.places
-        settled = [self.values[i] for i in places[-WINDOW - max(SPANS) : -max(SPANS)] or places[: min(SPANS)]]
+        settled = [
+            self.values[i] for i in places[-WINDOW - LONGEST_SPAN : -LONGEST_SPAN] or places[:FEWEST_SPAN]
+        ]
         level = median(settled)
         noise = max(spread_of(settled, level), self.reference.noise, 0.1 * LEAST)
         apart = self._worse_by(self.reference.level, level) / noise
@@ -377,7 +382,7 @@ class _Walk(DriftingLevel):
         self._split_inside()
         fast = bool(self.off) and self.better
         if self.now.standing == "red":
-            return self._mended() or self._red_night(news=False)
+            return self._mended() or self._second_at_once(self._red_night(news=False), change)
         if self.now.standing == "flaky":
             assert self.reference is not None
             if len(self.now.places) <= self.now.stay:
@@ -420,6 +425,13 @@ class _Walk(DriftingLevel):
             worse_at=where.best if risen else first, news=news, accused=(max(where.places[0] - 1, 0), where.places[-1]),
             probability=where.probability, levels=(held, level),
         )  # fmt: skip
+
+    def _second_at_once(self, night: Noisy, change: float) -> Noisy:
+        """A red night that stands clear of its own level, too: told on that night, and blamed when another confirms it."""
+        if not self.off or self.better:
+            return night
+        words = f"{night.verdict.sentence}; tonight {change_in_words(change)} on top of that"
+        return night._replace(verdict=replace(night.verdict, sentence=f"{words}, {CONFIRM}"))
 
     def _mended(self) -> Noisy | None:
         """Recovered, if the red level came to lie where the one before it was, little by little."""

@@ -119,18 +119,23 @@ def inner_split(costs: Sequence[float], remembered: float, fewest: int = 8) -> i
     if count < 2 * fewest:
         return None
     values = np.array(costs)
-    ordered = np.sort(values)  # equal values share their rank
-    ranks = 0.5 * (1.0 + ordered.searchsorted(values) + ordered.searchsorted(values, side="right"))
+    ordered = values.copy()
+    ordered.sort()
+    ranks = ordered.searchsorted(values) + ordered.searchsorted(
+        values, "right"
+    )  # twice, less one; equal ones share it
     expected, spread = _by_chance(count, fewest)
-    off = np.abs(np.cumsum(ranks)[fewest - 1 : count - fewest] - expected) / spread
-    place = int(np.argmax(off))
-    return place + fewest if float(off[place]) > 4.5 / math.sqrt(remembered) else None
+    off = (ranks.cumsum()[fewest - 1 : count - fewest] - expected) / spread
+    high, low = off.max(), off.min()
+    if max(high, -low) <= 4.5 / math.sqrt(remembered):
+        return None
+    return int(off.argmax() if high >= -low else off.argmin()) + fewest
 
 
 @lru_cache(maxsize=128)
 def _by_chance(count: int, fewest: int) -> tuple[Values, Values]:
-    """Mean and standard deviation of the sum of the first so many ranks of `count`, `fewest` or more on each side."""
+    """Mean and standard deviation of the sum of the first so many 2 r − 1, r being the ranks of `count`, `fewest` on each side."""
     import numpy as np
 
     n = np.arange(fewest, count - fewest + 1, dtype=float)
-    return 0.5 * n * (count + 1), np.sqrt(n * (count - n) * (count + 1) / 12.0)
+    return n * count, np.sqrt(n * (count - n) * (count + 1) / 3.0)
