@@ -193,13 +193,9 @@ def judge_run(history: History, run: str, accepted: Sequence[Accepted] = ()) -> 
 
     `latest` is the latest night of every machine: what is red of the last runs of others within a day is among it.
     """
-    from spook_tracker.tracker.judge.tonight import on_other_machines, tonight, worst_first
+    from spook_tracker.tracker.judge.tonight import tonight
 
-    of_run = history.resolve(run)
-    findings = tonight(history, of_run, accepted)
-    if run.rpartition("@")[2] != "latest":
-        return findings
-    return worst_first([*findings, *on_other_machines(history, of_run, findings, accepted)])
+    return tonight(history, history.resolve(run), accepted, others=run.rpartition("@")[2] == "latest")
 
 
 def idle_entries(

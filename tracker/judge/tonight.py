@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import timedelta
 from typing import Any
@@ -92,27 +92,39 @@ class Finding:
         return "" if bad is None else blame(bad, good)
 
 
-def tonight(records: Records, run: Any, accepted: Sequence[Accepted] = ()) -> list[Finding]:
-    """Findings of one recorded run against its history (tracker.store.history.History); red first."""
+def tonight(
+    records: Records, run: Any, accepted: Sequence[Accepted] = (), others: bool = False
+) -> list[Finding]:
+    """Findings of one recorded run against its history (tracker.store.history.History); red first.
+
+    `others`: also what is red of the last runs of other machines within a day, as far as the run does not say so.
+    """
     line = line_of(records.runs(), run)
-    findings = of_run(judge_all(histories(records, line), accepted), run.id)
+    told = judge_all(histories(records, line), accepted)
+    findings = of_run(told, run.id)
     findings += [_of_map(told) for told in told_maps(records, line, accepted) if told.tonight]
+    if others:
+        findings += _on_other_machines(line, told, findings)
     return worst_first(findings)
 
 
-def on_other_machines(
-    records: Records, run: Run, findings: Sequence[Finding], accepted: Sequence[Accepted] = ()
-) -> list[Finding]:
-    """What is red of the last runs of other machines within the same day, as far as `findings` of a run do not say so."""
-    last = {other.machine.fingerprint: other for other in line_of(records.runs(), run)}
-    said = {finding.series for finding in findings if finding.red and not _of_a_clock(finding)}
-    return [
-        replace(finding, machine=f"{other.machine.processor} ({fingerprint[:8]})")
+def _on_other_machines(
+    line: Sequence[Run], told: Mapping[str, Told], findings: Sequence[Finding]
+) -> Iterator[Finding]:
+    run = line[-1]
+    last = {other.machine.fingerprint: other for other in line}
+    night = {
+        other.id: f"{other.machine.processor} ({fingerprint[:8]})"
         for fingerprint, other in last.items()
         if fingerprint != run.machine.fingerprint and abs(started(other) - started(run)) < NIGHT
-        for finding in tonight(records, other, accepted)
-        if finding.red and finding.series not in said
-    ]
+    }
+    if not night:
+        return
+    said = {finding.series for finding in findings if finding.red and not _of_a_clock(finding)}
+    for key, series in told.items():
+        for judged in series.nights:
+            if judged.red and judged.night.run.id in night and key not in said:
+                yield replace(_finding(key, series, judged), machine=night[judged.night.run.id])
 
 
 def _of_a_clock(finding: Finding) -> bool:
@@ -141,19 +153,21 @@ def of_run(told: Mapping[str, Told], run_id: str) -> list[Finding]:
         judged = series.nights[-1] if series.nights else None
         if judged is None or judged.night.run.id != run_id:
             continue
-        findings.append(
-            Finding(
-                series=key,
-                definition=series.definition,
-                test=series.definition.test,
-                judged=judged,
-                verdict=judged.verdict,
-                red=judged.red,
-                news=judged.news,
-                state=judged.state,
-            )
-        )
+        findings.append(_finding(key, series, judged))
     return worst_first(beside_findings(findings))
+
+
+def _finding(key: str, series: Told, judged: Judged) -> Finding:
+    return Finding(
+        series=key,
+        definition=series.definition,
+        test=series.definition.test,
+        judged=judged,
+        verdict=judged.verdict,
+        red=judged.red,
+        news=judged.news,
+        state=judged.state,
+    )
 
 
 def to_be_timed_again(findings: Sequence[Finding]) -> list[str]:
