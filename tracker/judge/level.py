@@ -140,7 +140,7 @@ class PresentLevel:
         if len(base) < FEWEST_BASE or not math.isfinite(change) or not remembered(base):
             return True
         far = RANGES * float(np.max(base) - np.min(base))  # whatever they remember
-        return change * float(np.median(base)) > min(standard_error(base, 1), far)
+        return change * median_of_sorted(np.sort(base)) > min(standard_error(base, 1), far)
 
     def _reach_down(self, threshold: float) -> float:
         """What stands clear for the better: of where nights that hold have been."""

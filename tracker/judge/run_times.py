@@ -241,8 +241,11 @@ class _Walk(DriftingLevel):
         if found is None:
             if self.reference is None or self.now.standing != "red":
                 return None
-            if self._worse_by(self.reference.level, value) > 0.5 * self.now.size:
+            half, last = 0.5 * self.now.size, [*self.now.places[-2:], *self.off][-2]
+            if self._worse_by(self.reference.level, value) > half:
                 return None  # as red as before
+            if self._worse_by(self.reference.level, self.values[last]) <= half:
+                return None  # as on the night before
         elif found[1] is not None:
             return None  # more of them than chance draws from one
         import numpy as np
