@@ -195,6 +195,7 @@ def page(database: str, of_facts: str = "") -> str:
         "",
         "Made by `make engines`: " + ", ".join(f"{n} {version(r[0].engine)}" for n, r in runs.items()) + ".",
         f"Measured on {runs[OURS][-1].started[:10]}, one core at a time for the run times, {machine.processor}.",
+        *recorded.occasion_lines(database),
         *_asked_later(runs[OURS]),
         *_not_asked(samples[OURS]),
         *([f"On another machine, and not timed here: {elsewhere}."] if elsewhere else []),
@@ -353,8 +354,8 @@ def _treatment(samples: Mapping[str, ranks.Samples]) -> list[str]:
 READING = (
     "An engine is asked in two or three settings (`tracker engines` says which and why); the best of them counts. A *scene*",
     "is one quantity of one scalar test, its *error* the distance from a closed form or a reference of known accuracy, its",
-    "*run time* that of the engine's own steps in one thread, models built before. *First* is who comes within an error",
-    "soonest, whatever step that takes. What an engine cannot be asked (a joint, a shape, a force it does not show) is not",
+    "*run time* the processor's for the engine's own steps in one thread, models built before. *First* is who comes within an",
+    "error soonest, whatever step that takes. What an engine cannot be asked (a joint, a shape, a force it does not show) is not",
     "supported, by name, and no mark against it. What pushes besides gravity does so from Python in dart and pybullet, before",
     "every step, and in mujoco, in every stage, where it is the pull of the sun in planetarium: there the run times of these",
     "three are Python's more than theirs. All others push in their own loop.",

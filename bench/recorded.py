@@ -59,6 +59,21 @@ def add_occasion(database: str, occasion: recorded.Occasion) -> None:
     file.write_bytes(msgspec.json.format(msgspec.json.encode([*found, occasion]), indent=1) + b"\n")
 
 
+def occasion_lines(database: str) -> list[str]:
+    """How busy the machine was, for a page; nothing where it is not known."""
+    if not database or not (file := occasions(database)).exists():
+        return []
+    newest = {one.engine: one for one in msgspec.json.decode(file.read_bytes(), type=list[recorded.Occasion])}
+    loads = [load for one in newest.values() for load in one.load]
+    busiest = max(newest.values(), key=lambda one: max(one.load))
+    return [
+        f"The machine's load was {min(loads):g} to {max(loads):g} meanwhile, highest around {busiest.engine}; all nights took "
+        f"{sum(one.seconds for one in newest.values()) / 60.0:.0f} min so.",
+        "Run times are the processor's, so that little of it is in them; limits are of processor time, errors know nothing of it.",
+        *dict.fromkeys(f"In this night {one.note}." for one in newest.values() if one.note),
+    ]
+
+
 def newest_answers(runs: Iterable[RunDocument]) -> Iterator[RunDocument]:
     """Runs of one engine, the newest first, each with those tests alone that no newer one was asked."""
     later: set[str] = set()
@@ -77,7 +92,9 @@ def newest_answers(runs: Iterable[RunDocument]) -> Iterator[RunDocument]:
 def _compared(sample: Sample) -> Sample:
     """What is compared with other engines: no bits of this machine, of the run times the repeats alone."""
     timing = sample.timing and Timing(
-        seconds=sample.timing.seconds, runs_per_repeat=sample.timing.runs_per_repeat
+        seconds=sample.timing.seconds,
+        cpu_seconds=sample.timing.cpu_seconds,
+        runs_per_repeat=sample.timing.runs_per_repeat,
     )
     return msgspec.structs.replace(sample, state_hash="", counters={}, timing=timing)
 

@@ -91,3 +91,18 @@ def test_what_was_found_is_found_once_and_not_sent_along() -> None:
     assert source.tests() is source.tests()
     assert pickle.loads(pickle.dumps(source)) == source
     assert "_tests" not in source.__getstate__()
+
+
+def test_what_a_busy_machine_adds_to_a_simulation_is_not_charged_to_its_question(
+    slow: Slow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the clock .8 s each, of the processor .1 s: eleven of them use up a second, and not two."""
+    monkeypatch.setattr(
+        slow, "simulate", lambda scene, **options: SimpleNamespace(seconds=0.8, cpu_seconds=0.1)
+    )
+    simulate = Questions(**SOURCE, limit=0.5, patience=1.0).simulate()
+    for _ in range(10):
+        simulate(0.0)
+    with pytest.raises(NoAnswer, match="not tried"):
+        for _ in range(2):
+            simulate(0.0)

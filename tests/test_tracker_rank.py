@@ -233,3 +233,25 @@ def test_an_engine_that_is_not_recorded_is_said_to_be_that(tmp_path: Path) -> No
     assert "no run of an engine 'drake' is recorded, only of spook" in ranked.stderr
     assert compared.stderr == ranked.stderr
     assert "'spook' is an engine: compare it with another one that is recorded" in mixed.stderr
+
+
+def test_the_processor_s_time_counts_where_it_is_known() -> None:
+    """An engine that a busy machine held up twice as long is no slower for it; one that does not tell keeps its clock."""
+    told = both()
+    held_up = {
+        key: (
+            definition,
+            msgspec.structs.replace(
+                sample,
+                timing=msgspec.structs.replace(
+                    sample.timing, cpu_seconds=(0.5 * min(sample.timing.seconds),)
+                ),
+            ),
+        )
+        for key, (definition, sample) in told["plain 1"].items()
+        if sample.timing is not None
+    }
+    (clock, other), (processor, same) = standings(told), standings({**told, "plain 1": held_up})
+
+    assert processor.seconds[0] == pytest.approx(0.5 * clock.seconds[0])
+    assert same.seconds == other.seconds

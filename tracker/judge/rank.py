@@ -1,7 +1,8 @@
 """Engines beside each other on the same questions: nothing is red, somebody is ahead.
 
 Read from the ladders: an engine's error at h = 1/60 and the run time it needs for a given error, each in the
-configuration that does it best. Run times of different machines are not set against each other.
+configuration that does it best. Run times are the processor's where the engine tells them: what else a machine does while
+one engine is timed is no merit of another. Those of different machines are not set against each other.
 """
 
 from __future__ import annotations
@@ -209,7 +210,7 @@ def soonest(configurations: Mapping[str, Rungs], error: float) -> tuple[float | 
     times: list[tuple[float, str]] = []
     for name, rungs in configurations.items():
         timed = [
-            (min(sample.timing.seconds), abs(sample.value))
+            (min(sample.timing.cpu_seconds or sample.timing.seconds), abs(sample.value))
             for _, sample in rungs
             if sample.outcome == "value" and sample.timing is not None and sample.timing.seconds
         ]

@@ -160,6 +160,7 @@ def _occasion(recorded: Recorded) -> dict[str, object]:
         "limits": sorted({one.limit for one in recorded.occasions}),
         "minutes": number(sum(one.seconds for one in recorded.occasions) / 60.0, 3),
         "stale": recorded.stale,
+        "notes": list(dict.fromkeys(one.note for one in recorded.occasions if one.note)),
     }
 
 

@@ -33,6 +33,7 @@ class Occasion(msgspec.Struct, frozen=True, kw_only=True):
     seconds: float  # of the whole night
     load: tuple[float, float]  # the machine's, a minute's mean, as the night began and as it ended
     limit: float  # s, of processor time, for one simulation
+    note: str = ""  # what was otherwise than a night is measured now
 
 
 @dataclass(frozen=True)
@@ -56,7 +57,7 @@ class Recorded:
 
 def read_files(folder: Path) -> Files:
     """What `make recorded` wrote there. RecordedError if it is not there or cannot be read."""
-    from spook_tracker.tracker.store.months import read_runs  # a website without such a folder needs no SQLAlchemy
+    from spook_tracker.tracker.store.months import read_runs  # without such a folder SQLAlchemy is not needed
 
     try:
         night = read_runs(folder / NIGHT)
