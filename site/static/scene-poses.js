@@ -164,3 +164,60 @@ function extentOf(movie, count = movie.count) {
   }
   return low[0] <= high[0] ? { low, high } : { low: [-1, -1, -1], high: [1, 1, 1] };
 }
+
+// --- what turns about what: read off the motion, as a recorded joint says its ends alone ---
+
+// The axis in its own frame about which a body turns all the while; null where it does not turn, or not about one.
+function axisOf(movie, body) {
+  const { orientation: o, bodies, count } = movie, stride = Math.max(1, Math.floor(count / 40));
+  if (!o) { return null; }
+  let found = null, most = 0.02;
+  const turns = [];
+  for (let sample = stride; sample < count; sample += stride) {
+    const a = 4 * body, b = 4 * (sample * bodies + body);
+    const [, x, y, z] = product([o[a], -o[a + 1], -o[a + 2], -o[a + 3]], [o[b], o[b + 1], o[b + 2], o[b + 3]]), size = Math.hypot(x, y, z);
+    if (!(size > 0.02)) { continue; }
+    turns.push([x / size, y / size, z / size]);
+    if (size > most) { most = size; found = turns.at(-1); }
+  }
+  return found && turns.every((turn) => Math.abs(turn.reduce((sum, v, k) => sum + v * found[k], 0)) > 0.999) ? found : null;
+}
+
+// Bodies that roll on each other: the ends of their joint, fixed in them, come apart while their centres keep the
+// sum of its radii. By body: radius, axis, teeth in the proportion of the radii, and the end of the joint as a mark.
+function wheelsOf(movie) {
+  const wheels = new Map(), poses = new Poses(movie, movie.position, movie.orientation), ends = [[0, 0, 0], [0, 0, 0]], centres = [[0, 0, 0], [0, 0, 0]];
+  for (const link of movie.links.slice(0, 200)) {
+    const radii = link.anchors.map((v) => Math.hypot(...v)), least = Math.min(...radii), sum = radii[0] + radii[1];
+    if (link.kind !== "joint" || link.bodies.includes(WORLD_BODY) || !(least > 0)) { continue; }
+    let apart = 0, kept = true;
+    for (let sample = 0; sample < movie.count && kept; sample += Math.max(1, Math.floor(movie.count / 40))) {
+      link.bodies.forEach((body, end) => {
+        poses.at(body, sample);
+        turnInto(ends[end], poses.q, ...link.anchors[end]);
+        for (let k = 0; k < 3; k += 1) { ends[end][k] += poses.p[k]; centres[end][k] = poses.p[k]; }
+      });
+      apart = Math.max(apart, Math.hypot(...ends[0].map((v, k) => v - ends[1][k])));
+      kept = Math.abs(Math.hypot(...centres[0].map((v, k) => v - centres[1][k])) - sum) < 0.02 * sum;
+    }
+    const axes = link.bodies.map((body) => axisOf(movie, body));
+    if (!kept || apart < 0.3 * least || axes.includes(null)) { continue; }
+    link.bodies.forEach((body, end) => {
+      if (!wheels.has(body)) { wheels.set(body, { radius: radii[end], axis: axes[end], teeth: Math.round((16 * radii[end]) / least), mark: link.anchors[end] }); }
+    });
+  }
+  return wheels;
+}
+
+// The faces of a wheel about the z-axis, half of each tooth outside its radius and half inside.
+function toothed(radius, thick, teeth) {
+  const rim = [], far = [1.06, 1.06, 0.94, 0.94], low = -thick / 2, high = thick / 2;
+  for (let i = 0; i < 4 * teeth; i += 1) {
+    const angle = (2 * Math.PI * i) / (4 * teeth), r = radius * far[i % 4];
+    rim.push([r * Math.cos(angle), r * Math.sin(angle)]);
+  }
+  return rim.flatMap(([x, y], i) => {
+    const [u, v] = rim[(i + 1) % rim.length];
+    return [[[0, 0, high], [x, y, high], [u, v, high]], [[0, 0, low], [u, v, low], [x, y, low]], [[x, y, low], [u, v, low], [u, v, high], [x, y, high]]];
+  });
+}

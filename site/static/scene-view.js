@@ -99,9 +99,10 @@ class SceneView {
 
   build() {
     const kinds = new Map();
-    const start = new Poses(this.movie, this.movie.position, this.movie.orientation);
+    const start = new Poses(this.movie, this.movie.position, this.movie.orientation), wheels = wheelsOf(this.movie);
     for (const solid of this.movie.solids) {
       if (solid.kind === "plane") { this.floor(solid); continue; }
+      if (solid.kind === "box" && wheels.has(solid.body)) { continue; }  // it stands for the inertia of the wheel
       const key = (solid.kind === "particle" ? "sphere" : ["capsule", "facets"].includes(solid.kind) ? `${solid.kind} ${solid.size}` : solid.kind) + (solid.fixed ? " fixed" : "");
       if (!kinds.has(key)) { kinds.set(key, []); }
       // The solid in the axes of its body: a compound has several that move as one.
@@ -125,6 +126,7 @@ class SceneView {
         this.solids.push({ mesh, solids, poses: this.ghost, colour: "--c1", ghost: true });
       }
     }
+    this.wheels(wheels);
     const rods = this.movie.links.filter((link) => link.kind !== "joint"), joints = this.movie.links.filter((link) => link.kind === "joint");
     const rod = new THREE.CylinderGeometry(1, 1, 1, 8).rotateX(Math.PI / 2);
     this.rods = rods.length ? { mesh: this.mesh(rod, rods.length), links: rods } : null;
@@ -146,6 +148,29 @@ class SceneView {
       this.world.add(star);
     }
     this.violationScale = (this.movie.violation || []).reduce((a, v) => Math.max(a, Math.abs(v) || 0), 0);
+  }
+
+  // Wheels with their teeth, the second in a second colour, and the axle of whatever the world holds and lets turn.
+  wheels(wheels) {
+    const add = (body, geometry, colour, offset, turn, scale) => {
+      const solids = packed([{ body, offset, turn, scale }]);
+      this.solids.push({ mesh: this.mesh(geometry, 1), solids, poses: this.poses, colour });
+    };
+    let place = 0;
+    for (const [body, { radius, axis, teeth, mark }] of wheels) {
+      const turn = aim(...axis, 1);
+      add(body, this.facesAsGeometry(toothed(radius, 0.3 * radius, teeth)), place++ % 2 ? "--c4" : "--c0", [0, 0, 0], turn, [1, 1, 1]);
+      const out = mark.map((v) => 0.45 * v);
+      add(body, new THREE.SphereGeometry(1, 16, 10), "--paper", out.map((v, k) => v + 0.13 * radius * axis[k]), [1, 0, 0, 0], [0.1 * radius, 0.1 * radius, 0.1 * radius]);
+    }
+    for (const link of this.movie.links) {
+      const end = link.kind === "joint" ? link.bodies.indexOf(WORLD_BODY) : -1, body = link.bodies[1 - end];
+      const axis = end >= 0 && this.movie.bodies <= 60 ? axisOf(this.movie, body) : null;
+      if (!axis) { continue; }
+      const reach = Math.max(0.25 * this.size, ...this.movie.solids.filter((s) => s.body === body && s.kind === "box").map((s) => 1.35 * s.size[axis.map(Math.abs).indexOf(Math.max(...axis.map(Math.abs)))]));
+      const long = link.anchors[1 - end].every((v) => Math.abs(v) < 1e-9) ? reach : 0.12 * this.size;  // of a hinge at the rim only its pin
+      add(body, new THREE.CylinderGeometry(1, 1, 1, 12).rotateX(Math.PI / 2), "--ink-3", link.anchors[1 - end], aim(...axis, 1), [0.5 * this.dot, 0.5 * this.dot, long]);
+    }
   }
 
   // Where rods and springs are held by the world.
@@ -208,8 +233,10 @@ class SceneView {
     return most.sort((a, b) => a - b)[Math.floor(most.length / 2)] || 0;
   }
 
-  facets(size) {
-    const places = facesOf(size).flatMap((face) => face.slice(2).flatMap((corner, k) => [...face[0], ...face[k + 1], ...corner]));
+  facets(size) { return this.facesAsGeometry(facesOf(size)); }
+
+  facesAsGeometry(faces) {
+    const places = faces.flatMap((face) => face.slice(2).flatMap((corner, k) => [...face[0], ...face[k + 1], ...corner]));
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(places), 3));
     geometry.computeVertexNormals();
