@@ -18,6 +18,7 @@ from spook_tracker.engine.program import Program, observations, table
 from spook_tracker.engine.quantities import requests
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.smooth import check_smooth
+from spook_tracker.engine.watch import in_time, time_left
 
 _ORIGIN = (0.0, 0.0, 0.0)
 
@@ -37,6 +38,7 @@ def compile_particles(
         loads_change=held and any(isinstance(force, Load) for force in scene.forces),
         quantities=quantities,
         observations=observations(observe),
+        time_left=time_left(),
     )
     return Program(native, time_step=time_step, bodies=tuple(bodies), observe=observe, shapes=shapes)
 
@@ -61,7 +63,7 @@ def _pack(scene: Scene, time_step: float, method: Method, bodies: Mapping[str, i
     default_damping = 2.0 * time_step / method.substeps
     positions = {body.name: body.position for body in scene.bodies}
     rows = []
-    for row in scene.constraints:
+    for row in in_time(scene.constraints):
         assert isinstance(row, Distance)  # the scene refuses joints between particles
         length = row.rest_length
         if length is None:

@@ -41,6 +41,7 @@ from spook_tracker.engine.smooth import check_rigid, check_wide_rows
 from spook_tracker.engine.surface_tables import Outlined, hull_tables, surfaces
 from spook_tracker.engine.time_functions import Ramp, Sinusoid, TimeFunction
 from spook_tracker.engine.tyres import Tyre
+from spook_tracker.engine.watch import in_time, time_left
 
 _MOTIONS = {"dynamic": "dynamic", "static": "fixed", "kinematic": "kinematic"}
 _ORIGIN: Vector = (0.0, 0.0, 0.0)
@@ -59,6 +60,7 @@ def compile_rigid(
         **pack(scene, time_step, method, held),
         quantities=quantities,
         observations=observations(observe),
+        time_left=time_left(),
     )
     names = [body.name for body in scene.bodies]
     program = Program(
@@ -112,7 +114,7 @@ def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> 
                 }
             )
     hulls: dict[Outlined, int] = {}
-    joints = [_joint(scene, constraint, bodies, step) for constraint in scene.constraints]
+    joints = [_joint(scene, constraint, bodies, step) for constraint in in_time(scene.constraints)]
     apart = [{"first": bodies[first], "second": bodies[second]} for first, second in scene.no_contact]
     apart += [
         {"first": joint["first"], "second": joint["second"]}
@@ -120,7 +122,9 @@ def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> 
         if min(joint["first"], joint["second"]) >= 0 and joint["kind"] not in ("relation", "wire")
     ]
     return {
-        "bodies": table([_body(body, push, step) for body, push in zip(scene.bodies, pushes, strict=True)]),
+        "bodies": table(
+            [_body(body, push, step) for body, push in in_time(zip(scene.bodies, pushes, strict=True))]
+        ),
         "joints": table(joints),
         **drives(scene, step),
         **couplings(scene, bodies),

@@ -5,18 +5,22 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass
+
+import numpy as np
 
 from spook_tracker.engine import check
 from spook_tracker.engine.compiler import NOTHING, compile
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.method import PLAIN, Method
 from spook_tracker.engine.model_file import ModelRun
-from spook_tracker.engine.observe import Observable
+from spook_tracker.engine.observe import Observable, Trace
 from spook_tracker.engine.program import Program
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result
 from spook_tracker.engine.scene import Scene
+from spook_tracker.engine.watch import until
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,12 +81,46 @@ def simulate(
     """
     if isinstance(scene, ModelRun):
         return _of_model(scene, time_step, duration, method, time_limit)
-    check.wall_time(time_limit)
+    limit = check.wall_time(time_limit)
     begun = time.monotonic()
-    prepared = prepare(
-        scene, time_step=time_step, duration=duration, steps=steps, method=method, observe=observe
-    )
+    try:
+        with until(begun + limit) if limit else nullcontext():
+            prepared = prepare(
+                scene, time_step=time_step, duration=duration, steps=steps, method=method, observe=observe
+            )
+    except TimeoutError:
+        return _not_compiled(scene, time_step, observe, limit, time.monotonic() - begun)
     return prepared.program.run(prepared.steps, time_limit, time_stages, since=begun)
+
+
+def _not_compiled(
+    scene: Scene, time_step: float, observe: Mapping[str, Observable], limit: float, seconds: float
+) -> Result:
+    """Of a scene whose time was over before anything could run: where its bodies are."""
+    places = {
+        body.name: np.array(
+            [*body.position, *getattr(body, "orientation", (1.0, 0.0, 0.0, 0.0)), *[np.nan] * 6]
+        )
+        for body in scene.bodies
+    }
+    nothing = np.empty(0)
+    return Result(
+        status="timed_out",
+        failure=f"the time limit of {limit:g} s was reached before step 1: the scene was still being compiled",
+        failed_body=None,
+        failed_step=1,
+        time_step=time_step,
+        steps=0,
+        seconds=seconds,
+        observables={
+            name: nothing if isinstance(what, Trace) else np.array(np.nan) for name, what in observe.items()
+        },
+        sample_times={name: nothing for name, what in observe.items() if isinstance(what, Trace)},
+        final_state=places,
+        counters={"steps": 0},
+        state_hash="",
+        stages=(),
+    )
 
 
 def _of_model(

@@ -29,6 +29,8 @@ def work(piece: str) -> str:
         return str(len(bytearray(64 << 30)))
     if piece.startswith("raise"):
         raise ValueError(piece)
+    if piece.startswith("print"):
+        os.write(1, b"LOUD\n")
     return piece.upper()
 
 
@@ -52,6 +54,13 @@ def test_who_hangs_dies_or_is_greedy_costs_its_own_piece():
     assert found["hang"] == crew.Lost("timed_out", "no answer within 1 s, so its process was ended")
     assert found["die"] == crew.Lost("crashed", "the engine's process died while answering")
     assert found["hog"] == crew.Lost("crashed", "the piece of work ran out of memory")
+
+
+def test_what_a_piece_prints_is_a_complaint(capfd: pytest.CaptureFixture[str]) -> None:
+    told(["print"])
+
+    assert "LOUD" not in (captured := capfd.readouterr()).out
+    assert "LOUD" in captured.err
 
 
 def test_an_error_of_ours_is_raised_and_ends_everything():

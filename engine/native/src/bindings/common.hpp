@@ -141,6 +141,19 @@ void bind_held(nb::module_& m, nb::class_<Program<System>>& program, const char*
                 "How a kinematic body moves from now on.");
 }
 
+/// Makes a program where Python keeps it; TimeoutError where that takes longer than `time_left` [s, 0 for no limit].
+template <class Compiled, class Scene>
+void make_in_time(Compiled* self, const Scene& scene, const std::vector<QuantityRequest>& quantities,
+                  const std::vector<Observation>& observations, double time_left) {
+    const Watch watch(time_left);
+    try {
+        new (self) Compiled(scene, quantities, observations);
+    } catch (const Stopped&) {
+        if (!PyErr_Occurred()) PyErr_SetNone(PyExc_TimeoutError);  // else it was the keyboard
+        throw nb::python_error();
+    }
+}
+
 /// A pipeline's program as a Python class; `make` is its __init__.
 template <class System, class Make, class... Extra>
 void bind_program(nb::module_& m, const char* name, const char* snapshot, const char* doc, Make make,

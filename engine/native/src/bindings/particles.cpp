@@ -50,7 +50,8 @@ void read_rows(const nb::dict& rows, ParticleScene& scene) {
 
 void make(ParticleProgram* self, const nb::dict& bodies, const nb::dict& rows, const nb::dict& springs,
           const nb::dict& fields, const Point& gravity, const nb::dict& method, bool loads_change,
-          const std::vector<QuantityRequest>& quantities, const std::vector<Observation>& observations) {
+          const std::vector<QuantityRequest>& quantities, const std::vector<Observation>& observations,
+          double time_left) {
     ParticleScene scene;
     scene.gravity = to_vec(gravity);
     scene.loads_change = loads_change;
@@ -59,7 +60,7 @@ void make(ParticleProgram* self, const nb::dict& bodies, const nb::dict& rows, c
     read_rows(rows, scene);
     scene.springs = read_springs(springs, scene.bodies.size());
     scene.fields = read_fields(fields);
-    new (self) ParticleProgram(scene, quantities, observations);
+    make_in_time(self, scene, quantities, observations, time_left);
 }
 
 }  // namespace
@@ -68,10 +69,11 @@ void bind_particles(nb::module_& m) {
     bind_program<ParticleSystem>(
         m, "ParticleProgram", "ParticleSnapshot", "A compiled scene of particles.", &make, nb::arg("bodies"),
         nb::arg("rows"), nb::arg("springs"), nb::arg("fields"), nb::arg("gravity"), nb::arg("method"),
-        nb::arg("loads_change"), nb::arg("quantities"), nb::arg("observations"),
+        nb::arg("loads_change"), nb::arg("quantities"), nb::arg("observations"), nb::arg("time_left") = 0.0,
         "Tables are dicts of columns, a row each. bodies: mass, position, velocity, load. rows and springs:\n"
         "first, second (body or -1), first_point, second_point (of ends that are no body), rest_length, and\n"
-        "compliance, damping, or stiffness, viscosity. fields: strength, centre.");
+        "compliance, damping, or stiffness, viscosity. fields: strength, centre. Raises TimeoutError where\n"
+        "making it takes longer than `time_left` [s, 0 for no limit].");
 }
 
 }  // namespace spook

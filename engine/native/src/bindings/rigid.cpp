@@ -364,7 +364,8 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
           const nb::dict& drives, const nb::dict& knots, const nb::dict& colliders,
           const nb::dict& outline_corners, const nb::dict& outline_faces, const nb::dict& no_contact,
           bool contacts, const Point& gravity, const nb::dict& method, bool loads_change,
-          const std::vector<QuantityRequest>& quantities, const std::vector<Observation>& observations) {
+          const std::vector<QuantityRequest>& quantities, const std::vector<Observation>& observations,
+          double time_left) {
     RigidScene scene;
     scene.gravity = to_vec(gravity);
     scene.loads_change = loads_change;
@@ -388,7 +389,7 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
     scene.floaters = read_colliders(floaters, outlines, scene.bodies.size(), "floaters");
     scene.colliders = read_colliders(colliders, outlines, scene.bodies.size(), "colliders");
     read_no_contact(no_contact, scene);
-    new (self) RigidProgram(scene, quantities, observations);
+    make_in_time(self, scene, quantities, observations, time_left);
 }
 
 }  // namespace
@@ -402,10 +403,12 @@ void bind_rigid(nb::module_& m) {
         nb::arg("drives"), nb::arg("knots"), nb::arg("colliders"), nb::arg("outline_corners"),
         nb::arg("outline_faces"), nb::arg("no_contact"), nb::arg("contacts"), nb::arg("gravity"),
         nb::arg("method"), nb::arg("loads_change"), nb::arg("quantities"), nb::arg("observations"),
+        nb::arg("time_left") = 0.0,
         "Tables are dicts of columns, a row each, in the names of RigidBodySpec, JointSpec and Primitive;\n"
         "outlines of hulls and meshes are numbered in the order they come;\n"
         "springs and fields as for ParticleProgram. A body is an index, -1 the world; motors, limits,\n"
-        "joint_springs and joint_frictions name the joint they drive.");
+        "joint_springs and joint_frictions name the joint they drive. Raises TimeoutError where making it takes longer\n"
+        "than `time_left` [s, 0 for no limit].");
 }
 
 }  // namespace spook
