@@ -131,6 +131,18 @@ def test_what_a_night_hands_over_rewrites_nothing_that_is_kept(kept: Kept, tmp_p
     assert len(lines) == 2
 
 
+def test_a_file_that_is_no_month_is_not_kept(kept: Kept, tmp_path: Path) -> None:
+    kept.keep(months(tmp_path / "first", night(1)))
+    before = kept.lines()
+    handed = months(tmp_path / "odd", night(2))
+    (month,) = handed.glob("*.xz")
+    month.rename(handed / "main.jsonl.xz")
+
+    with pytest.raises(AssertionError, match=r"main\.jsonl\.xz is no month"):
+        kept.keep(handed)
+    assert kept.lines() == before
+
+
 def test_a_history_that_gained_nothing_is_left_alone(kept: Kept, tmp_path: Path) -> None:
     handed = months(tmp_path / "first", night(1))
     kept.keep(handed)
