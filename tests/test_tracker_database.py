@@ -170,8 +170,8 @@ def test_a_trigger_from_elsewhere(file):
 
     for readonly in (True, False):
         refused(file, readonly=readonly, words="holds a trigger 'mine'.*; drop it")
-    with pytest.raises(DatabaseError, match="holds a trigger 'mine'"):
-        History.open(str(file))
+    with pytest.raises(DatabaseError, match="holds a trigger 'mine'"), History.open(str(file)):
+        pass
 
 
 def test_a_truncated_file(file):
