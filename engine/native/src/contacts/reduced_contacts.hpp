@@ -67,7 +67,9 @@ private:
     double residual() const;
     bool find_step(double& worst);
     bool eliminate(std::size_t m);
+    double share_to_edge(const Unit& unit) const;
     void take_step();
+    double leaves(const Unit& unit) const;
     void polish(Report& report, double goal);
     double keep_best();
     void settle(Report& report, double goal, int iterations);

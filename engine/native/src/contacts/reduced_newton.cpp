@@ -10,13 +10,14 @@ namespace spook {
 namespace {
 
 constexpr int polish_steps = 24;
-constexpr int patience = 5;      // steps without half the best residual: those that end do so sooner
-constexpr double relief = 1e-9;  // of a row's own entry of W, in Newton's matrix only: redundant points
+constexpr int patience = 8;       // steps without half the best residual: those that end do so sooner
+constexpr double enough = 1e-11;  // a residual, of the speeds: one step more, for its last digits
+constexpr double relief = 1e-9;   // of a row's own entry of W, in Newton's matrix only: redundant points
 
 }  // namespace
 
 /// The laws to first order over the working set, solved for the steps of all rows. Of rows between bounds, those that are
-/// pinned, or at a bound that they push against, stay. `worst`: of the laws in the set, m/s. False if there is no factor.
+/// pinned, or at a bound that they push against, stay; friction that is pinned slides on the edge of its disc. `worst`: of the laws in the set, m/s. False if there is no factor.
 bool ReducedContacts::find_step(double& worst) {
     const std::size_t n = static_cast<std::size_t>(rows_);
     active_.clear();
@@ -60,7 +61,7 @@ bool ReducedContacts::find_step(double& worst) {
         double d[2] = {z_[at] - u_[at] / unit.own, 0.0};
         if (unit.size == 2) d[1] = z_[at + 1] - u_[at + 1] / unit.own;
         const double size = length(d[0], d[1]);
-        if (size <= bound || !(size > 0.0)) {
+        if ((size <= bound && pinned_[at] == 0) || !(size > 0.0)) {
             for (int i = 0; i < unit.size; ++i) stay(at + i);
             continue;
         }
@@ -109,13 +110,37 @@ bool ReducedContacts::eliminate(std::size_t m) {
     return true;
 }
 
-/// Takes the step as far as the first row between bounds that reaches one: that row is pinned there.
+/// The part of the step, 1 at most, after which friction that sticks reaches the edge of its disc, |t| = mu nu; 1 if none.
+double ReducedContacts::share_to_edge(const Unit& unit) const {
+    const int at = unit.at;
+    if (place_[at] < 0 || pinned_[at] != 0) return 1.0;
+    const double mu = unit.coefficient, nu = z_[unit.normal], by = step_[unit.normal];
+    double ahead = 0.0, a = -mu * mu * by * by, b = -mu * mu * nu * by, c = -mu * mu * nu * nu;
+    for (int i = at; i < at + unit.size; ++i) {
+        const double aim = z_[i] - u_[i] / unit.own;
+        ahead += aim * aim;
+        a += step_[i] * step_[i], b += z_[i] * step_[i], c += z_[i] * z_[i];
+    }
+    if (ahead > mu * mu * nu * nu) return 1.0;  // it slides
+    c = std::min(0.0, c);                       // a s² + 2 b s + c = 0
+    const double root = b * b - a * c;
+    if (!(root >= 0.0)) return 1.0;
+    const double over = b + std::sqrt(root);
+    return over > 0.0 ? std::min(1.0, -c / over) : 1.0;
+}
+
+/// Takes the step as far as the first row between bounds that reaches one, or friction that sticks the edge of its disc: that
+/// is pinned there.
 void ReducedContacts::take_step() {
     double length_of = 1.0;
     const Unit* hit = nullptr;
     bool low = true;
     for (const Unit& unit : units_) {
-        if (unit.normal >= 0 || place_[unit.at] < 0) continue;
+        if (unit.normal >= 0) {
+            if (const double share = share_to_edge(unit); share < length_of) length_of = share, hit = &unit;
+            continue;
+        }
+        if (place_[unit.at] < 0) continue;
         const double z = z_[unit.at], by = step_[unit.at];
         for (const bool down : {true, false}) {
             const double end = down ? unit.lower : unit.upper;
@@ -125,7 +150,8 @@ void ReducedContacts::take_step() {
         }
     }
     for (const int at : active_) z_[at] += length_of * step_[at];
-    if (hit) z_[hit->at] = low ? hit->lower : hit->upper, pinned_[hit->at] = low ? -1 : 1;
+    if (hit && hit->normal >= 0) pinned_[hit->at] = 1;
+    else if (hit) z_[hit->at] = low ? hit->lower : hit->upper, pinned_[hit->at] = low ? -1 : 1;
     for (const Unit& unit : units_) {
         const int at = unit.at;
         if (unit.normal < 0) {
@@ -139,8 +165,19 @@ void ReducedContacts::take_step() {
     measure();
 }
 
+/// How fast a pinned unit moves the way that would let it go, m/s: off its bound, or along the friction on it.
+double ReducedContacts::leaves(const Unit& unit) const {
+    const int at = unit.at;
+    if (pinned_[at] == 0) return 0.0;
+    if (unit.normal < 0) return pinned_[at] * u_[at];
+    double along = 0.0, size = 0.0;
+    for (int i = at; i < at + unit.size; ++i) along += u_[i] * z_[i], size += z_[i] * z_[i];
+    return size > 0.0 ? along / std::sqrt(size) : 0.0;
+}
+
 /// Newton's method on a working set of rows, from where iterations have left it. Where points are redundant a step is
-/// long: load goes from one to another until that carries all. Keeps the best point in best_; ends on the last.
+/// long: load goes from one to another until that carries all, or more than friction bears, which then slides, be it by
+/// 1e-6 m/s. Keeps the best point in best_; ends on the last.
 void ReducedContacts::polish(Report& report, double goal) {
     pinned_.assign(static_cast<std::size_t>(rows_), 0);
     int stalled = 0;
@@ -148,16 +185,17 @@ void ReducedContacts::polish(Report& report, double goal) {
         const double best = best_residual_;
         if (keep_best() <= goal) return;
         stalled = best_residual_ < 0.5 * best ? 0 : stalled + 1;
-        if (stalled > patience) return;
+        if (stalled > (best_residual_ <= enough * speed_ ? 0 : patience)) return;
         double worst = 0.0;
         ++report.newton_steps;
         if (!find_step(worst)) return;
         // Of those pinned, the one that would leave its bound most.
         double most = 0.0;
         int of = -1;
-        for (const Unit& unit : units_)
-            if (const int at = unit.at; unit.normal < 0 && pinned_[at] != 0)
-                if (const double off = pinned_[at] * u_[at]; off > most) most = off, of = at;
+        for (const Unit& unit : units_) {
+            if (unit.normal >= 0 && !(z_[unit.normal] > 0.0)) pinned_[unit.at] = 0;
+            if (const double off = leaves(unit); off > most) most = off, of = unit.at;
+        }
         if (worst <= std::max(goal, 1e-2 * most)) {
             if (most <= goal) return;
             pinned_[of] = 0;
