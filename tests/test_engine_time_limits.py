@@ -5,6 +5,7 @@ from __future__ import annotations
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -234,8 +235,8 @@ PROMPT = (
 )  # s of processor time: asked at most ten times a second, and of two threads each has its own
 
 
-def interrupted_after(seconds: float, program: Program) -> float | None:
-    """How late a run ends [s], in processor time, after the signal of Ctrl-C; None if it ended before that.
+def interrupted_after(seconds: float, work: Callable[[], object]) -> float | None:
+    """How late it ends [s], in processor time, after the signal of Ctrl-C; None if it ended before that.
 
     The system raises the signal once this process has had so much processor time, however busy the machine is.
     """
@@ -243,7 +244,7 @@ def interrupted_after(seconds: float, program: Program) -> float | None:
     try:
         began = time.process_time()
         signal.setitimer(signal.ITIMER_PROF, seconds)
-        program.run(10**6, time_limit=600.0)
+        work()
     except KeyboardInterrupt:
         return time.process_time() - began - seconds
     finally:
@@ -252,13 +253,38 @@ def interrupted_after(seconds: float, program: Program) -> float | None:
     return None
 
 
+def long_run(program: Program) -> Callable[[], object]:
+    return lambda: program.run(10**6, time_limit=600.0)
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_the_keyboard_interrupts_a_step_at_once(name: str) -> None:
     scene, method = SCENES[name]()
-    late = interrupted_after(LIMIT, compile(scene, time_step=TIME_STEP, method=method))
+    late = interrupted_after(LIMIT, long_run(compile(scene, time_step=TIME_STEP, method=method)))
 
     assert late is not None
     assert late < PROMPT
+
+
+def test_the_keyboard_interrupts_compiling_at_once() -> None:
+    scene, method = sheet(60)
+    late = interrupted_after(3 * LIMIT, lambda: compile(scene, time_step=TIME_STEP, method=method))
+
+    assert late is not None
+    assert late < PROMPT
+
+
+def test_a_scene_that_another_thread_compiles_holds_nothing_up() -> None:
+    scene, method = sheet(60)
+    other = threading.Thread(target=compile, args=(scene,), kwargs={"time_step": TIME_STEP, "method": method})
+    began = last = time.monotonic()
+    other.start()
+    longest = 0.0
+    while other.is_alive():
+        time.sleep(0.001)
+        longest, last = max(longest, time.monotonic() - last), time.monotonic()
+
+    assert longest < 0.5 * (last - began)
 
 
 FAILS = 60  # the step that is unfit
@@ -334,7 +360,7 @@ def test_a_time_limit_holds_while_a_block_is_replayed(failing: tuple[Program, fl
 def test_the_keyboard_interrupts_a_replay(failing: tuple[Program, float]) -> None:
     program, passed = failing
     for _ in range(ATTEMPTS):
-        late = interrupted_after(1.3 * passed, program)
+        late = interrupted_after(1.3 * passed, long_run(program))
         if late is not None:
             assert late < PROMPT
             return

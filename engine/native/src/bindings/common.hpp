@@ -145,8 +145,9 @@ void bind_held(nb::module_& m, nb::class_<Program<System>>& program, const char*
 template <class Compiled, class Scene>
 void make_in_time(Compiled* self, const Scene& scene, const std::vector<QuantityRequest>& quantities,
                   const std::vector<Observation>& observations, double time_left) {
-    const Watch watch(time_left);
     try {
+        nb::gil_scoped_release release;
+        const Watch watch(time_left);
         new (self) Compiled(scene, quantities, observations);
     } catch (const Stopped&) {
         if (!PyErr_Occurred()) PyErr_SetNone(PyExc_TimeoutError);  // else it was the keyboard
