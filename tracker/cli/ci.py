@@ -23,8 +23,7 @@ from spook_tracker.tracker.cli.options import (
     example,
     executor_option,
     limit_option,
-    mutants_option,
-    recorded_option,
+    pages_options,
     recorded_runs,
     refuse_unwritable,
     source_options,
@@ -61,8 +60,7 @@ def ci() -> None:
 @workers_option
 @limit_option
 @website_options
-@mutants_option
-@recorded_option
+@pages_options
 @documents_option
 @accepted_option
 @source_options

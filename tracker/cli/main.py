@@ -26,9 +26,8 @@ from spook_tracker.tracker.cli.options import (
     example,
     executor_option,
     limit_option,
-    mutants_option,
+    pages_options,
     recorded,
-    recorded_option,
     refuse_unwritable,
     site_options,
     source_options,
@@ -176,8 +175,7 @@ def _of_engine(file: Path, name: str, names: list[str]) -> Path:
 )
 @with_database_option
 @website_options
-@mutants_option
-@recorded_option
+@pages_options
 @documents_option
 @accepted_option
 @source_options
@@ -298,8 +296,7 @@ def engines() -> None:
 )
 @with_database_option
 @website_options
-@mutants_option
-@recorded_option
+@pages_options
 @documents_option
 @accepted_option
 @database_option

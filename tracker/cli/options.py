@@ -198,28 +198,28 @@ def website_options(command: Command) -> Command:
     return command
 
 
-def mutants_option(command: Command) -> Command:
-    """--mutants FILE: a page of engines that were wrong on purpose."""
-    return click.option(
-        "--mutants",
-        metavar="FILE",
-        expose_value=False,
-        callback=_kept(),
-        type=click.Path(path_type=Path),
-        help="Record of engines wrong on purpose, for a page of the website.",
-    )(command)
-
-
-def recorded_option(command: Command) -> Command:
-    """--recorded DIR: nights of other engines, measured elsewhere."""
-    return click.option(
-        "--recorded",
-        metavar="DIR",
-        expose_value=False,
-        callback=_kept(),
-        type=click.Path(exists=True, file_okay=False, path_type=Path),
-        help="Recorded nights of other engines, as `make recorded` writes them, for pages of the website.",
-    )(command)
+def pages_options(command: Command) -> Command:
+    """--mutants FILE and --recorded DIR: pages of what was measured before, and elsewhere."""
+    for option in (
+        click.option(
+            "--recorded",
+            metavar="DIR",
+            expose_value=False,
+            callback=_kept(),
+            type=click.Path(exists=True, file_okay=False, path_type=Path),
+            help="Recorded nights of other engines, as `make recorded` writes them, for pages of the website.",
+        ),
+        click.option(
+            "--mutants",
+            metavar="FILE",
+            expose_value=False,
+            callback=_kept(),
+            type=click.Path(path_type=Path),
+            help="Record of engines wrong on purpose, for a page of the website.",
+        ),
+    ):
+        command = option(command)
+    return command
 
 
 def _with_first_page(folder: Path | None) -> None:
