@@ -151,7 +151,7 @@ aa: develop
 bench: develop
 	$(BIN)/python bench/run.py
 
-# Every engine that can be had on every scene, and the page that says who is first where; TESTS="door pendulum": those alone.
+# Every engine that can be had on every scene, and the page that says which is first where; TESTS="door pendulum": those alone.
 engines engine-releases: export TRACKER_NODE_MODULES ?= $(CURDIR)/build/engines/node_modules
 engines: develop
 	.ci/engines all

@@ -44,7 +44,7 @@ class Place:
 
 
 def places(timed: Mapping[str, ranks.Samples]) -> list[Place]:
-    """All races, with who can be asked each."""
+    """All races, with the engines that can be asked each."""
     askable: dict[tuple[str, str], set[str]] = {}
     for name, told in timed.items():
         for definition, sample in told.values():
@@ -61,7 +61,7 @@ def choice(run: Sequence[Place]) -> list[str]:
     engines = sorted({name for one in run for name in one.askable}, key=lambda name: (name != OURS, name))
     rows = []
     for name in engines:
-        here = [(one.race, time) for one in run for time, who in one.race.order if who == name]
+        here = [(one.race, time) for one in run for time, engine in one.race.order if engine == name]
         how = Counter(one.how for one in run if one.first == name)
         near = sum(race.order[0][0] < time <= 10.0 * race.order[0][0] for race, time in here)
         reached = [sum(race.error == error for race, _ in here) for error in ranks.ERRORS]
@@ -70,7 +70,7 @@ def choice(run: Sequence[Place]) -> list[str]:
     return [
         "## Which engine comes how far",
         "",
-        f"Of {len(run)} places (a scene at an error that somebody reaches): at how many an engine can be asked; how often it is",
+        f"Of {len(run)} places (a scene at an error that an engine reaches): at how many an engine can be asked; how often it is",
         "first of several that come within the error, the only one to come so near though others can be asked, or the only one",
         "that can be asked, which is no victory; how often it takes up to ten times as long as the first; and on how many",
         "scenes it comes within each error at all.",
@@ -107,7 +107,7 @@ def single(run: Sequence[Place]) -> list[str]:
         finest = [
             f"{one.race.test}, {one.race.ladder.replace('_', ' ')}"
             for one in run
-            if one.race.error == min(ranks.ERRORS) and name in {who for _, who in one.race.order}
+            if one.race.error == min(ranks.ERRORS) and name in {engine for _, engine in one.race.order}
         ]
         if asked:
             where = f" ({'; '.join(finest)})" if finest else ""
@@ -119,12 +119,12 @@ def single(run: Sequence[Place]) -> list[str]:
 
 
 def first(run: Sequence[Place]) -> list[str]:
-    """Scene by scene: who comes within an error first, in what time, and what the next needs."""
+    """Scene by scene: which engine comes within an error first, in what time, and what the next needs."""
     lines = [
         "## Who is first",
         "",
         "Run time to come within an error, in the setting named; in brackets how much longer the next engine takes. *Alone*:",
-        "others can be asked and do not come so near. *Only one asked*: nobody else has what the scene needs.",
+        "others can be asked and do not come so near. *Only one asked*: no other has what the scene needs.",
         "",
         "| scene | " + " | ".join(f"{error:g}" for error in ranks.ERRORS) + " |",
         "|---|" + "---|" * len(ranks.ERRORS),
@@ -139,7 +139,7 @@ def first(run: Sequence[Place]) -> list[str]:
         setting = f" ({race.settings[0]})" if race.settings and race.settings[0] else ""
         scenes.setdefault(scene, {})[race.error] = f"{name}{setting} {seconds(best)} ({further})"
     for scene, cells in scenes.items():
-        lines.append(f"| {scene} | {' | '.join(cells.get(error, 'nobody') for error in ranks.ERRORS)} |")
+        lines.append(f"| {scene} | {' | '.join(cells.get(error, 'none') for error in ranks.ERRORS)} |")
     kinds = {"won": "first of several", "alone": "the only one so near", "unasked": "the only one asked"}
     told = []
     for how, words in kinds.items():

@@ -1,4 +1,4 @@
-"""Every engine that is installed on every scene, and the page that says who is first where, and where we are behind.
+"""Every engine that is installed on every scene, and the page that says which is first where, and where we are behind.
 
     python bench/engines.py --db sqlite:///build/engines.db --page docs/engines.md
     python bench/engines.py --db sqlite:///build/engines.db --page docs/engines.md --only-page
@@ -79,8 +79,8 @@ def measure(
     """A run with ladders of each engine, and one of the facts, recorded each in its own; says how long both took.
 
     Ours and the others have one budget: `limit` [s] a simulation, and as much for those of a ladder in one setting.
-    Of `tests` alone if there are any, and no facts then. After so many minutes what is finished is recorded, and who is
-    left is named.
+    Of `tests` alone if there are any, and no facts then. After so many minutes what is finished is recorded, and which
+    engines are left is said.
     """
     ends = time.monotonic() + 60.0 * minutes
 
@@ -354,7 +354,7 @@ def _treatment(samples: Mapping[str, ranks.Samples]) -> list[str]:
 READING = (
     "An engine is asked in two or three settings (`tracker engines` says which and why); the best of them counts. A *scene*",
     "is one quantity of one scalar test, its *error* the distance from a closed form or a reference of known accuracy, its",
-    "*run time* the processor's for the engine's own steps in one thread, models built before. *First* is who comes within an",
+    "*run time* the processor's for the engine's own steps in one thread, models built before. *First* is which comes within an",
     "error soonest, whatever step that takes. What an engine cannot be asked (a joint, a shape, a force it does not show) is not",
     "supported, by name, and no mark against it. What pushes besides gravity does so from Python in dart and pybullet, before",
     "every step, and in mujoco, in every stage, where it is the pull of the sun in planetarium: there the run times of these",
@@ -449,7 +449,7 @@ def main(arguments: list[str]) -> int:
         help="s of one simulation of any engine, and of a ladder's together",
     )
     parser.add_argument("--minutes", type=float, default=math.inf, help="in which all have to be asked")
-    parser.add_argument("--missing", action="store_true", help="ask only whom the database has no run of")
+    parser.add_argument("--missing", action="store_true", help="ask only those the database has no run of")
     parser.add_argument(
         "--facts", action="store_true", help="ask for what kinds of engines do, and nothing else"
     )

@@ -103,7 +103,7 @@ class Row:
 
 @dataclass(frozen=True)
 class Use:
-    """One use: who is soonest at each error, and every engine."""
+    """One use: which is soonest at each error, and every engine."""
 
     title: str
     anchor: str

@@ -1,4 +1,4 @@
-"""Engines beside each other, and a page for each of the others: nothing here is red, somebody is ahead."""
+"""Engines beside each other, and a page for each of the others: nothing here is red, some are ahead."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def _untimed(sample: Sample) -> Sample:
 
 
 def engines(book: Book, recorded: Recorded | None = None, path: str = ENGINES, beside: str = "") -> Page:
-    """Who answers what, and who is ahead at equal error: tonight, or in the recorded night with ours of tonight beside.
+    """What each answers, and which is ahead at equal error: tonight, or in the recorded night with ours of tonight beside.
 
     `beside` is the other of the two pages, where there are both.
     """
@@ -171,7 +171,7 @@ def _title(chapter: Chapter) -> str:
 def _card(
     name: str, chapter: Chapter, address: str, told: Sequence[Any], found: Sequence[Standing]
 ) -> dict[str, Any]:
-    """One engine: what it answers, and how often nobody is quicker."""
+    """One engine: what it answers, and how often none is quicker."""
     mine = [answer for _, of_gate in told for answer in of_gate if answer.engine == name]
     supported = [a for a in mine if a.sample is not None and a.sample.outcome != "not_supported"]
     first = Counter(race.error for race in races(found) if race.order[0][1] == name)
