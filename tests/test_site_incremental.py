@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import pytest
@@ -16,7 +19,7 @@ from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.remove import remove
 from spook_tracker.tracker.website.options import SiteOptions
 from spook_tracker.tracker.website.publish import publish
-from tests.synthetic_history import DocumentHistory, engine
+from tests.synthetic_history import DocumentHistory, document, engine, of_test, rival
 from tests.test_tracker_one_judge import night, one
 
 NIGHTS = [night(n, one(0.1 if n < 3 else 0.3 if n < 6 else 0.5)) for n in range(8)]  # worse on two nights
@@ -116,6 +119,101 @@ def test_a_database_that_grew_and_shrank_gives_the_site_of_what_it_holds(tmp_pat
     published("put back with another value")
     record(NIGHTS[-1], url)
     published("one more night")
+
+
+def of_many(number: int, *tests: str, days: int = 27) -> RunDocument:
+    """A night with ladders, run times, figures and maps, of these tests; the month ends after the fourth."""
+    run = document(number, broken=3)
+    parts = [of_test(run, test) for test in tests]
+    moved = {
+        end: (datetime.fromisoformat(getattr(run, end)) + timedelta(days=days)).isoformat()
+        for end in ("started", "finished")
+    }
+    return replace(
+        run,
+        series=sum((part.series for part in parts), ()),
+        samples=sum((part.samples for part in parts), ()),
+        tests=sum((part.tests for part in parts), ()),
+        figures=tuple(f for f in run.figures if f.test in tests),
+        maps=tuple(m for m in run.maps if m.test in tests),
+        **moved,
+    )
+
+
+def renamed(run: RunDocument, old: str, new: str) -> RunDocument:
+    """The test under its new name, which says what it was called formerly."""
+
+    def key(text: str) -> str:
+        return f"{new}/{text.removeprefix(old + '/')}" if text.startswith(f"{old}/") else text
+
+    return replace(
+        run,
+        series=tuple(
+            replace(d, test=new, key=key(d.key), aliases=(d.key,)) if d.test == old else d for d in run.series
+        ),
+        samples=tuple(replace(s, series=key(s.series)) for s in run.samples),
+        tests=tuple(replace(c, name=new) if c.name == old else c for c in run.tests),
+        figures=tuple(replace(f, test=new) if f.test == old else f for f in run.figures),
+    )
+
+
+def crashed(run: RunDocument, test: str) -> RunDocument:
+    why = {"outcome": "crashed", "passed": False, "set_point_held": False, "failure": "it crashed"}
+    return replace(
+        run,
+        samples=tuple(
+            replace(s, value=Number(math.nan), timing=None, **why) if s.series.startswith(f"{test}/") else s
+            for s in run.samples
+        ),
+    )
+
+
+def other(version: str) -> RunDocument:
+    return replace(rival(version), trigger="import", tracker_version="0.1")
+
+
+def test_nights_of_every_kind_one_after_the_other_give_the_site_of_all_at_once(tmp_path: Path) -> None:
+    """A test appears, one is renamed, one crashes, one is gone; a night comes late, and two releases of another engine,
+    the older one later; the month changes. After every step, as from nothing."""
+    url, grown = f"sqlite:///{tmp_path / 'tracker.db'}", tmp_path / "grown"
+    steps = {
+        "the first": of_many(0, "friction", "door"),
+        "a test appears": of_many(2, "friction", "door", "pendulum"),
+        "another engine": other("3.10"),
+        "a value is worse": of_many(3, "friction", "door", "pendulum"),
+        "a test is renamed, in another month": renamed(
+            of_many(4, "friction", "door", "pendulum"), "door", "gate"
+        ),
+        "a night comes late": of_many(1, "friction", "door"),
+        "a test crashes": crashed(
+            renamed(of_many(5, "friction", "door", "pendulum"), "door", "gate"), "pendulum"
+        ),
+        "an older release": other("3.9"),
+        "a test is gone": of_many(6, "friction", "pendulum"),
+    }
+    for number, (step, run) in enumerate(steps.items()):
+        record(run, url)
+        with History.open(url) as history:
+            publish(history, grown)
+            publish(history, tmp_path / str(number))
+        assert files(grown) == files(tmp_path / str(number)), step
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        pytest.param(Path.unlink, id="gone"),
+        pytest.param(lambda file: file.write_bytes(file.read_bytes()[:-1]), id="cut short"),
+    ],
+)
+def test_a_damaged_file_is_written_again(damage: Callable[[Path], object], tmp_path: Path) -> None:
+    publish(DocumentHistory(NIGHTS), tmp_path)
+    whole = files(tmp_path)
+    for name in ("index.html", "data/t.csv", "feed.xml"):
+        damage(tmp_path / name)
+
+    assert publish(DocumentHistory(NIGHTS), tmp_path).written == 3
+    assert files(tmp_path) == whole
 
 
 def test_the_first_bad_run_imported_late_is_blamed_on_the_page_of_comparisons(tmp_path: Path) -> None:

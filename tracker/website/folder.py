@@ -1,7 +1,7 @@
 """The folder of the website: built beside the old one and swapped in, so that a reader never meets a half one.
 
-A marker file says that the folder is ours and from what each file was made. A folder without it is never
-touched. A file whose source is unchanged keeps its bytes and its time.
+A marker file says that the folder is ours, from what each file was made and how long it is. A folder without it is
+never touched. A file whose source is unchanged keeps its bytes and its time; one that was cut short is made again.
 """
 
 from __future__ import annotations
@@ -36,14 +36,15 @@ class Folder:
 
     old: Path
     new: Path
-    known: dict[str, str]  # path to digest, of the old one
+    known: dict[str, str]  # path to digest and size, of the old one
     made: dict[str, str] = field(default_factory=dict)
     written: int = 0
     skipped: int = 0
 
     def unchanged(self, path: str, digest: str) -> bool:
-        """Whether the old site has the file, made from the same."""
-        return self.known.get(path) == digest and (self.old / path).is_file()
+        """Whether the old site has the whole file, made from the same."""
+        before = self.old / path
+        return before.is_file() and self.known.get(path) == _mark(digest, before)
 
     def add(self, path: str, digest: str, make: Callable[[], bytes]) -> None:
         """Put a file in place: the old one if it was made from the same, else what `make` gives."""
@@ -70,7 +71,8 @@ def replacing(out: Path) -> Iterator[Folder]:
         new.mkdir()
         folder = Folder(out, new, known)
         yield folder
-        marker = {"made_by": "tracker publish", "files": dict(sorted(folder.made.items()))}
+        files = {path: _mark(made, new / path) for path, made in sorted(folder.made.items())}
+        marker = {"made_by": "tracker publish", "files": files}
         (new / MARKER).write_text(json.dumps(marker, indent=0) + "\n", encoding="utf-8")
         _swap(new, out)
     except OSError as error:
@@ -114,6 +116,10 @@ def _known(out: Path) -> dict[str, str]:
             f"{out} holds files that this tracker did not write; choose an empty folder with --out"
         ) from None
     return {str(path): str(made) for path, made in files.items()}
+
+
+def _mark(digest: str, file: Path) -> str:
+    return f"{digest} {file.stat().st_size}"
 
 
 def _keep(before: Path, target: Path) -> None:
