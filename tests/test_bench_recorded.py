@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import lzma
+import re
 from pathlib import Path
 from typing import Any
 
@@ -66,6 +68,12 @@ def test_the_recorded_night_asks_what_the_catalogue_asks() -> None:
     assert {one.engine for one in files.occasions} == {run.engine.name for run in files.night}
     assert all(not (run.figures or run.maps or run.trajectories) for run in (*files.night, *files.releases))
     assert sum(file.stat().st_size for file in recorded.FOLDER.iterdir()) <= 4_000_000
+
+
+def test_no_recorded_file_names_a_place_of_the_machine() -> None:
+    for file in sorted(recorded.FOLDER.iterdir()):
+        content = lzma.decompress(file.read_bytes()) if file.suffix == ".xz" else file.read_bytes()
+        assert re.findall(rb"(?<![\w./:~-])/\w[\w.-]*/[\w./-]+", content) == [], file.name
 
 
 def test_the_workflow_measures_all_engines_beside_the_night_and_shows_the_newest_such_night() -> None:

@@ -6,6 +6,7 @@ The whole motion is one call of its solver; positions, rotations and velocities 
 from __future__ import annotations
 
 import math
+import re
 import time
 import warnings
 from importlib.metadata import version
@@ -29,6 +30,7 @@ exudyn.config.printToConsole = False  # it tells of every solve that fails, by t
 exudyn.config.suppressWarnings = True
 SOLVERS = exudyn.DynamicSolverType
 SEEN = exudyn.OutputVariableType
+CALLER = re.compile(r"\[Python file [^\]]*\]")  # where this file is on the machine: no part of the reason
 
 
 class Exudyn:
@@ -176,7 +178,7 @@ class _Run:
             )
             failure = "" if solved else "its solver did not converge"
         except Exception as error:  # what the solver could not do is an outcome
-            failure = " ".join(str(error).split())[:200]
+            failure = " ".join(CALLER.sub("", str(error)).split())[:200]
         self.seconds, self.cpu_seconds = time.perf_counter() - began, time.process_time() - worked
         if late := time.process_time() >= end:
             failure = f"the time limit of {task.time_limit:g} s was reached"
