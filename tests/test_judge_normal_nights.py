@@ -11,7 +11,7 @@ import pytest
 from scipy import stats
 
 from spook_tracker.tracker.document.run_document import Point, Timing
-from spook_tracker.tracker.judge import normal_nights, series_history, shifts
+from spook_tracker.tracker.judge import normal_nights, run_times, series_history, shifts
 from spook_tracker.tracker.judge.normal_nights import chance, independent_and_normal
 from spook_tracker.tracker.judge.run_times import judge_noisy, judged_and_segments
 from tests import noise_battery as battery
@@ -155,13 +155,48 @@ def test_two_clusters_are_learnt_in_a_month_whatever_segments_they_seemed_to_mak
 def test_nights_drawn_from_two_levels_are_told_from_a_step_and_from_visits() -> None:
     nights = battery.noise("clusters 8 % apart, 50/50", 1, 40)
     drawn = sum(
-        shifts.drawn_anew(battery.noise("clusters 8 % apart, 50/50", series, 40)) for series in range(200)
+        shifts.drawn_anew(battery.noise("clusters 8 % apart, 50/50", series, 40), 4) for series in range(200)
     )
 
-    assert drawn >= 180  # nineteen in twenty
-    assert not shifts.drawn_anew(np.sort(nights))  # a step
-    assert not shifts.drawn_anew(battery.visits(5, 1.08)(battery.generator("visits", 1), 40))
-    assert not shifts.drawn_anew(battery.noise("Gauss 1 %", 1, 40))
+    assert drawn >= 180
+    assert shifts.drawn_anew(nights, 4)
+    assert not shifts.drawn_anew(np.sort(nights), 4)  # a step
+    assert not shifts.drawn_anew(battery.visits(5, 1.08)(battery.generator("visits", 1), 40), 4)
+    assert not shifts.drawn_anew(battery.noise("Gauss 1 %", 1, 40), 4)
+    for change in (0.95, 1.05):  # neither level is where the last nights lie
+        assert not shifts.drawn_anew(np.concatenate([nights[:36], change * nights[36:]]), 4)
+
+
+def test_five_per_cent_is_found_where_weekends_are_slower_as_where_no_two_levels_are_joined(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Two nights in seven 8 % slower are not drawn anew; joined as such they hid a step that lies between the levels."""
+
+    def found() -> int:
+        count = 0
+        for series in range(40):
+            draws, place = battery.generator("weekends", series), np.arange(80)
+            values = battery.gauss(0.01)(draws, 80) * np.where(place % 7 > 4, 1.08, 1.0)
+            values[63:] *= 1.05
+            told = judge_noisy(list(map(float, values)))
+            count += any(night.news for night in told[63:75])
+        return count
+
+    joined = found()
+    monkeypatch.setattr(run_times, "drawn_anew", lambda nights, last: False)
+
+    assert joined >= found() >= 10
+
+
+def test_a_red_of_two_clusters_that_both_moved_stays_red() -> None:
+    """+3 %, clusters 8 % apart: the nights of both clusters fall into two again, and yet are no draws of the old ones."""
+    kept = 0
+    for series in range(40):
+        values = battery.clusters(0.5, 1.08)(battery.generator("both moved", series), 100)
+        values[60:] *= 1.03
+        kept += sum(night.state == "detected" for night in judge_noisy(list(map(float, values)))[60:])
+
+    assert kept >= 15 * 40
 
 
 def test_a_step_and_its_mending_and_a_step_again_are_no_draws() -> None:

@@ -237,7 +237,10 @@ class _Walk(DriftingLevel):
         return None
 
     def _of_two_levels(self, value: float, found: tuple[int, Shift | None] | None) -> int | None:
-        """The first of nights that are drawn anew from two levels, where such nights would begin or keep a segment."""
+        """Which segment's nights and all after them are drawn anew from two levels, where such would begin or keep one.
+
+        As a place in `over`, behind whose end lies the present segment.
+        """
         if found is None:
             if self.reference is None or self.now.standing != "red":
                 return None
@@ -250,24 +253,30 @@ class _Walk(DriftingLevel):
             return None  # more of them than chance draws from one
         import numpy as np
 
-        level = [s.first for s in self.over if s.first >= self.start and s.standing in ("usual", "accepted")]
-        begun = [*level, self.now.places[0]]
-        for first in begun[: None if found else -1]:
-            costs = self._costs(
-                [i for i in range(max(first, self.until - BASE), self.until) if self._number(i)]
-            )
-            within = not self.off or min(costs[-len(self.off) :]) <= max(costs[: -len(self.off)], default=0.0)
-            if within and len(costs) >= FEWEST_BASE and drawn_anew(np.array(costs)):
-                return first
+        begun = [
+            (place, segment.first)
+            for place, segment in enumerate(self.over)
+            if segment.first >= self.start and segment.standing in ("usual", "accepted")
+        ]
+        if found:
+            begun.append((len(self.over), self.now.places[0]))
+        asked = found[0] if found else len(self.now.places) + len(self.off)  # of the last nights
+        for place, first in begun:
+            nights = [i for i in range(max(first, self.until - BASE), self.until) if self._number(i)]
+            if len(nights) >= max(FEWEST_BASE, asked + 1) and drawn_anew(
+                np.array(self._costs(nights)), asked
+            ):
+                return place
         return None
 
-    def _drawn_anew(self, place: int, first: int) -> Noisy:
+    def _drawn_anew(self, place: int, segment: int) -> Noisy:
         """Segments that nights drawn anew from two levels seemed to make are one."""
         held, _ = self.held_to()
+        joined = self.over[segment:]
+        first = joined[0].first if joined else self.now.places[0]
         nights = [i for i in range(self.start, self.until) if self._number(i)]
-        joined = [segment for segment in self.over if segment.first >= first]
         if joined:
-            self.over = self.over[: -len(joined)]
+            del self.over[segment:]
             before = [i for i in nights if i < first][-WINDOW:]
             self.now = Growing([], joined[0].standing, before, joined[0].boundary)
             self.reference, self.first = None, None

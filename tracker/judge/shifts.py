@@ -40,9 +40,8 @@ CHANCE = 2.6  # standard deviations of an autocorrelation that is none
 APART = (
     5.0  # standard deviations inside two clusters between their middles; noise of one hump cut in two shows 3
 )
-OFTEN_ENOUGH = (
-    1.645  # standard deviations: one in twenty of nights drawn anew change their cluster less often
-)
+OFTEN_ENOUGH = 1.5  # standard deviations: one in fifteen draws changes cluster less often; slow weekends do
+NEAR_ENOUGH = 3.0  # the same of squared distances from the nearer cluster
 FEWEST_CLUSTER, SMALLEST_CLUSTER = 6, 0.1  # nights, and share of all, in the smaller cluster
 
 
@@ -129,15 +128,23 @@ def clusters(base: Values) -> tuple[float, float] | None:
     return middles if middles[1] - middles[0] > APART * inside else None
 
 
-def drawn_anew(nights: Values) -> bool:
-    """Whether nights fall into two clusters at random: as often from one to the other as chance goes (Wald and Wolfowitz 1940)."""
+def drawn_anew(nights: Values, last: int) -> bool:
+    """Whether nights fall into two clusters at random, and the last so many lie as near to the nearer one as the others.
+
+    At random: as often from one to the other as chance goes (Wald and Wolfowitz 1940). A change moves both clusters.
+    """
     if (split := clusters(nights)) is None:
         return False
-    slow = nights - split[0] > split[1] - nights
+    low, high = nights - split[0], nights - split[1]
+    slow = low > -high
     count, of_them = len(slow), float(slow.sum())
     changes = 2.0 * of_them * (count - of_them) / count
     spread = math.sqrt(changes * (changes - 1.0) / (count - 1))
-    return float((slow[1:] != slow[:-1]).sum()) > changes - OFTEN_ENOUGH * spread
+    if float((slow[1:] != slow[:-1]).sum()) <= changes - OFTEN_ENOUGH * spread:
+        return False
+    squares = (low * ~slow + high * slow) ** 2
+    wide = 1.0 + NEAR_ENOUGH * math.sqrt(2.0 / last)
+    return float(squares[-last:].mean()) <= wide * float(squares[:-last].mean())
 
 
 def _scatter(values: Values) -> float:
