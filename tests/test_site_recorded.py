@@ -69,6 +69,7 @@ def test_recorded_run_times_are_set_beside_recorded_ones_alone(site: Path) -> No
     gates = table(site, "engines.html", "A line for each gate")["Door on hinges Largest door deviation"]
     assert gates[1] == gates[3] != "not asked"
     assert errors["Scene"] == times["Scene"]
+    assert "Where another engine is ahead of spook 0.1.0<" in (site / "engines.html").read_text()
 
 
 def test_the_page_of_a_recorded_engine_names_the_recorded_release_of_a_change(site: Path) -> None:
@@ -93,6 +94,16 @@ def test_engines_that_were_asked_tonight_stand_first_and_the_recorded_night_besi
     assert 'href="recorded.html"' in (site / "engines.html").read_text(encoding="utf-8")
     assert lines(site, "recorded.html", "A line for each gate")[0][2:4] == ["spook 0.1.0", "rival 3.2"]
     assert 'href="../recorded.html"' in (site / "recorded" / "rival.html").read_text(encoding="utf-8")
+
+
+def test_a_recorded_night_without_our_engine_puts_no_other_in_its_place(tmp_path: Path) -> None:
+    """Only ours is held to limits, and it is behind or ahead only where it was timed."""
+    folder = recorded(tmp_path / "files", rival("3.3"))
+    site = published(tmp_path / "public", history(2), folder)
+    text = (site / "engines.html").read_text(encoding="utf-8")
+
+    assert "only spook 0.1.1 tonight is held to any" in text
+    assert "is ahead of" not in text
 
 
 def test_a_test_that_is_asked_otherwise_by_now_is_left_out_by_name(tmp_path: Path) -> None:

@@ -95,18 +95,19 @@ def engines(book: Book, recorded: Recorded | None = None, path: str = ENGINES, b
     titles = [_title(chapter) for chapter in chapters]
     if recorded is not None:
         titles[-1] += " tonight"
+    by_title = dict(zip(titles, chapters, strict=True))
+    ours = next(title for title, chapter in by_title.items() if chapter.name == book.name)
+    untimed = [  # of another machine, or tonight's own beside recorded ones
+        title
+        for title, chapter in by_title.items()
+        if chapter.tonight.machine.fingerprint != machine or (recorded is not None and chapter is book)
+    ]
     asked: dict[str, Samples] = {
-        title: samples_of(chapter, timed=_alike(chapter, machine, book if recorded else None))
-        for title, chapter in zip(titles, chapters, strict=True)
+        title: samples_of(chapter, timed=title not in untimed) for title, chapter in by_title.items()
     }
     gates = [(test, trend.definition) for test in book.tests for trend in test.gates()]
     told = answers([definition for _, definition in gates], asked)
     found = standings(asked)
-    untimed = [
-        title
-        for title, chapter in zip(titles, chapters, strict=True)
-        if not _alike(chapter, machine, book if recorded else None)
-    ]
     folder = "engines" if recorded is None else "recorded"
     addresses = [
         "index.html" if chapter.name == book.name else engine_address(chapter.name, folder)
@@ -134,15 +135,11 @@ def engines(book: Book, recorded: Recorded | None = None, path: str = ENGINES, b
             for (test, _), (definition, of_gate) in zip(gates, told, strict=True)
         ],
         "ranks": list(_ranks(found, book, untimed)),
-        "behind": _behind(found, titles[0], book),
+        "ours": ours,
+        "behind": None if ours in untimed else _behind(found, ours, book),
         "elsewhere": untimed,
     }
     return Page(path, "engines.html", "Engines", "The same questions to other engines.", context, plotly=True)
-
-
-def _alike(chapter: Chapter, machine: str, tonight: Book | None) -> bool:
-    """Whether the run times of a chapter stand beside those of the machine; tonight's never beside recorded ones."""
-    return chapter is not tonight and chapter.tonight.machine.fingerprint == machine
 
 
 def _occasion(recorded: Recorded) -> dict[str, object]:
