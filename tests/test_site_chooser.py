@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import re
 from importlib.metadata import PackageNotFoundError, metadata
 from pathlib import Path
 
@@ -9,10 +11,12 @@ import pytest
 
 from spook_tracker.engine import find
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.tracker.document.run_document import OutcomeClass, Sample, SeriesDefinition, Timing
+from spook_tracker.tracker.document.wording import seconds as within
 from spook_tracker.tracker.store.documents import DocumentHistory
-from spook_tracker.tracker.website.page_chooser import FACTS, USES, half
+from spook_tracker.tracker.website.page_chooser import FACTS, USES, half, uses
 from spook_tracker.tracker.website.publish import publish
-from tests.synthetic_history import history, rival
+from tests.synthetic_history import history, rival, sample, series
 from tests.test_site_engines import table
 
 
@@ -51,6 +55,42 @@ def test_the_first_answer_names_the_soonest_engines_and_below_what_each_cannot_b
     assert every["spook 0.1.2"][3:7] == ["none failed", "-", "64 bits", "MIT"]
 
 
+def rungs(test: str, *seconds: float | OutcomeClass) -> dict[str, tuple[SeriesDefinition, Sample]]:
+    """A ladder: the seconds of a rung within every error, or what became of it."""
+    found = {}
+    for place, told in enumerate(seconds):
+        definition = series(test, "ladder:error", kind="ladder", time_step=0.01 * (place + 1))
+        found[definition.key] = (
+            definition,
+            (
+                sample(definition, math.nan, outcome=told)
+                if isinstance(told, str)
+                else sample(definition, 1e-6, timing=Timing(seconds=(told,), runs_per_repeat=1))
+            ),
+        )
+    return found
+
+
+def test_what_an_engine_cannot_be_asked_takes_for_ever_and_is_named() -> None:
+    """Two scenes count: the third only one engine can be asked."""
+    cannot: OutcomeClass = "not_supported"
+    asked = {
+        "one": rungs("friction", 1.0) | rungs("grasp", 2.0) | rungs("grain", 3.0),
+        "two": rungs("friction", 3.0, "timed_out") | rungs("grasp", 4.0, "crashed") | rungs("grain", cannot),
+        "three": rungs("friction", cannot) | rungs("grasp", 0.5) | rungs("grain", cannot),
+    }
+    (use,) = uses(asked, {name: (f"{name}.html", name) for name in asked}, {"friction": "Friction"})
+    lines = {line.engine: line for line in use.lines}
+
+    assert use.count == 2
+    assert list(lines) == ["one", "two", "three"], "the most scenes first, then the soonest"
+    assert {name: line.times[0] for name, line in lines.items()} == {
+        "one": (within(1.0), 2), "two": (within(3.0), 2), "three": (within(0.5), 1),
+    }  # fmt: skip
+    assert lines["three"].lacking == (("Friction", "tests/friction.html"),)
+    assert [line.worst for line in use.lines] == ["none failed", "crashed on 1", "none failed"]
+
+
 def test_every_engine_has_its_facts_and_the_licence_that_its_package_names() -> None:
     assert FACTS.keys() == {"spook", *find.EXTRAS, *find.NODE, *find.BUILT}
     for name, package in find.EXTRAS.items():
@@ -59,4 +99,5 @@ def test_every_engine_has_its_facts_and_the_licence_that_its_package_names() -> 
         except PackageNotFoundError:
             continue
         words = f"{said.get('License')} {said.get('License-Expression')} {said.get_all('Classifier')}".lower()
-        assert FACTS[name].licence.lower().split()[0].split("-")[0] in words, name
+        licence = FACTS[name].licence.lower().split()[0].split("-")[0]
+        assert re.search(rf"\b{licence}\b", words), name

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import lzma
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +46,7 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Three nights of ours alone, and a recorded night of two engines."""
     place = tmp_path_factory.mktemp("recorded")
     folder = recorded(
-        place / "files", document(0), rival("3.3"), releases=(rival("3.1", door=0.25), rival("3.2"))
+        place / "files", document(0), rival("3.3"), releases=(rival("3.10"), rival("3.9", door=0.25))
     )
     return published(place / "public", history(3), folder)
 
@@ -72,12 +73,21 @@ def test_recorded_run_times_are_set_beside_recorded_ones_alone(site: Path) -> No
     assert "Where another engine is ahead of spook 0.1.0<" in (site / "engines.html").read_text()
 
 
+def test_another_night_of_the_same_machine_is_not_set_beside_tonights_times(tmp_path: Path) -> None:
+    folder = recorded(tmp_path / "files", document(0), rival("3.3"))
+    write_runs(folder / NIGHT, [document(0), msgspec.structs.replace(rival("3.3"), trigger="manual")])
+    site = published(tmp_path / "public", history(3), folder)
+
+    times = table(site, "engines.html", "Run time to an error of 10⁻²")
+    assert times["Pendulum length [%]"] == ["40 µs", "200 µs 5 times the best", "another night"]
+
+
 def test_the_page_of_a_recorded_engine_names_the_recorded_release_of_a_change(site: Path) -> None:
     releases = table(site, "recorded/rival.html", "The newest first")
 
-    assert releases["3.2"][1] == "2"
-    assert "0.25 % to 0.5 %" in releases["3.2"][2] or "door" in releases["3.2"][2]
-    assert releases["3.1"][1] == "the first"
+    assert releases["3.10"][1] == "2"
+    assert "0.25 % to 0.5 %" in releases["3.10"][2] or "door" in releases["3.10"][2]
+    assert releases["3.9"][1] == "the first"
     assert "Recorded, not asked tonight" in (site / "recorded" / "rival.html").read_text(encoding="utf-8")
 
 
@@ -123,7 +133,7 @@ def test_a_test_that_is_asked_otherwise_by_now_is_left_out_by_name(tmp_path: Pat
     assert "left out: door." in (site / "engines.html").read_text(encoding="utf-8")
 
 
-@pytest.mark.parametrize("content", [b"", b"no archive"])
+@pytest.mark.parametrize("content", [b"", b"no archive", lzma.compress(b"")])
 def test_files_that_are_none_are_refused_with_the_command_that_writes_them(
     tmp_path: Path, content: bytes
 ) -> None:

@@ -52,6 +52,18 @@ def test_two_gears_have_teeth_in_the_proportion_of_their_radii():
     assert [abs(axis[2]) for axis in found["axes"]] == pytest.approx([1.0, 1.0])
 
 
+def test_what_turns_as_one_or_about_no_axis_of_its_own_is_no_pair_of_wheels():
+    ends = [[0.2, 0.0, 0.0], [-0.1, 0.0, 0.0]]
+    bar = lambda n: ([0.0, 0.0, 0.0], [0.3 * math.cos(0.05 * n), 0.3 * math.sin(0.05 * n), 0.0])  # noqa: E731
+    assert told(movie((0.05, 0.05), bar, ends))["wheels"] == []
+    tumbling = movie((0.05, -0.1), lambda _: ([0.0, 0.0, 0.0], [0.3, 0.0, 0.0]), ends)
+    for sample in range(COUNT // 2, COUNT):
+        w, _, _, z = tumbling["orientation"][8 * sample : 8 * sample + 4]
+        tumbling["orientation"][8 * sample : 8 * sample + 4] = [w, z, 0.0, 0.0]  # about x from there on
+    found = told(tumbling)
+    assert (found["wheels"], found["axes"][0]) == ([], None)
+
+
 def test_a_hinge_is_no_pair_of_wheels_whether_it_holds_or_breaks():
     ends = [[0.2, 0.0, 0.0], [-0.1, 0.0, 0.0]]
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby, pairwise
@@ -97,13 +97,13 @@ def engines(book: Book, recorded: Recorded | None = None, path: str = ENGINES, b
         titles[-1] += " tonight"
     by_title = dict(zip(titles, chapters, strict=True))
     ours = next(title for title, chapter in by_title.items() if chapter.name == book.name)
-    untimed = [  # of another machine, or tonight's own beside recorded ones
-        title
+    apart = {
+        title: "another machine" if chapter.tonight.machine.fingerprint != machine else "another night"
         for title, chapter in by_title.items()
         if chapter.tonight.machine.fingerprint != machine or (recorded is not None and chapter is book)
-    ]
+    }
     asked: dict[str, Samples] = {
-        title: samples_of(chapter, timed=title not in untimed) for title, chapter in by_title.items()
+        title: samples_of(chapter, timed=title not in apart) for title, chapter in by_title.items()
     }
     gates = [(test, trend.definition) for test in book.tests for trend in test.gates()]
     told = answers([definition for _, definition in gates], asked)
@@ -114,7 +114,7 @@ def engines(book: Book, recorded: Recorded | None = None, path: str = ENGINES, b
         for chapter in chapters
     ]
     chosen = uses(
-        {title: samples for title, samples in asked.items() if title not in untimed},
+        {title: samples for title, samples in asked.items() if title not in apart},
         {
             title: (address, chapter.name)
             for title, address, chapter in zip(titles, addresses, chapters, strict=True)
@@ -134,10 +134,10 @@ def engines(book: Book, recorded: Recorded | None = None, path: str = ENGINES, b
             _line(test, definition, of_gate)
             for (test, _), (definition, of_gate) in zip(gates, told, strict=True)
         ],
-        "ranks": list(_ranks(found, book, untimed)),
+        "ranks": list(_ranks(found, book, apart)),
         "ours": ours,
-        "behind": None if ours in untimed else _behind(found, ours, book),
-        "elsewhere": untimed,
+        "behind": None if ours in apart else _behind(found, ours, book),
+        "apart": apart,
     }
     return Page(path, "engines.html", "Engines", "The same questions to other engines.", context, plotly=True)
 
@@ -213,18 +213,18 @@ def _told(definition: SeriesDefinition, sample: Sample) -> str:
     return clean(f"{conditions(definition)}{': ' + sample.failure if sample.failure else ''}")[:300]
 
 
-def _ranks(found: Sequence[Standing], book: Book, untimed: Sequence[str]) -> Iterator[dict[str, Any]]:
-    """A line for every scene: its errors at h = 1/60, and the run times to each error."""
+def _ranks(found: Sequence[Standing], book: Book, apart: Mapping[str, str]) -> Iterator[dict[str, Any]]:
+    """A line for every scene: its errors at h = 1/60, and the run times to each error; `apart` says whose do not compare,
+    and why."""
     titles = {test.name: test.card.title for test in book.tests}
     for group in scenes(found):
         first = group[0]
         lacks = [one.outcome.replace("_", " ") for one in group]
         columns = [_cells([one.error for one in group], lacks, partial(_error, first.unit), TIE)]
         late = [
-            "another machine" if one.engine in untimed
-            else lack if lack in ("not asked", "not supported") else "not reached"
+            apart.get(one.engine, lack if lack in ("not asked", "not supported") else "not reached")
             for one, lack in zip(group, lacks, strict=True)
-        ]  # fmt: skip
+        ]
         for place in range(len(ERRORS)):
             columns.append(_cells([one.seconds[place] for one in group], late, seconds))
         if any(cell.best for column in columns for cell in column):
