@@ -131,7 +131,9 @@ def test_run_times_of_another_machine_are_not_set_beside_ours(tmp_path: Path) ->
     coarse = table(tmp_path / "public", "engines.html", "Run time to an error of 10⁻²")
 
     assert coarse["Pendulum length [%]"][1] == "another machine"
-    assert "no times are shown of rival 3.1: another machine" in (tmp_path / "public" / "engines.html").read_text(encoding="utf-8")
+    assert "no times are shown of rival 3.1: another machine" in (
+        tmp_path / "public" / "engines.html"
+    ).read_text(encoding="utf-8")
 
 
 def test_one_engine_alone_is_told_how_others_are_asked(tmp_path: Path) -> None:
