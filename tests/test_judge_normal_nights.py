@@ -138,6 +138,12 @@ def test_a_step_off_two_clusters_is_seen_though_one_of_them_is_visited() -> None
 
     assert found >= 37
 
+    young = 0  # after thirty nights, where the rule above both clusters finds what no other does
+    for series in range(100):
+        values = list(map(float, battery.step("+10 % on clusters 8 % apart", series, 30, 8)))
+        young += "detected" in [night.state for night in judge_noisy(values)[30:]]
+    assert young >= 88
+
 
 def test_two_clusters_are_learnt_in_a_month_whatever_segments_they_seemed_to_make() -> None:
     """First nights by chance of one cluster make a level that the other is clear of: no red outlives what shows both."""
