@@ -93,7 +93,7 @@ def test_what_stands_on_legs_is_solved_at_every_step(seed):
     steps = round(1.5 / STEP)
     assert run.status == "completed"
     assert run["deepest"] <= 1e-6  # m
-    assert run.residual <= 5e-3  # m/s, of the worst solve
+    assert run.residual <= 1e-5  # m/s, of the worst solve
     assert run.counters["factorisations"] <= 60 * steps
     assert run.counters["sweeps"] <= 100 * steps
 

@@ -10,14 +10,14 @@ namespace spook {
 namespace {
 
 constexpr int polish_steps = 24;
-constexpr int patience = 8;       // steps without half the best residual: those that end do so sooner
-constexpr double enough = 1e-11;  // a residual, of the speeds: one step more, for its last digits
-constexpr double relief = 1e-9;   // of a row's own entry of W, in Newton's matrix only: redundant points
+constexpr int patience = 8;      // steps without half the best residual: those that end do so sooner
+constexpr double relief = 1e-9;  // of a row's own entry of W, in Newton's matrix only: redundant points
 
 }  // namespace
 
 /// The laws to first order over the working set, solved for the steps of all rows. Of rows between bounds, those that are
-/// pinned, or at a bound that they push against, stay; friction that is pinned slides on the edge of its disc. `worst`: of the laws in the set, m/s. False if there is no factor.
+/// pinned, or at a bound that they push against, stay; friction that is pinned slides on the edge of its disc. `worst`: of the laws
+/// in the set, m/s. False if there is no factor.
 bool ReducedContacts::find_step(double& worst) {
     const std::size_t n = static_cast<std::size_t>(rows_);
     active_.clear();
@@ -185,7 +185,7 @@ void ReducedContacts::polish(Report& report, double goal) {
         const double best = best_residual_;
         if (keep_best() <= goal) return;
         stalled = best_residual_ < 0.5 * best ? 0 : stalled + 1;
-        if (stalled > (best_residual_ <= enough * speed_ ? 0 : patience)) return;
+        if (stalled > patience) return;
         double worst = 0.0;
         ++report.newton_steps;
         if (!find_step(worst)) return;
