@@ -30,6 +30,7 @@ from tests.test_documents_commands import typed
 from tests.test_documents_site import DOCS, ROOT, blocks
 
 ELSEWHERE = {  # what asks for another engine, a server, or minutes, and the test that does the same
+    "tracker init NAME": "tests/test_tracker_init.py",
     "tracker ci change --history history --comment comment.md": "tests/test_team_workflow.py",
     "tracker run pendulum n_pendulum resting_stack --engine spook,mujoco --sweep": "tests/test_engine_mujoco.py",
     "tracker backfill --engine mujoco --newest 3": "tests/test_tracker_releases.py",

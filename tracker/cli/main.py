@@ -14,6 +14,7 @@ import spook_tracker.tracker.cli.releases as releases
 from spook_tracker.tracker.cli.ci import ci
 from spook_tracker.tracker.cli.count import count
 from spook_tracker.tracker.cli.history import compare, explain, judge_command, list_tests, show, trend
+from spook_tracker.tracker.cli.init import init
 from spook_tracker.tracker.cli.models import models_command
 from spook_tracker.tracker.cli.options import (
     RED,
@@ -51,6 +52,7 @@ Three usual ways in:
 
 \b
 A first run:
+  tracker init NAME                adapter, settings and workflow for an engine of your own
   tracker run                      measure every scalar test of this engine and record it
   tracker list                     the questions that are asked
 """
@@ -382,6 +384,7 @@ def serve(folder: Path, port: int) -> None:
 
 
 for command in (
+    init,
     past.bisect,
     count,
     ci,
