@@ -338,6 +338,7 @@ class ScalarTest:
     lacks: Mapping[str, Reason] = field(
         default_factory=dict
     )  # why it has no ladder, or no break point or map
+    measured: bool = False  # its right answer was measured, not derived: validation
     seven: bool = False  # one of the thesis' seven continuous tests
     formerly: tuple[str, ...] = ()  # its earlier names: its history goes on
     as_given: bool = False  # its measurements say all themselves: no engine puts it in settings of its own

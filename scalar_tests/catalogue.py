@@ -83,6 +83,12 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "falling_chain": "falling_chain",
     "rocking_block": "rocking_block",
     "shaken_block": "shaken_block",
+    # what was measured
+    "oblique_impact": "measured.oblique_impact",
+    "bar_pendulum": "measured.bar_pendulum",
+    "seconds_pendulum": "measured.seconds_pendulum",
+    "last_bounce": "measured.last_bounce",
+    "rolling_beats": "measured.rolling_beats",
     # the multibody benchmark library
     "simple_pendulum": "multibody.simple_pendulum",
     "four_bars": "multibody.four_bars",

@@ -126,6 +126,9 @@ FOUND = {  # test: metric: what finds it again without the engine
     "hanging_cable": {
         "catenary_error": f"{S}.test_links_pull_less_than_a_smooth_cable_by_the_midpoint_rule",
     },
+    "last_bounce": {
+        "theory_error": "tests.test_scalar_tests_measured.test_the_limit_of_the_last_bounce_is_a_step_for_each_bounce_that_is_heard",
+    },
     "taut_rope": dict.fromkeys(
         ("mode_error", "speed_error"), f"{S}.test_modes_of_a_taut_rope_are_the_eigenvalues_of_its_links"
     ),

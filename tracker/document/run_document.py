@@ -286,6 +286,7 @@ class TestCard(Struct, frozen=True, kw_only=True):
     stages: tuple[StageChoice, ...]
     scene: SceneDrawing | None = None
     lacks: dict[Name, Text] = {}  # why it has no "ladder", or no "stability"
+    measured: bool = False  # its right answer was measured in the world: validation, not verification
 
 
 Family = Literal["values", "sweep", "stability"]

@@ -33,6 +33,7 @@ def test_card(name: str, test: ScalarTest, engine: Any, saved: Mapping[str, floa
         stages=stages(test, engine, saved),
         scene=ask(lambda: drawing(test.example().scene)).value,
         lacks=dict(test.lacks),
+        measured=test.measured,
     )
 
 

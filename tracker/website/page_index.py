@@ -55,10 +55,15 @@ def index(book: Book, causes: Sequence[Cause]) -> Page:
     gates = [(test, trend) for test in book.tests for trend in test.gates()]
     found = counted(book)
     seven = [row(t, test.card.title, address(test), book.nights) for test, t in gates if test.card.seven]
+    measured = [
+        row(t, test.card.title, address(test), book.nights)
+        for test, t in gates
+        if test.card.measured and t.definition.limit_kind == "physical"
+    ]
     others = [
         _nearest(test, book)
         for test in book.tests
-        if not (test.card.seven and test.gates()) and _judged(test)
+        if not ((test.card.seven or test.card.measured) and test.gates()) and _judged(test)
     ]
     others.sort(key=lambda one: CLASS_RANK[one.state] if one.state in RED else len(CLASS_RANK))
     steps = {t.definition.time_step for test, t in gates if test.card.seven}
@@ -71,6 +76,7 @@ def index(book: Book, causes: Sequence[Cause]) -> Page:
         "set_points": found.set_points,
         "nights": len(book.nights),
         "seven": seven,
+        "measured": measured,
         "others": others,
         "common_step": _step_words(step),
         "heat": heat(book, folded=True),

@@ -1,0 +1,205 @@
+"""Does a ball roll down a slope past Galileo's frets, beat by beat?"""
+
+from __future__ import annotations
+
+import math
+
+from spook_tracker.engine import (
+    PLAIN,
+    AngularVelocity,
+    Final,
+    Method,
+    Plane,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+    Velocity,
+)
+from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.case import (
+    BreakPoint,
+    Configuration,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
+from spook_tracker.scalar_tests.measured.readings import (
+    Reading,
+    against_theory,
+    agreement,
+    deviation,
+    told,
+)
+from spook_tracker.scalar_tests.sweep import line
+
+GRAVITY = 9.81  # m/s²
+SLOPE = math.radians(1.7)
+BEAT = 0.55  # s
+POINT = 0.94e-3  # m, Galileo's unit
+FRICTION, RADIUS, MASS = 0.3, 0.02, 0.3  # 1, m, kg: none of them matters while the ball rolls
+HALF_STEP = Method(half_step_velocities=True)
+TIME_STEP = BEAT / 20.0  # s
+BEATS = 8
+FRETS = (33, 130, 298, 526, 824, 1192, 1620, 2123)  # points from where the ball is let go
+EAR = 1.0 / 64.0  # s: how well beats are heard
+SOURCE = "Galileo, Ms. Gal. 72, folio 107 verso (about 1604), deciphered by Drake"
+READINGS = tuple(
+    Reading(
+        at=f"beat {n} over beat {BEATS}",
+        value=fret / FRETS[-1],
+        sigma=2.0 * fret / FRETS[-1] * EAR / BEAT * math.hypot(1.0 / n, 1.0 / BEATS),
+    )
+    for n, fret in enumerate(FRETS[:-1], 1)
+)
+PULL = 5.0 / 7.0 * GRAVITY * math.sin(SLOPE)  # m/s², of a ball that rolls
+SEARCHED = 2e-3
+LADDER_DURATION = BEAT * BEATS  # s
+
+
+def scene(slope: float = SLOPE) -> Scene:
+    """A ball at rest on a plane under gravity tilted by `slope` [rad] towards +x."""
+    rough = Material(friction=FRICTION)
+    ramp = RigidBody(name="ramp", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
+    ball = RigidBody(
+        name="ball", mass=MASS, shape=Sphere(RADIUS), position=(0.0, 0.0, RADIUS), material=rough
+    )
+    return Scene(bodies=(ramp, ball), gravity=(GRAVITY * math.sin(slope), 0.0, -GRAVITY * math.cos(slope)))
+
+
+def rolled(simulate: Simulate) -> tuple[float, ...]:
+    """Distance [m] at each beat."""
+    observe = {"place": Trace(quantity=Position("ball"), every=round(BEAT / TIME_STEP))}
+    steps = round(BEATS * BEAT / TIME_STEP)
+    result = simulate(scene(), time_step=TIME_STEP, steps=steps, method=HALF_STEP, observe=observe)
+    return tuple(map(float, result["place"][1:, 0]))
+
+
+def measure(simulate: Simulate) -> dict[str, float]:
+    """Distances over the last one, against Galileo's and against ½ a t²."""
+    found = rolled(simulate)
+    right = [0.5 * PULL * (n * BEAT) ** 2 for n in range(1, BEATS + 1)]
+    return {
+        "deviation": deviation((one / found[-1] for one in found[:-1]), READINGS),
+        "theory_error": max(abs(a / b - 1.0) for a, b in zip(found, right, strict=True)),
+        "last_fret": found[-1] / POINT / FRETS[-1] - 1.0,
+    }
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Distance after eight beats minus ½ a t² [m]."""
+    observe = {"place": Final(quantity=Position("ball"), from_start=True)}
+    result = simulate(scene(), time_step=time_step, duration=LADDER_DURATION, method=method, observe=observe)
+    return float(result["place"][0]) - 0.5 * PULL * LADDER_DURATION**2
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same rolling with nothing observed."""
+    return simulate(scene(), time_step=time_step, duration=LADDER_DURATION, method=method)
+
+
+def steepest_rolled(simulate: Simulate) -> BreakPoint:
+    """Steepest slope (its tangent) down which the ball rolls without slip."""
+
+    def rolls(tangent: float) -> bool:
+        observe = {"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))}
+        result = simulate(scene(math.atan(tangent)), time_step=TIME_STEP, steps=40, observe=observe)
+        speed = float(result["v"][0])
+        return abs(speed - RADIUS * float(result["w"][1])) <= 1e-9 * speed
+
+    return break_point(rolls, 0.1, 4.0, resolution=SEARCHED, walk=6)
+
+
+def _draw(simulate: Simulate) -> Drawing:
+    beats = tuple(float(n) for n in range(1, BEATS + 1))
+    found = rolled(simulate)
+    return Drawing(
+        curves=(
+            line("simulated", beats, (one / POINT for one in found)),
+            line("Galileo's frets", beats, FRETS, "points"),
+        ),
+        x_label="beat",
+        y_label="distance [points of 0.94 mm]",
+    )
+
+
+TEST = ScalarTest(
+    title="Galileo's slope, measured",
+    question="Does a ball roll down a slope past Galileo's frets, beat by beat?",
+    why="The first measurement of an accelerated motion there is; what it found, t², is what every step of ours adds up.",
+    model="A ball rolls from rest down a slope of 1.7°; where it is at eight equal beats is compared with eight frets.",
+    parameters=(
+        ("slope", "1.7°"),
+        ("beat", "0.55 s, as Drake has it; ratios do not depend on it"),
+        ("friction coefficient", "0.3: it rolls"),
+        ("time step", "1/20 beat"),
+        *told(READINGS, ""),
+    ),
+    theory=(
+        "x = ½ (5/7) g sin θ t² of a solid ball that rolls; over the last distance (n/8)², whatever slope, beat and ball.",
+        "σ: an ear is 1/64 s off, at this fret and at the last: 2 (1/64 s)/(n · 0.55 s) of the distance.",
+        "Left out: the groove, rolling friction, and the knock of the frets.",
+    ),
+    reference=f"Measured: {SOURCE}: 33, 130, 298, 526, 824, 1192, 1620, 2123 points.",
+    conclusion="Green: a rolling ball is as far after each beat as the first one measured. Red: motion is not t², or not rolling.",
+    source=f"measured: {SOURCE}",
+    measured=True,
+    measurements=(
+        Measurement(
+            configuration="half-step",
+            time_step=TIME_STEP,
+            metrics=(
+                agreement(READINGS, SOURCE),
+                against_theory(1e-12, "a steady pull is exact with velocities at mid-step; rounding", "gate"),
+                Metric(
+                    name="last_fret",
+                    description="distance at the eighth beat over the last fret, less 1, with Drake's slope and beat, each known to 2 or 3 %",
+                    unit="1",
+                    role="reported",
+                    tolerance=1e-9,
+                ),
+            ),
+            measure=measure,
+            note="velocities live at mid-step",
+        ),
+    ),
+    example=lambda: Example(scene=scene(), time_step=TIME_STEP, method=HALF_STEP),
+    figures=(Figure(name="frets", title="Distance at each beat", draw=_draw),),
+    ladders=(
+        Ladder(
+            name="distance",
+            description="distance after eight beats against ½ a t²",
+            unit="m",
+            time_steps=tuple(BEAT / n for n in (10, 20, 40, 80, 160)),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=1.0),
+                Configuration(name="half-step", method=HALF_STEP, expected_order=None),  # rounding
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=0.01,
+            target_seconds=0.01,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="steepest-rolled",
+            title="Steepest slope down which the ball rolls",
+            configuration="plain",
+            definition="speed and spin agree to 1e-9 after 40 steps",
+            study=steepest_rolled,
+            unit="1",
+            expected=((1.0 - 1.1 * SEARCHED) * 3.5 * FRICTION, 3.5 * FRICTION),
+            expected_source="tan θ = 3.5 µ of a solid ball; the search ends 0.2 % short of it at most",
+        ),
+    ),
+)

@@ -1,0 +1,197 @@
+"""Does a pendulum of Kater's length beat seconds under the gravity of today's gravimeters?"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from spook_tracker.engine import (
+    PLAIN,
+    Distance,
+    Method,
+    Particle,
+    Position,
+    Result,
+    Scene,
+    Trace,
+)
+from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.case import (
+    BreakPoint,
+    Configuration,
+    Drawing,
+    Example,
+    Figure,
+    Ladder,
+    Measurement,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
+from spook_tracker.scalar_tests.measured.readings import (
+    Reading,
+    against_theory,
+    agreement,
+    deviation,
+    said,
+    told,
+)
+from spook_tracker.scalar_tests.sweep import line
+
+INCH = 0.0254  # m
+LENGTH = 39.13929 * INCH  # m
+FARTHEST = 0.00028 * INCH  # m, of a trial from the mean of twelve
+GRAVITY = (
+    9.8119629 - 140e-6
+)  # m/s²: 981 196.29 mGal at Teddington on the Potsdam system, which is 14.0 mGal too high
+NEARBY = 1e-4  # m/s²: what Teddington and London may differ by, 15 km, 0.1° and some metres apart
+SWING = 1e-3  # rad: Kater's figure is for no swing at all; this one takes 6e-8 longer
+ORDER_4 = Method(composition="order4")
+TIME_STEP = 1.0 / 120.0  # s
+DURATION = 40.0  # s
+SOURCE = (
+    "Kater, Phil. Trans. 108 (1818) 33, with his later correction; gravity: Proc. R. Soc. A 213 (1952) 408"
+)
+BEAT = math.pi * math.sqrt(LENGTH / GRAVITY) * (1.0 + SWING**2 / 16.0)  # s
+READINGS = (
+    Reading(
+        at="a beat", value=1.0, sigma=0.5 * math.hypot(FARTHEST / LENGTH, NEARBY / GRAVITY)
+    ),  # s of mean solar time
+)
+STEPS = 400  # of a search; at h ω = 2 a swing has grown some hundredfold
+SEARCHED = 2e-3
+
+
+def scene(swing: float = SWING) -> Scene:
+    """A bob on a rod without weight, let go `swing` [rad] from the vertical."""
+    bob = Particle(name="bob", mass=1.0, position=(LENGTH * math.sin(swing), 0.0, -LENGTH * math.cos(swing)))
+    rod = Distance(name="rod", between=((0.0, 0.0, 0.0), "bob"), compliance=0.0)
+    return Scene(bodies=(bob,), constraints=(rod,), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def beat(simulate: Simulate, time_step: float = TIME_STEP, method: Method = ORDER_4) -> float:
+    """Mean time [s] from one passage of the lowest place to the next."""
+    observe = {"place": Trace(quantity=Position("bob"))}
+    result = simulate(scene(), time_step=time_step, duration=DURATION, method=method, observe=observe)
+    times, x = result.sample_times["place"], result["place"][:, 0]
+    place = np.nonzero((x[:-1] > 0.0) != (x[1:] > 0.0))[0]
+    zero = times[place] - x[place] * time_step / (x[place + 1] - x[place])
+    return float(zero[-1] - zero[0]) / (len(zero) - 1) if len(zero) > 1 else math.nan
+
+
+def measure(simulate: Simulate) -> dict[str, float]:
+    """The beat against a second, and against the closed form."""
+    found = beat(simulate)
+    return {"deviation": deviation((found,), READINGS), "theory_error": abs(found / BEAT - 1.0)}
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    """Relative error of the beat."""
+    return beat(simulate, time_step, method) / BEAT - 1.0
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same swing with nothing observed."""
+    return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
+
+
+def longest_step(simulate: Simulate) -> BreakPoint:
+    """The longest step [s] with which a pendulum that hardly swings goes on hardly swinging."""
+
+    def holds(time_step: float) -> bool:
+        observe = {"place": Trace(quantity=Position("bob"))}
+        result = simulate(scene(1e-5), time_step=time_step, steps=STEPS, observe=observe)
+        return result.completed and float(np.abs(result["place"][:, 0]).max()) < 1e-3 * LENGTH
+
+    return break_point(holds, 0.3, 1.2, resolution=SEARCHED, walk=4)
+
+
+def _draw(simulate: Simulate) -> Drawing:
+    steps = tuple(1.0 / n for n in (30, 60, 120, 240))
+    off = tuple(abs(beat(simulate, h, PLAIN) - 1.0) for h in steps)
+    return Drawing(
+        curves=(
+            line("plain SPOOK, against a second", steps, off, "both"),
+            line("standard deviation", steps, (READINGS[0].sigma,) * len(steps), "reference"),
+        ),
+        x_label="time step [s]",
+        y_label="off [s]",
+        x_scale="log",
+        y_scale="log",
+        note=said(measure(simulate)["deviation"]),
+    )
+
+
+TEST = ScalarTest(
+    title="Seconds pendulum, measured",
+    question="Does a pendulum of Kater's length beat seconds under the gravity of today's gravimeters?",
+    why="Two measurements 134 years apart, one with a ruler and one without, meet in a single period, to six digits.",
+    model="A bob on a rod of 39.13929 inches, the length that beat seconds in London, swings by a thousandth of a radian.",
+    parameters=(
+        ("length", "39.13929 in; trials at most 0.00028 in from their mean"),
+        ("gravity", "9.811823 m/s² at Teddington; London within 1e-4"),
+        ("swing", "0.001 rad"),
+        ("time step", "1/120 s, 40 s"),
+        *told(READINGS, "s"),
+    ),
+    theory=(
+        "A beat is π √(l/g) (1 + φ₀²/16).",
+        "σ = ½ √((0.00028/39.139)² + (1e-4/9.81)²) s: what his trials differ by, and gravity between the two places.",
+        "Left out: air and its drag, the knife edges, the height above the sea: Kater reckoned them out of his length.",
+    ),
+    reference=f"Measured: {SOURCE} (981 196.29 mGal on the Potsdam system, less its 14.0 mGal).",
+    conclusion="Green: the engine's second, metre and gravity are those of the world. Red: the pendulum runs fast or slow.",
+    source=f"measured: {SOURCE}",
+    measured=True,
+    measurements=(
+        Measurement(
+            configuration="order 4",
+            time_step=TIME_STEP,
+            metrics=(
+                agreement(READINGS, SOURCE),
+                against_theory(
+                    1e-9, "fourth order in h: 2e-11 are left; zeros by straight lines between samples"
+                ),
+            ),
+            measure=measure,
+            note="40 beats",
+        ),
+    ),
+    example=lambda: Example(scene=scene(), time_step=TIME_STEP, method=ORDER_4),
+    figures=(Figure(name="beat", title="How far a beat is from a second", draw=_draw),),
+    ladders=(
+        Ladder(
+            name="beat",
+            description="relative error of the beat against π √(l/g)",
+            unit="1",
+            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480)),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=2.0),
+                Configuration(
+                    name="order 4", method=ORDER_4, expected_order=None
+                ),  # down to how zeros are read
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-5,
+            target_seconds=0.01,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="longest-step",
+            title="Longest time step of a small swing",
+            configuration="plain",
+            definition="400 steps without a hundredfold swing",
+            study=longest_step,
+            unit="s",
+            expected=(
+                (1.0 - 1.1 * SEARCHED) * 2.0 * math.sqrt(LENGTH / GRAVITY),
+                2.0 * math.sqrt(LENGTH / GRAVITY),
+            ),
+            expected_source="h ω = 2 of a small swing, where symplectic Euler's eigenvalues leave the circle; the search ends 0.2 % "
+            "short of it at most",
+        ),
+    ),
+)
