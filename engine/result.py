@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from html import escape
 from importlib import import_module
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from spook_tracker.engine.display import Figure, Shown, display, framed
 from spook_tracker.engine.errors import EngineError
+
+if TYPE_CHECKING:
+    from spook_tracker.engine.method import Method
+    from spook_tracker.engine.scene import Scene
 
 Status = Literal["completed", "unsettled", "diverged", "not_finite", "timed_out"]
 Array = npt.NDArray[np.float64]
@@ -31,6 +36,18 @@ class Broken:
     def __str__(self) -> str:
         load = f"{self.force:.4g} N" + (f" and {self.torque:.4g} N m" if self.torque else "")
         return f"{self.joint!r} broke in step {self.step} ({self.time:.4g} s) under {load}"
+
+
+SHORT = 2.0  # s: a run that took longer is not run again just because a cell ends with it
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Origin:
+    """What a run is a run of: enough to run it again, to the same bits, and watch it."""
+
+    scene: Scene
+    method: Method
+    simulate: Callable[..., Result]
 
 
 @dataclass(frozen=True, slots=True, kw_only=True, repr=False)
@@ -66,6 +83,7 @@ class Result:
     cpu_seconds: float = 0.0  # processor time of the native loop; 0 where it cannot be told
     residual: float = 0.0  # largest row residual [m/s] a solve stopped at
     broken: tuple[Broken, ...] = ()
+    origin: Origin | None = None  # of what `simulate` gave
 
     def __getitem__(self, name: str) -> Any:
         if self.status not in ("completed", "unsettled"):
@@ -92,13 +110,35 @@ class Result:
         return f"<Result: {'; '.join([*rows, seen or 'nothing observed'])}>"
 
     def _repr_html_(self) -> str:
-        """The same for notebooks, with the last value of every observable that is one number."""
+        """The same for notebooks, with every observable that is one number; a run of at most two seconds with its replay."""
         rows = [("status", self.failure or self.status), ("steps", f"{self.steps} of {self.time_step:.4g} s")]
         rows += [("broken", str(joint)) for joint in self.broken]
         for name, value in self.observables.items():
             rows.append((name, f"{value:.6g}" if value.shape == () else f"array of shape {value.shape}"))
         cells = "".join(f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, text in rows)
-        return f"<table>{cells}</table>"
+        seen = framed(self.show().html) if self.origin and 0.0 < self.seconds <= SHORT else ""
+        return f"<table>{cells}</table>{seen}"
+
+    def show(self) -> Shown:
+        """The run as a replay in three dimensions, as the website has it, in a document that needs no other file.
+
+        The scene is run again with everything traced that is drawn: as long as the run took, at most 20 s. EngineError
+        where it cannot be: a run that was held, or of a scene whose time was over while it was compiled.
+        """
+        return Shown(display().motion(self))
+
+    def plot(self, *names: str) -> Figure:
+        """These traces (none: all) over time [s] as a Plotly figure, a line per component, named as by `to_dataframe`.
+
+        The values are those of `result[name]`, in the units of its quantity. EngineError if nothing was traced, for a
+        name that was not, and without Plotly.
+        """
+        if not self.sample_times:
+            raise EngineError("plot: nothing was traced; observe a Trace")
+        for name in names:
+            if name not in self.sample_times:
+                raise EngineError(f"plot: {name!r} was not traced; there are {', '.join(self.sample_times)}")
+        return display().traces(self, names or tuple(self.sample_times))
 
     def to_dataframe(self) -> Any:
         """The traces as a pandas DataFrame: a row per sample time [s], a column per component.
@@ -115,7 +155,7 @@ class Result:
             pandas.DataFrame(
                 self[name].reshape(len(times), -1),
                 index=pandas.Index(times, name="time"),
-                columns=_columns(name, self[name].shape[1:]),
+                columns=columns_of(name, self[name].shape[1:]),
             )
             for name, times in self.sample_times.items()
         ]
@@ -125,7 +165,8 @@ class Result:
         return together
 
 
-def _columns(name: str, shape: tuple[int, ...]) -> list[str]:
+def columns_of(name: str, shape: tuple[int, ...]) -> list[str]:
+    """What the components of a sample of that shape are called."""
     if shape == ():
         return [name]
     named: dict[tuple[int, ...], str] = {(3,): "xyz", (4,): "wxyz"}

@@ -11,6 +11,7 @@ from spook_tracker.engine import check
 from spook_tracker.engine.bodies import WORLD, Body, Particle, RigidBody
 from spook_tracker.engine.check import Vector
 from spook_tracker.engine.couplings import Relation, Wire
+from spook_tracker.engine.display import display, framed
 from spook_tracker.engine.errors import SceneError
 from spook_tracker.engine.forces import CentralGravity, Fluid, Force, Load, Spring
 from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Hinge, Joint
@@ -79,6 +80,10 @@ class Scene:
             self._check_force(force, known)
         object.__setattr__(self, "no_contact", tuple(self._pair(pair, known) for pair in self.no_contact))
         self._check_directions()
+
+    def _repr_html_(self) -> str:
+        """The scene at its start, to be turned, for notebooks."""
+        return framed(display().scene(self), height=420)
 
     def _check_directions(self) -> None:
         """One ellipse of friction meets any surface; two that cross have no law that is generally agreed on."""

@@ -6,7 +6,7 @@ import math
 import time
 from collections.abc import Mapping
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from spook_tracker.engine.model_file import ModelRun
 from spook_tracker.engine.observe import Observable, Trace
 from spook_tracker.engine.program import Program
 from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.engine.result import Result
+from spook_tracker.engine.result import Origin, Result
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.watch import until
 
@@ -90,7 +90,8 @@ def simulate(
             )
     except TimeoutError:
         return _not_compiled(scene, time_step, observe, limit, time.monotonic() - begun)
-    return prepared.program.run(prepared.steps, time_limit, time_stages, since=begun)
+    result = prepared.program.run(prepared.steps, time_limit, time_stages, since=begun)
+    return replace(result, origin=Origin(scene=scene, method=method, simulate=simulate))
 
 
 def _not_compiled(

@@ -224,7 +224,7 @@ def test_a_night_of_a_teams_own_questions_needs_no_extra_and_no_compiler(
 
     assert standard.returncode == table.returncode == 2
     assert "pip install 'spook-tracker[standard]'" in standard.stderr
-    assert "spook-tracker[data]" in table.stderr
+    assert "tables need pandas; install it with: pip install 'spook-tracker[standard]'" in table.stderr
     assert not {"scipy", "pandas", "plotly"} & {
         name.partition(">")[0]
         for name in importlib.metadata.requires("spook-tracker") or ()

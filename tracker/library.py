@@ -22,13 +22,14 @@ from spook_tracker.tracker.judge.comparison_document import CompareDocument
 from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.series_history import Told
 from spook_tracker.tracker.judge.tonight import Finding, to_be_timed_again
-from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.history import History as StoredHistory
 from spook_tracker.tracker.website.options import DEFAULTS, SiteOptions
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.measure.limits import Limits
     from spook_tracker.tracker.measure.run import Progress, Questions, Request, Trigger
     from spook_tracker.tracker.measure.timing import Repeats
+    from spook_tracker.tracker.website.plotly_figures import Figure
     from spook_tracker.tracker.website.publish import Report
 
 __all__ = [
@@ -43,6 +44,20 @@ __all__ = [
     "record",
     "run",
 ]
+
+
+class History(StoredHistory):
+    """What is stored, as of the moment it is opened: `runs`, `series`, `samples`, `to_dataframe`, `plot`."""
+
+    def plot(self, test: str, metric: str = "", *, ladder: bool = False) -> Figure:
+        """A test over versions as a Plotly figure, with limit and set point: its gate, or `metric`, in its own unit.
+
+        `ladder`: its error against run time [s] instead, all configurations and engines. The traces are those of the
+        website. UnknownName for what is not recorded; TrackerError without Plotly.
+        """
+        from spook_tracker.tracker.notebook import ladder_figure, trend_figure
+
+        return ladder_figure(self, test) if ladder else trend_figure(self, test, metric)
 
 
 class RunOptions(TypedDict, total=False):
@@ -127,7 +142,7 @@ def record(document: RunDocument, database: str) -> bool:
 FORK_POINT = "fork-point"
 
 
-def fork_point(history: History, after: str) -> Any:
+def fork_point(history: StoredHistory, after: str) -> Any:
     """The run that a version's branch is to be compared with: the nearest measured commit it builds on."""
     from spook_tracker.tracker.document.errors import UnknownName
     from spook_tracker.tracker.judge.lane import forked_from
@@ -140,7 +155,7 @@ def fork_point(history: History, after: str) -> Any:
     return found
 
 
-def _earlier(history: History, before: str, after: str) -> Any:
+def _earlier(history: StoredHistory, before: str, after: str) -> Any:
     """The run that `before` stands for beside `after`."""
     from spook_tracker.tracker.judge.lane import line_of
 
@@ -158,7 +173,7 @@ def _earlier(history: History, before: str, after: str) -> Any:
 
 @no_collection()
 def compare(
-    history: History,
+    history: StoredHistory,
     before: str,
     after: str,
     accepted: Sequence[Accepted] = (),
@@ -188,7 +203,7 @@ def compare(
 
 
 @no_collection()
-def judge_run(history: History, run: str, accepted: Sequence[Accepted] = ()) -> list[Finding]:
+def judge_run(history: StoredHistory, run: str, accepted: Sequence[Accepted] = ()) -> list[Finding]:
     """What became of a recorded run, against everything measured before it; red first.
 
     `latest` is the latest night of every machine: what is red of the last runs of others within a day is among it.
@@ -199,7 +214,7 @@ def judge_run(history: History, run: str, accepted: Sequence[Accepted] = ()) -> 
 
 
 def idle_entries(
-    history: History, run: str, findings: Sequence[Finding], accepted: Sequence[Accepted]
+    history: StoredHistory, run: str, findings: Sequence[Finding], accepted: Sequence[Accepted]
 ) -> list[str]:
     """A sentence for each entry of accepted.toml that does nothing to this run's findings."""
     from spook_tracker.tracker.judge.accepted import unused
@@ -212,7 +227,7 @@ def idle_entries(
 
 @no_collection()
 def trend(
-    history: History,
+    history: StoredHistory,
     test: str,
     metric: str | None = None,
     accepted: Sequence[Accepted] = (),
@@ -258,7 +273,7 @@ def trend(
 
 
 def trend_of_maps(
-    history: History, test: str, accepted: Sequence[Accepted] = (), engine: str | None = None
+    history: StoredHistory, test: str, accepted: Sequence[Accepted] = (), engine: str | None = None
 ) -> list[ToldMap]:
     """What became of the stability maps of a test (or of one map, by its key), of `engine` or the first that has such."""
     from spook_tracker.tracker.judge.lane import lines
@@ -274,7 +289,7 @@ def trend_of_maps(
 
 
 def publish(
-    history: History,
+    history: StoredHistory,
     out: Path,
     accepted: Sequence[Accepted] = (),
     database: str = "",
@@ -367,10 +382,10 @@ def nightly(
         store(session, document)
         tell(document)
         document, findings = judged_again(session, document, accepted, **asked)
-        history = History(session, ahead=NO_TIME)
+        recorded = StoredHistory(session, ahead=NO_TIME)
         tell(findings)
-        notes = idle_entries(history, document.id, findings, accepted)
-        drop_old_figures(session, history)  # once they have been compared
+        notes = idle_entries(recorded, document.id, findings, accepted)
+        drop_old_figures(session, recorded)  # once they have been compared
     with History.open(database, NO_TIME) as history:
         notes += [history.dated_ahead()] if history.ahead else []
         published = publish(history, out, accepted, database, site)

@@ -14,11 +14,13 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
+from msgspec.structs import replace
 
 from spook_tracker.engine.bodies import WORLD, RigidBody
 from spook_tracker.engine.couplings import Wire
 from spook_tracker.engine.forces import CentralGravity, Spring
 from spook_tracker.engine.joints import Distance, Joint
+from spook_tracker.engine.method import Method
 from spook_tracker.engine.observe import (
     ContactForce,
     ContactPoints,
@@ -57,7 +59,30 @@ def trajectory(name: str, test: ScalarTest, simulate: Simulate) -> Trajectory | 
     return ask(lambda: _recorded(name, test.example(), simulate)).value  # type: ignore[no-any-return]
 
 
-def _recorded(name: str, example: Example, simulate: Simulate) -> Trajectory | None:
+def motion(
+    scene: Scene, method: Method, time_step: float, steps: int, simulate: Simulate
+) -> Trajectory | None:
+    """A run of any scene, without an exact motion beside it; None where there is nothing to see."""
+    example = Example(scene=scene, time_step=time_step, method=method, duration=steps * time_step)
+    return _recorded("run", example, simulate, compared=False)
+
+
+def at_rest(scene: Scene) -> Trajectory:
+    """A scene at its start, as a motion in which nothing moves."""
+    bodies = scene.bodies[:MOST_SOLIDS]
+    turns = [[float(v) for v in getattr(body, "orientation", UPRIGHT)] for body in bodies]
+    seen = {
+        "position": np.array([[body.position for body in bodies]] * 2),
+        "orientation": np.array([turns] * 2),
+    }
+    channels = [
+        channel(name, unit, seen[name].reshape(2, -1))
+        for name, unit in (("position", "m"), ("orientation", "1"))
+    ]
+    return _told("start", scene, 1.0, 1.0, 2, channels, rows=0)
+
+
+def _recorded(name: str, example: Example, simulate: Simulate, compared: bool = True) -> Trajectory | None:
     scene = example.scene
     bodies = scene.bodies[:MOST_SOLIDS]
     steps = min(MOST_STEPS, max(1, round(example.duration / example.time_step)))
@@ -70,30 +95,37 @@ def _recorded(name: str, example: Example, simulate: Simulate) -> Trajectory | N
     if len(positions) < 2:
         return None
     seen = dict(result.partial)
-    exact = "" if not result.completed else _exact(example, simulate, seen, every)
+    exact = _exact(example, simulate, seen, every) if compared and result.completed else ""
     while True:
         channels = _channels(seen, scene, len(bodies))
         if sum(len(channel.data) for channel in channels) <= MOST_BYTES or len(seen["position"]) < 8:
             break
         seen = {key: values[::2] for key, values in seen.items()}
         every *= 2
+    told = _told(name, scene, example.time_step, every * example.time_step, len(seen["position"]), channels)
+    return replace(told, exact=exact, failure=result.failure)
+
+
+def _told(
+    name: str, scene: Scene, time_step: float, step: float, count: int, channels: Sequence[Channel],
+    rows: int = MOST_ROWS,
+) -> Trajectory:  # fmt: skip
+    """What is drawn of the scene, with how it moves."""
+    bodies = scene.bodies[:MOST_SOLIDS]
     solids = [solids_of(body, bodies) for body in bodies]
-    links = _links(scene)
     return Trajectory(
         test=name,
         name="example",
-        time_step=example.time_step,
-        step=every * example.time_step,
-        count=len(seen["position"]),
+        time_step=time_step,
+        step=step,
+        count=count,
         bodies=len(bodies),
         solids=tuple(solid for of_body in solids for solid in of_body),
         body_of_solid=tuple(i for i, of_body in enumerate(solids) for _ in of_body),
-        links=tuple(links),
+        links=tuple(_links(scene)),
         attractors=tuple(force.centre for force in scene.forces if isinstance(force, CentralGravity)),
         gravity=scene.gravity,
-        rows=min(len(scene.constraints), MOST_ROWS),
-        exact=exact,
-        failure=result.failure,
+        rows=min(len(scene.constraints), rows),
         channels=tuple(channels),
     )
 

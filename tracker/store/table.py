@@ -1,6 +1,6 @@
 """The history as one table, a row for each value: a pandas DataFrame, and from it CSV and Parquet.
 
-pandas, and fastparquet for Parquet, are an optional extra: `pip install 'spook-tracker[data]'`.
+pandas is in the extra `standard`, and both pandas and fastparquet, for Parquet, in `data`.
 """
 
 from __future__ import annotations
@@ -86,4 +86,6 @@ def _pandas() -> Any:
     try:
         return import_module("pandas")
     except ImportError:
-        raise TableError("tables need pandas; install spook-tracker[data]") from None
+        raise TableError(
+            "tables need pandas; install it with: pip install 'spook-tracker[standard]'"
+        ) from None

@@ -53,7 +53,7 @@ def kept_motions(tests: Iterable[TestHistory]) -> dict[str, tuple[Motion, ...]]:
             night, recorded = test.motions[age]
             key = f"{slug(recorded.test)}-{digest(encode(recorded))[:10]}"
             if key not in written:
-                script = _script(key, recorded)
+                script = motion_script(key, recorded)
                 if age > 0 and spent + len(script) > SITE_BYTES:
                     continue
                 written[key] = script
@@ -129,7 +129,8 @@ def _values(motion: Trajectory, name: str) -> list[float]:
     return found
 
 
-def _script(key: str, motion: Trajectory) -> bytes:
+def motion_script(key: str, motion: Trajectory) -> bytes:
+    """What hands a motion to replay.js under its key."""
     solids = [
         {
             "kind": solid.kind,
