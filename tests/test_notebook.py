@@ -153,9 +153,7 @@ def test_what_cannot_be_drawn_is_said_in_a_sentence(fallen: Result, monkeypatch:
 def database(tmp_path_factory: pytest.TempPathFactory) -> str:
     url = f"sqlite:///{tmp_path_factory.mktemp('nights')}/nights.db"
     for _ in range(2):
-        document = tracker.run(
-            ["falling_object", "near_miss"], sweep=True, workers=0, repeats=1, apart=False
-        )
+        document = tracker.run(["falling_object", "near_miss"], sweep=True, workers=0, repeats=1, apart=False)
         tracker.record(document, url)
     return url
 
