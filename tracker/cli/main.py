@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -40,6 +40,12 @@ from spook_tracker.tracker.cli.options import (
 )
 from spook_tracker.tracker.cli.settings import present
 from spook_tracker.tracker.cli.storage import db, export, import_files, schema
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.run_document import RunDocument
+    from spook_tracker.tracker.judge.tonight import Finding
+    from spook_tracker.tracker.measure.run import Request
+    from spook_tracker.tracker.website.publish import Report
 
 FIRST_STEPS = """\
 Tracks whether a physics engine became less accurate, less stable or slower.
@@ -229,11 +235,11 @@ def nightly(
         except EngineUnavailable as reason:
             say(f"left out: {reason}", err=True)
 
-    measured: list[Any] = []
-    judged: list[Any] = []
+    measured: list[RunDocument] = []
+    judged: list[list[Finding]] = []
     kept = True
 
-    def tell(news: Any) -> None:
+    def tell(news: RunDocument | list[Finding]) -> None:
         nonlocal kept
         if isinstance(news, list):
             judged.append(news)
@@ -406,7 +412,9 @@ for command in (
     main.add_command(command)
 
 
-def _measure(request: Any, engine: str, limit: float | None, catalogue: str, database: str | None) -> Any:
+def _measure(
+    request: Request, engine: str, limit: float | None, catalogue: str, database: str | None
+) -> RunDocument:
     """Run what is asked for and record it, the database being opened first: no night is measured in vain."""
     from spook_tracker.tracker.cli.console import watching
     from spook_tracker.tracker.measure.apart import run
@@ -439,7 +447,7 @@ def _measure(request: Any, engine: str, limit: float | None, catalogue: str, dat
     return document
 
 
-def _print_run(document: Any, everything: bool) -> None:
+def _print_run(document: RunDocument, everything: bool) -> None:
     from spook_tracker.tracker.cli.console import say, width
     from spook_tracker.tracker.cli.report_short import FEW, short_table
     from spook_tracker.tracker.cli.report_table import pass_table
@@ -454,7 +462,7 @@ def _print_run(document: Any, everything: bool) -> None:
             say(textwrap.fill(f"note: retired instructions are not counted: {why}", width()))
 
 
-def _answered(document: Any) -> bool:
+def _answered(document: RunDocument) -> bool:
     """Whether the engine supports anything that was asked; if not, that is said: nothing is no green."""
     if any(sample.outcome != "not_supported" for sample in document.samples):
         return True
@@ -462,13 +470,13 @@ def _answered(document: Any) -> bool:
     return False
 
 
-def _red(document: Any) -> bool:
+def _red(document: RunDocument) -> bool:
     from spook_tracker.tracker.cli.report_table import red
 
     return bool(red(document))
 
 
-def _say_published(report: Any, out: Path) -> None:
+def _say_published(report: Report, out: Path) -> None:
     from spook_tracker.tracker.cli.console import say
 
     say(f"published {out / 'index.html'}: {report.pages} files, {report.written} of them new or changed")
@@ -476,7 +484,7 @@ def _say_published(report: Any, out: Path) -> None:
         say(f"not made: {sentence}", err=True)
 
 
-def _json(document: Any) -> str:
+def _json(document: RunDocument) -> str:
     from spook_tracker.tracker.document.json_form import readable
 
     return readable(document) + "\n"
