@@ -36,13 +36,14 @@ class StageChoice:
     stage: str
     kept: bool
     reason: str
+    within: str = ""  # of a stage kept: in whose loop it is done, and timed, where it has no time of its own
 
 
 class NativeProgram(Protocol):
     """What a pipeline's native object offers; see bindings/common.hpp for the report."""
 
     @property
-    def choices(self) -> list[tuple[str, bool, str]]: ...
+    def choices(self) -> list[tuple[str, bool, str, str]]: ...
     @property
     def stages(self) -> list[str]: ...
     def run(self, steps: int, time_limit: float, timed: bool) -> dict[str, Any]: ...

@@ -100,7 +100,7 @@ def test_each_thing_in_a_scene_brings_its_stage() -> None:
 def test_every_stage_is_explained_in_words() -> None:
     choices = explain(pendulum(), time_step=0.01)
 
-    assert len(choices) == 32
+    assert len(choices) == 34
     assert all(choice.reason for choice in choices)
     assert {choice.stage for choice in choices if choice.kept} == {
         "apply_gravity",

@@ -91,7 +91,7 @@ def test_every_stage_has_its_reason() -> None:
 
     choices = engine.explain(scene, time_step=TIME_STEP)
 
-    assert len(choices) == 32
+    assert len(choices) == 34
     assert all(choice.reason for choice in choices)
 
 

@@ -428,7 +428,7 @@ def explain(test: str, cost: bool, as_json: bool, engine: str, catalogue: str) -
     """Say which stages of the engine the test's scene needs, which are left out, and why."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.report_catalogue import stage_table
-    from spook_tracker.tracker.measure.ladder import saved_by_leaving_out, stage_costs
+    from spook_tracker.tracker.measure.ladder import saved_by_leaving_out, step_cost
     from spook_tracker.tracker.measure.run import Questions, select
 
     source = Questions(
@@ -439,7 +439,7 @@ def explain(test: str, cost: bool, as_json: bool, engine: str, catalogue: str) -
     if cost:
         simulate = source.simulate()
         saved = saved_by_leaving_out(tests, simulate).get(test, {})
-        costs = stage_costs(tests[test], simulate)
+        costs = step_cost(tests[test], simulate)
     if as_json:
         from spook_tracker.tracker.cli.report_json import explain_json
         from spook_tracker.tracker.measure.cards import explained

@@ -14,6 +14,7 @@ from spook_tracker.tracker.cli.report_sweep import seconds
 from spook_tracker.tracker.cli.report_table import number
 from spook_tracker.tracker.document.coverage import HEADINGS, Coverage, Rungs, coverage, rungs, summary
 from spook_tracker.tracker.measure.cards import explained
+from spook_tracker.tracker.measure.ladder import StepCost
 
 
 def catalogue_table(tests: Mapping[str, ScalarTest]) -> str:
@@ -123,16 +124,23 @@ def _per_step(cost: float | None, verb: str) -> str:
     return "" if cost is None else f"{verb} {seconds(cost)}" if cost > 0.0 else f"{verb} nothing"
 
 
+def _taken(choice: Any, costs: Mapping[str, float]) -> str:
+    within = getattr(choice, "within", "")
+    if choice.stage not in costs and within:
+        return f"in {within}"
+    return _per_step(costs.get(choice.stage), "takes") or "did not run"
+
+
 def stage_table(
     name: str,
     test: ScalarTest,
     engine: Any,
-    costs: Mapping[str, float] | None = None,
+    costs: StepCost | None = None,
     saved: Mapping[str, float] | None = None,
 ) -> str:
     """The stages of a step of this test's scene: first those kept, in order, then why.
 
-    `costs` are seconds per step of stages kept, `saved` those that leaving a stage out saves, if measured.
+    `costs` are those of stages kept, `saved` seconds per step that leaving a stage out saves, if measured.
     """
     choices = list(explained(test, engine))
     kept = [choice.stage for choice in choices if choice.kept]
@@ -140,8 +148,7 @@ def stage_table(
     columns: tuple[Column, ...] = (Column("stage"), Column("name"), Column("why", flexible=True))
     if costs is not None and saved is not None:
         told = [
-            _per_step(costs.get(c.stage), "takes") if c.kept else _per_step(saved.get(c.stage), "saves")
-            for c in choices
+            _taken(c, costs.stages) if c.kept else _per_step(saved.get(c.stage), "saves") for c in choices
         ]
         columns = (*columns[:2], Column("a step", "right"), columns[2])
         rows = [(*row[:2], cost, row[2]) for row, cost in zip(rows, told, strict=True)]
@@ -150,4 +157,11 @@ def stage_table(
         return click.style(text, fg="green" if choices[row].kept else None)
 
     lines = [f"{name}: {' → '.join(kept)}", ""]
-    return "\n".join(lines + table(columns, rows, colour={0: paint}))
+    lines += table(columns, rows, colour={0: paint})
+    if costs is not None:
+        lines += [
+            "",
+            f"A step takes {seconds(costs.whole)} while its stages are timed: {seconds(sum(costs.stages.values()))} in them, "
+            f"{seconds(costs.beside)} between them.",
+        ]
+    return "\n".join(lines)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.tracker.cli.report_compare import accused
@@ -12,6 +12,9 @@ from spook_tracker.tracker.document.json_form import Number, readable
 from spook_tracker.tracker.judge.judged import Judged
 from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.series_history import Told
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.measure.ladder import StepCost
 
 
 def trend_json(trends: Iterable[Told], maps: Iterable[ToldMap] = ()) -> str:
@@ -124,22 +127,25 @@ def show_json(name: str, test: ScalarTest) -> str:
 def explain_json(
     name: str,
     choices: Iterable[Any],
-    costs: Mapping[str, float] | None = None,
+    costs: StepCost | None = None,
     saved: Mapping[str, float] | None = None,
 ) -> str:
-    """The stages of a test's scene in order; `seconds_per_step` is what one takes or, left out, saves."""
+    """The stages of a test's scene in order; `seconds_per_step` is what one takes or, left out, saves, `within` the stage
+    that has the time of one that is part of its loop. The times of stages and `beside_stages` add up to the whole step."""
     told = []
     for choice in choices:
-        measured = (costs or {}) if choice.kept else (saved or {})
+        measured = (costs.stages if costs else {}) if choice.kept else (saved or {})
         told.append(
             {
                 "stage": choice.stage,
                 "kept": choice.kept,
                 "reason": choice.reason,
                 "seconds_per_step": measured.get(choice.stage),
+                "within": getattr(choice, "within", ""),
             }
         )
-    return readable({"test": name, "stages": told})
+    whole = {"seconds_per_step": costs.whole, "beside_stages": costs.beside} if costs else {}
+    return readable({"test": name, "stages": told} | whole)
 
 
 def stats_json(found: Any) -> str:

@@ -221,11 +221,13 @@ def _instructions(run: Timed, simulate: Simulate) -> int | None:
     return min((count for count in counts if count), default=None)
 
 
-def stage_seconds(run: Timed, simulate: Simulate) -> dict[str, float]:
-    """Time by stage; empty for an engine that has no such clock."""
+def stage_seconds(run: Timed, simulate: Simulate) -> tuple[dict[str, float], float]:
+    """Time by stage, and of the whole run that it was measured in; empty for an engine that has no such clock."""
     watch = Stopwatch(simulate, {"time_stages": True})
     answer = ask(partial(run, watch))
-    return _stages(watch) if answer.outcome == "value" else {}
+    if answer.outcome != "value" or not watch.results:
+        return {}, math.nan
+    return _stages(watch), float(watch.results[0].seconds)
 
 
 def _stages(watch: Stopwatch) -> dict[str, float]:

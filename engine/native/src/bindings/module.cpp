@@ -11,8 +11,11 @@ namespace spook {
 
 nb::list to_list(const StageChoices& choices) {
     nb::list list;
-    for (std::size_t k = 0; k < STAGES; ++k)
-        list.append(nb::make_tuple(to_text(static_cast<Stage>(k)), choices[k].kept, choices[k].reason));
+    for (std::size_t k = 0; k < STAGES; ++k) {
+        const Stage stage = static_cast<Stage>(k), other = choices[k].kept ? host(stage, choices) : stage;
+        list.append(nb::make_tuple(to_text(stage), choices[k].kept, choices[k].reason,
+                                   other == stage ? std::string() : to_text(other)));
+    }
     return list;
 }
 

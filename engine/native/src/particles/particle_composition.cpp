@@ -118,7 +118,7 @@ void ParticleComposition::drift_kick(double tau) noexcept {
     find_kicks();
     for (std::size_t node = 0; node < nodes_.x.size(); ++node) nodes_.v[node] += part * nodes_.kick[node];
     state_.pending = 0.5 * tau;
-    if (clock_) clock_->mark(forces_.fields().empty() ? Stage::apply_gravity : Stage::apply_central_gravity);
+    if (clock_) clock_->mark({Stage::apply_central_gravity, Stage::apply_springs, Stage::apply_gravity, Stage::apply_loads});
 }
 
 void ParticleComposition::find_kicks() noexcept {
@@ -131,6 +131,7 @@ bool ParticleComposition::constrained_stage(double tau, double* history) {
     const double span = state_.pending + 0.5 * tau, part = span / h_;
     double *one = history, *two = history + count, *three = history + 2 * count;
     find_kicks();
+    if (clock_ && forces_.any()) clock_->mark({Stage::apply_central_gravity, Stage::apply_springs});
     const double a1 = state_.stage_steps >= 3 ? 3.0 : state_.stage_steps == 2 ? 2.0 : 1.0;
     const double a2 = state_.stage_steps >= 3   ? -3.0
                       : state_.stage_steps == 2 ? -1.0

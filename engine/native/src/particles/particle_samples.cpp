@@ -16,7 +16,8 @@ void ParticleSystem::observe(Recorder& recorder, std::int64_t sample) {
     if (composition_) {
         if (sample > 0) read_composition();
     } else if (half_step_) {
-        velocity_stage<false>();
+        if (clock_) velocity_stage<true>();
+        else velocity_stage<false>();
         velocity_ready_ = true;
         for (std::size_t node = 0; node < nodes_.v.size(); ++node)
             seen_.v[node] = 0.5 * (seen_.v[node] + nodes_.v[node]);

@@ -112,6 +112,8 @@ StageChoices choose_stages(const ParticleScene& scene, bool observing) {
                                  "velocities live at whole steps");
             case Stage::integrate_positions: return {true, "every body can move"};
             case Stage::integrate_rotations: return leave_out("a particle has no rotation");
+            case Stage::project_positions:
+            case Stage::sleep: return leave_out(no_contacts);
             case Stage::observe:
                 return choose_if(observing, "observables are reduced inside the loop",
                                  "nothing is read while the loop runs");

@@ -35,7 +35,7 @@ template <bool Timed> void ParticleSystem::advance_by(std::int64_t steps) {
 template <bool Timed> void ParticleSystem::velocity_stage() {
     if (parts_.forces.any()) {
         nodes_.kick = nodes_.steady_kick;
-        mark<Timed>(Stage::apply_gravity);
+        if constexpr (Timed) clock_->mark({Stage::apply_gravity, Stage::apply_loads});
         if (!parts_.forces.fields().empty()) {
             parts_.forces.add_attraction(nodes_, parts_.h);
             mark<Timed>(Stage::apply_central_gravity);
@@ -47,22 +47,23 @@ template <bool Timed> void ParticleSystem::velocity_stage() {
     }
     if (parts_.solver == ParticleSolver::none) {
         for (std::size_t node = 0; node < nodes_.v.size(); ++node) nodes_.v[node] += nodes_.kick[node];
-        mark<Timed>(Stage::apply_gravity);
+        if constexpr (Timed) clock_->mark({Stage::apply_gravity, Stage::apply_springs, Stage::apply_central_gravity, Stage::apply_loads});
         return;
     }
     rows_.assemble(nodes_);
     if (corrections_ > 0) bend_rows_back();
     mark<Timed>(Stage::assemble_rows);
+    const Stage solver = parts_.solver == ParticleSolver::path    ? Stage::solve_path
+                         : parts_.solver == ParticleSolver::block ? Stage::solve_block
+                                                                  : Stage::solve_iterative;
     solve_rows();
-    mark<Timed>(parts_.solver == ParticleSolver::path    ? Stage::solve_path
-                : parts_.solver == ParticleSolver::block ? Stage::solve_block
-                                                         : Stage::solve_iterative);
+    mark<Timed>(solver);
     if (corrections_ > 0) {
         correct_curvature();
         mark<Timed>(Stage::correct_curvature);
     }
     kick_nodes(nodes_.v);
-    mark<Timed>(Stage::apply_gravity);
+    mark<Timed>(solver);
 }
 
 void ParticleSystem::position_stage() noexcept {
@@ -97,5 +98,6 @@ void ParticleSystem::kick_nodes(std::vector<Vec3>& v) const noexcept {
 }
 
 template void ParticleSystem::velocity_stage<false>();
+template void ParticleSystem::velocity_stage<true>();
 
 }  // namespace spook

@@ -13,7 +13,7 @@ void RigidSystem::apply_forces() {
     if (!force_.empty()) find_forces();
     joints_.begin_step();
     for (int i : free_) kick_free_body(i);
-    if (clock_) clock_->mark(Stage::apply_gravity);
+    if (clock_) clock_->mark({Stage::apply_gravity, Stage::apply_loads});
 }
 
 /// Of central fields and of springs between centres.

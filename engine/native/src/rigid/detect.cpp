@@ -39,7 +39,9 @@ bool RigidSystem::meet_late() {
     };
     const bool stop_hit = any([](const RowBlock& block) { return block.stop.hit; }),
                rebounds = any([](const RowBlock& block) { return block.stop.rebound != 0.0; });
-    if (!contacts_->meets(scratch_.next, stop_hit, rebounds)) return false;
+    const bool meets = contacts_->meets(scratch_.next, stop_hit, rebounds);
+    if (clock_) clock_->mark(Stage::collision);
+    if (!meets) return false;
     touching_ = true;
     note_start_of_contacts();
     return true;

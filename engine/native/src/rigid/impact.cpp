@@ -55,7 +55,6 @@ void RigidSystem::impact() {
             if (stop.rebound == 0.0) state.met = mixed_.rows[k].lower[stop.row] == 0.0 ? 1 : -1;
         }
     fill_rows();
-    if (clock_) clock_->mark(Stage::impact);
 }
 
 }  // namespace spook

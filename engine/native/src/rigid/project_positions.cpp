@@ -47,7 +47,6 @@ void RigidSystem::project_positions() {
     if (at_hand_) return;  // in a plane nothing overlaps
     if (joints_.take_given()) project_limits();
     if (touching_) project_overlaps();
-    if (clock_) clock_->mark(Stage::integrate_positions);
 }
 
 /// Parts what overlaps where the step ends; again as long as it helps, since a displacement is only right to first

@@ -244,7 +244,7 @@ bool RigidSystem::hold_stage(double tau, double span, std::size_t stage) {
 bool RigidSystem::composed_stage(double tau, std::size_t stage) {
     const double span = live_.pending + 0.5 * tau;
     kick_all(span);
-    if (clock_) clock_->mark(Stage::apply_gravity);
+    if (clock_) clock_->mark({Stage::apply_gravity, Stage::apply_loads});
     if (solver_ == RigidSolver::block) {
         if (!hold_stage(tau, span, stage)) return false;
         if (clock_) clock_->mark(Stage::solve_block);

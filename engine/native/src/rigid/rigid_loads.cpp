@@ -75,9 +75,6 @@ void RigidSystem::follow_time() {
     }
     if (clock_ && !drives_.empty()) clock_->mark(Stage::follow_time);
     if (!load_follows_.empty()) find_loads(now);
-    if (!clock_) return;
-    if (!fluids_.empty()) clock_->mark(Stage::apply_fluids);
-    else if (!turning_springs_.empty()) clock_->mark(Stage::apply_springs);
 }
 
 void RigidSystem::find_loads(double time) {
@@ -91,12 +88,15 @@ void RigidSystem::find_loads(double time) {
         acceleration_[drive.index] += part * drive.linear;
         constants_[drive.index].torque += part * drive.angular;
     }
+    if (clock_ && !drives_.empty()) clock_->mark(Stage::follow_time);
     for (const SpringForce& spring : turning_springs_) pull_aside(spring);
+    if (clock_ && !turning_springs_.empty()) clock_->mark(Stage::apply_springs);
     const Vec3 gravity = stages_.runs(Stage::apply_gravity) ? gravity_ : Vec3{};
     for (int i : load_follows_) {
         for (const Fluid& fluid : fluids_) add_fluid(fluid, i, acceleration_[i], constants_[i].torque);
         acceleration_[i] = gravity + (1.0 / constants_[i].mass) * acceleration_[i];
     }
+    if (clock_ && !fluids_.empty()) clock_->mark(Stage::apply_fluids);
 }
 
 /// Where an end of a spring is, and how fast.

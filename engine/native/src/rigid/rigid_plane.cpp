@@ -60,7 +60,6 @@ void RigidSystem::move_in_plane() {
         deliver();
         live_.whirling = find_whirling({&body, 1});
     }
-    if (clock_) clock_->mark(Stage::integrate_positions);
 }
 
 }  // namespace spook

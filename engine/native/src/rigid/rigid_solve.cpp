@@ -147,6 +147,7 @@ void RigidSystem::solve_locked() {
         finite = locked_.solve(live_.bodies, loads, method_.refinements, [this](int body, const Twist& v) {
             scratch_.next[body] = {v.linear.x, v.linear.y, v.linear.z, v.angular.x, v.angular.y, v.angular.z};
         });
+        if (clock_) clock_->mark(Stage::solve_block);
         if (finite && meet_late()) return solve_mixed(true);
         for (int i : constrained_)
             if (finite)
@@ -176,7 +177,9 @@ void RigidSystem::solve_block() {
     }
     if (clock_) clock_->mark(Stage::assemble_rows);
 
-    if (!factor_and_solve()) {
+    const bool finite = factor_and_solve();
+    if (clock_) clock_->mark(Stage::solve_block);
+    if (!finite) {
         live_.not_solved = constrained_.front();
         return;
     }
@@ -190,7 +193,10 @@ void RigidSystem::solve_block() {
         }
         if (meet_late()) return solve_mixed(true);
     }
-    if (method_.corrections > 0) correct_curvature();
+    if (method_.corrections > 0) {
+        correct_curvature();
+        if (clock_) clock_->mark(Stage::correct_curvature);
+    }
     if (stiff_) keep_angular_momentum();
     watch_redundancy();
     take_block_solution();

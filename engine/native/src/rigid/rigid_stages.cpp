@@ -11,7 +11,7 @@ namespace {
 
 /// What the choice of a stage depends on.
 struct Facts {
-    bool joints, bounded, contacts, rubbing, oriented, conveying, rolling, iterative, turning, moving, loaded;
+    bool joints, bounded, limited, contacts, rubbing, oriented, conveying, rolling, iterative, turning, moving, loaded;
     int with_surface = 0;
 };
 
@@ -36,6 +36,9 @@ Facts facts_of(const RigidScene& scene) {
     facts.joints = !scene.joints.empty();
     facts.bounded = std::any_of(scene.joints.begin(), scene.joints.end(),
                                 [](const JointSpec& joint) { return can_let_go(joint); });
+    facts.limited = std::any_of(scene.joints.begin(), scene.joints.end(), [](const JointSpec& joint) {
+        return joint.one_sided || (joint.has_limit && joint.limit_lower < joint.limit_upper);
+    });
     facts.contacts = Detection(scene.colliders, dynamic, scene.no_contact).possible();
     facts.rubbing = facts.contacts && rubbing >= 2;
     facts.oriented = facts.rubbing && facts.oriented;
@@ -198,6 +201,10 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
             case Stage::integrate_rotations:
                 return choose_if(is.turning || method.force_rotation,
                                  is.turning ? "rigid bodies can turn" : forced, "no rigid body can turn");
+            case Stage::project_positions:
+                return choose_if(is.contacts || is.limited, is.contacts ? "overlaps go by positions and leave no trace in velocities" : "limits that are passed where the scene begins come back by positions", is.joints ? "nothing can overlap, and no joint has a limit" : no_contact);
+            case Stage::sleep:
+                return choose_if(is.contacts && method.sleep_speed > 0.0, "islands at rest are left out of the steps until something comes to them", is.contacts ? "the method does not ask for it" : no_contact);
             case Stage::observe:
                 return choose_if(observing, "observables are reduced inside the loop",
                                  "nothing is read while the loop runs");

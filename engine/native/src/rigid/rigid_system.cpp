@@ -198,6 +198,8 @@ void RigidSystem::take_stages(const RigidScene& scene) {
     stages_.take(Stage::correct_curvature);
     stages_.take(Stage::integrate_positions);
     stages_.take(Stage::integrate_rotations);
+    stages_.take(Stage::project_positions);
+    stages_.take(Stage::sleep);
     stages_.take(Stage::observe);
     stages_.expect_all_taken("rigid bodies");
 }

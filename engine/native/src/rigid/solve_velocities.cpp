@@ -24,6 +24,7 @@ void RigidSystem::solve_velocities() {
         solve_mixed(false);
     } else {
         for (int i : constrained_) kick_free_body(i);  // bodies that could touch but do not
+        if (clock_) clock_->mark({Stage::apply_gravity, Stage::apply_loads});
     }
 }
 
@@ -35,16 +36,20 @@ void RigidSystem::solve_mixed(bool touching) {
     const auto impact_needed = [&] {
         return touching && stages_.runs(Stage::impact) && contacts_->impact_needed(mixed_);
     };
+    const Stage solver = stages_.runs(Stage::solve_iterative) ? Stage::solve_iterative : Stage::pivot;
     bool finite = true;
     scratch_.other_ends.clear();
     int corrected = 0;
     const auto to_correct = [&] { return curved_ && corrected++ < method_.corrections; };
     do {
         fill_rows(corrected > 0);
+        if (clock_) clock_->mark(Stage::assemble_rows);
         while (impact_needed()) impact(), corrected = 0;
+        if (clock_ && touching) clock_->mark(Stage::impact);
         fill_momenta(true);
         if (clock_) clock_->mark(Stage::assemble_rows);
         finite = touching ? contacts_->solve(mixed_, scratch_.velocities) : solve_joints();
+        if (clock_) clock_->mark(solver);
     } while (finite && (impact_needed() || ((!touching || contacts_->ends_passed()) && find_other_ends()) ||
                         to_correct()));  // the solve may find some that is to come first
     if (touching) judge_contacts();
@@ -74,7 +79,7 @@ void RigidSystem::solve_mixed(bool touching) {
     if (touching) take_velocities(false, [this](int k) { return !contacts_->has_rows(k); });
     else take_velocities(false, {});
     share_.clear();
-    if (clock_) clock_->mark(solver_ == RigidSolver::iterative ? Stage::solve_iterative : Stage::pivot);
+    if (clock_) clock_->mark(solver);
 }
 
 void RigidSystem::fill_masses() {

@@ -29,9 +29,13 @@ void RigidSystem::step() {
     live_.velocity_ready = false;
     keep_first_joints();
     integrate();
+    if (clock_) clock_->mark(Stage::integrate_positions);
     project_positions();
+    if (clock_) clock_->mark(Stage::project_positions);
     end_step();
+    if (clock_) clock_->mark(Stage::integrate_positions);
     sleep();
+    if (clock_) clock_->mark(Stage::sleep);
 }
 
 /// From wake to solve velocities; also ahead of the step, for samples that need them.
@@ -39,6 +43,7 @@ void RigidSystem::find_velocities() {
     if (in_plane_ && plane_velocities()) return;
     begin_velocities();
     wake();
+    if (clock_) clock_->mark(Stage::sleep);
     do {
         if (all_sleep()) return sleep_through();
         leave_out_sleepers_for_now();

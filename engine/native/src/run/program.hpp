@@ -50,7 +50,7 @@ public:
     /// Run from the start. time_limit in s, 0 for none; timed asks for seconds by stage.
     RunReport run(std::int64_t steps, double time_limit, bool timed) {
         RunReport report;
-        StageClock clock;
+        StageClock clock(choices_);
         Watch watch(time_limit);
         recorder_.prepare(steps);
         bool begun = true;
@@ -64,6 +64,7 @@ public:
             report.recordings = recorder_.recordings();
             report.counters["samples"] = recorder_.samples_read();
         }
+        const StageClock spent = clock;  // the state is read after the last step
         system_.count(report, report.steps);
         watch.extend();
         if (!begun) report.final_state = system_.places();
@@ -75,8 +76,8 @@ public:
         report.state_hash = state_hash(report.final_state);
         for (std::size_t k = 0; k < STAGES; ++k) {
             const Stage stage = static_cast<Stage>(k);
-            if (timed && clock.seconds(stage) > 0.0)
-                report.stage_seconds[to_text(stage)] = clock.seconds(stage);
+            if (timed && spent.seconds(stage) > 0.0)
+                report.stage_seconds[to_text(stage)] = spent.seconds(stage);
         }
         return report;
     }

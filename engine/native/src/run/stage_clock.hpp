@@ -13,18 +13,30 @@ class StageClock {
 public:
     using Clock = std::chrono::steady_clock;
 
+    explicit StageClock(const StageChoices& choices) {
+        for (std::size_t k = 0; k < STAGES; ++k) kept_[k] = choices[k].kept;
+    }
+
     void start() noexcept { last_ = Clock::now(); }
-    /// The time since the last mark belongs to `stage`.
+    /// The time since the last mark belongs to `stage`; to the stage of the next mark where it is left out.
     void mark(Stage stage) noexcept {
+        if (!kept(stage)) return;
         const auto now = Clock::now();
         seconds_[static_cast<std::size_t>(stage)] += std::chrono::duration<double>(now - last_).count();
         last_ = now;
     }
+    /// It belongs to the first of `stages` that is kept.
+    void mark(std::initializer_list<Stage> stages) noexcept {
+        for (const Stage stage : stages)
+            if (kept(stage)) return mark(stage);
+    }
+    bool kept(Stage stage) const noexcept { return kept_[static_cast<std::size_t>(stage)]; }
     double seconds(Stage stage) const noexcept { return seconds_[static_cast<std::size_t>(stage)]; }
 
 private:
     Clock::time_point last_ = Clock::now();
     std::array<double, STAGES> seconds_{};
+    std::array<bool, STAGES> kept_{};
 };
 
 }  // namespace spook

@@ -8,6 +8,7 @@
 #include <array>
 #include <initializer_list>
 #include <utility>
+#include <vector>
 
 #include "run/named_enum.hpp"
 
@@ -19,7 +20,7 @@ SPOOK_NAMED_ENUM(Stage, collision, meet_meshes, apply_gravity, apply_central_gra
                  couple_joints, hold_wires, wind_wires, tangents, solve_path, solve_block, solve_iterative,
                  pivot, friction, orient_friction, move_surfaces, roll, rub_wires, roll_tyres, rub_joints,
                  break_joints, correct_curvature, half_step, integrate_positions, integrate_rotations,
-                 observe)
+                 project_positions, sleep, observe)
 
 inline constexpr std::size_t STAGES = static_cast<std::size_t>(Stage::observe) + 1;
 
@@ -43,6 +44,43 @@ inline StageChoice choose_if(bool kept, const std::string& why, const std::strin
     return {kept, kept ? why : why_not};
 }
 inline StageChoice leave_out(const std::string& why_not) { return {false, why_not}; }
+
+/// The stages in whose loops a stage is done where it has none of its own: the first of them that is kept has its time.
+inline std::vector<Stage> hosts(Stage stage) {
+    switch (stage) {
+        case Stage::meet_meshes: return {Stage::collision};
+        case Stage::apply_springs: return {Stage::apply_central_gravity};
+        case Stage::apply_loads:
+            return {Stage::apply_gravity, Stage::apply_springs, Stage::apply_central_gravity};
+        case Stage::string_stiffness:
+        case Stage::couple_joints:
+        case Stage::hold_wires:
+        case Stage::wind_wires: return {Stage::assemble_rows};
+        case Stage::tangents:
+        case Stage::friction:
+        case Stage::orient_friction:
+        case Stage::move_surfaces:
+        case Stage::roll:
+        case Stage::rub_wires:
+        case Stage::roll_tyres:
+        case Stage::rub_joints:
+        case Stage::break_joints: return {Stage::pivot, Stage::solve_iterative};
+        case Stage::apply_gravity:
+        case Stage::assemble_rows:
+        case Stage::correct_curvature:
+            return {Stage::solve_path, Stage::solve_block, Stage::pivot, Stage::solve_iterative};
+        case Stage::half_step:
+        case Stage::integrate_rotations: return {Stage::integrate_positions};
+        default: return {};
+    }
+}
+
+/// The stage in whose loop this one may be done in such a program; itself where there is none.
+inline Stage host(Stage stage, const StageChoices& choices) {
+    for (const Stage other : hosts(stage))
+        if (choices[static_cast<std::size_t>(other)].kept) return other;
+    return stage;
+}
 
 /// The stages of one program while its system is built.
 class StageList {
