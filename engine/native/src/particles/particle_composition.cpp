@@ -118,7 +118,9 @@ void ParticleComposition::drift_kick(double tau) noexcept {
     find_kicks();
     for (std::size_t node = 0; node < nodes_.x.size(); ++node) nodes_.v[node] += part * nodes_.kick[node];
     state_.pending = 0.5 * tau;
-    if (clock_) clock_->mark({Stage::apply_central_gravity, Stage::apply_springs, Stage::apply_gravity, Stage::apply_loads});
+    if (clock_)
+        clock_->mark(
+            {Stage::apply_central_gravity, Stage::apply_springs, Stage::apply_gravity, Stage::apply_loads});
 }
 
 void ParticleComposition::find_kicks() noexcept {

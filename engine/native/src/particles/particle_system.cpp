@@ -47,7 +47,9 @@ template <bool Timed> void ParticleSystem::velocity_stage() {
     }
     if (parts_.solver == ParticleSolver::none) {
         for (std::size_t node = 0; node < nodes_.v.size(); ++node) nodes_.v[node] += nodes_.kick[node];
-        if constexpr (Timed) clock_->mark({Stage::apply_gravity, Stage::apply_springs, Stage::apply_central_gravity, Stage::apply_loads});
+        if constexpr (Timed)
+            clock_->mark({Stage::apply_gravity, Stage::apply_springs, Stage::apply_central_gravity,
+                          Stage::apply_loads});
         return;
     }
     rows_.assemble(nodes_);

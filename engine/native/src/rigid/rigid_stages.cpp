@@ -11,7 +11,8 @@ namespace {
 
 /// What the choice of a stage depends on.
 struct Facts {
-    bool joints, bounded, limited, contacts, rubbing, oriented, conveying, rolling, iterative, turning, moving, loaded;
+    bool joints, bounded, limited, contacts, rubbing, oriented, conveying, rolling, iterative, turning,
+        moving, loaded;
     int with_surface = 0;
 };
 
@@ -202,9 +203,15 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
                 return choose_if(is.turning || method.force_rotation,
                                  is.turning ? "rigid bodies can turn" : forced, "no rigid body can turn");
             case Stage::project_positions:
-                return choose_if(is.contacts || is.limited, is.contacts ? "overlaps go by positions and leave no trace in velocities" : "limits that are passed where the scene begins come back by positions", is.joints ? "nothing can overlap, and no joint has a limit" : no_contact);
+                return choose_if(is.contacts || is.limited,
+                                 is.contacts
+                                     ? "overlaps go by positions and leave no trace in velocities"
+                                     : "limits that are passed where the scene begins come back by positions",
+                                 is.joints ? "nothing can overlap, and no joint has a limit" : no_contact);
             case Stage::sleep:
-                return choose_if(is.contacts && method.sleep_speed > 0.0, "islands at rest are left out of the steps until something comes to them", is.contacts ? "the method does not ask for it" : no_contact);
+                return choose_if(is.contacts && method.sleep_speed > 0.0,
+                                 "islands at rest are left out of the steps until something comes to them",
+                                 is.contacts ? "the method does not ask for it" : no_contact);
             case Stage::observe:
                 return choose_if(observing, "observables are reduced inside the loop",
                                  "nothing is read while the loop runs");
