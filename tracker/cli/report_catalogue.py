@@ -124,11 +124,10 @@ def _per_step(cost: float | None, verb: str) -> str:
     return "" if cost is None else f"{verb} {seconds(cost)}" if cost > 0.0 else f"{verb} nothing"
 
 
-def _taken(choice: Any, costs: Mapping[str, float]) -> str:
-    within = getattr(choice, "within", "")
-    if choice.stage not in costs and within:
+def _taken(stage: str, within: str, costs: Mapping[str, float]) -> str:
+    if stage not in costs and within:
         return f"in {within}"
-    return _per_step(costs.get(choice.stage), "takes") or "did not run"
+    return _per_step(costs.get(stage), "takes") or "did not run"
 
 
 def stage_table(
@@ -148,7 +147,10 @@ def stage_table(
     columns: tuple[Column, ...] = (Column("stage"), Column("name"), Column("why", flexible=True))
     if costs is not None and saved is not None:
         told = [
-            _taken(c, costs.stages) if c.kept else _per_step(saved.get(c.stage), "saves") for c in choices
+            _taken(c.stage, getattr(c, "within", ""), costs.stages)
+            if c.kept
+            else _per_step(saved.get(c.stage), "saves")
+            for c in choices
         ]
         columns = (*columns[:2], Column("a step", "right"), columns[2])
         rows = [(*row[:2], cost, row[2]) for row, cost in zip(rows, told, strict=True)]

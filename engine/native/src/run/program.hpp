@@ -56,6 +56,7 @@ public:
         bool begun = true;
         try {
             system_.reset(timed ? &clock : nullptr);
+            clock = StageClock(choices_);  // of steps alone
             run_loop(system_, recorder_, steps, watch, report);
         } catch (const Stopped&) {
             begun = false;
