@@ -44,8 +44,10 @@ def _with_its_parent() -> None:
 
 
 @contextmanager
-def browser(chrome: str, driver: str) -> Iterator[Any]:
+def browser(chrome: str, driver: str, *, trace: str = "") -> Iterator[Any]:
     """A driver of a browser that cannot reach anything but files, and dies with the test.
+
+    With categories of Chromium's `trace` its events stand in the log named performance.
 
     Also with one that is killed, on Linux: the driver by the system's word, and the browser because what it is
     told comes through the driver's pipe, which closes then.
@@ -65,7 +67,11 @@ def browser(chrome: str, driver: str) -> Iterator[Any]:
         options.add_argument(argument)
     if hasattr(os, "geteuid") and os.geteuid() == 0:
         options.add_argument("--no-sandbox")
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    logs = {"browser": "ALL"}
+    if trace:
+        logs["performance"] = "ALL"
+        options.add_experimental_option("perfLoggingPrefs", {"traceCategories": trace})
+    options.set_capability("goog:loggingPrefs", logs)
     # The word is given when the starting thread ends: of others than the first that may be long before the process.
     leashed = sys.platform == "linux" and threading.current_thread() is threading.main_thread()
     started = {"preexec_fn": _with_its_parent} if leashed else {}

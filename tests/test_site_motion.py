@@ -198,10 +198,13 @@ def test_bar_and_axes_of_a_replay_measure_what_the_camera_sees(driver, site):
         visit(driver, site, "tests/pendulum.html", dark=dark)
         driver.execute_script("document.getElementById('replay').scrollIntoView()")
         wait_for(driver, "!!document.getElementById('replay').player")
-        told += driver.execute_script("""
+        told += driver.execute_async_script("""
+          const done = arguments[0], drawn = () => new Promise((then) => requestAnimationFrame(() => requestAnimationFrame(then)));
+          (async () => {
           const v = document.getElementById('replay').player.view, wide = v.host.clientWidth, high = v.host.clientHeight, found = [];
           for (const key of ['', 'ArrowRight', 'ArrowUp', '-']) {
             v.turnBy(key);
+            await drawn();
             const m = v.camera.matrixWorld.elements, at = (p) => { const q = p.project(v.camera); return [q.x * wide / 2, q.y * high / 2]; };
             const middle = v.controls.target, start = at(middle.clone());
             const across = at(middle.clone().add({ x: m[0] * v.marks.metres, y: m[1] * v.marks.metres, z: m[2] * v.marks.metres }));
@@ -214,6 +217,7 @@ def test_bar_and_axes_of_a_replay_measure_what_the_camera_sees(driver, site):
               projected: ['x', 'y', 'z'].map((k) => { const p = middle.clone(); p[k] += v.size * 1e-4; const q = at(p); return [q[0] - start[0], q[1] - start[1]]; }) });
           }
           return found;
+          })().then(done);
         """)
 
     for seen in told:
@@ -471,15 +475,15 @@ def test_the_box_on_a_slope_shows_friction_over_normal_force_while_it_runs(drive
 def test_ten_thousand_bodies_are_drawn_in_one_picture(driver, site):
     """Instanced: three.js is asked for one draw call a shape. (How long it takes is a matter of `make bench`.)"""
     replay(driver, site)
-    calls = driver.execute_script("""
+    calls = driver.execute_async_script("""
       const n = 10000, box = document.getElementById('replay'), position = new Float32Array(2 * 3 * n);
       for (let i = 0; i < 2 * n; i += 1) { position.set([i % 100, Math.floor(i / 100) % 100, (i % 7)], 3 * i); }
       const solids = Array.from({ length: n }, (_, body) => ({ kind: body % 2 ? 'box' : 'sphere', size: body % 2 ? [1, 1, 1] : [0.5],
         position: [...position.slice(3 * body, 3 * body + 3)], orientation: [1, 0, 0, 0], fixed: false, body }));
       box.player.use({ step: 1, count: 2, bodies: n, solids, links: [], rows: 0, gravity: [0, 0, -1], attractors: [], position, orientation: null });
       box.player.seek(0.5);
-      const told = box.player.view.renderer.info.render;
-      return [told.calls, told.triangles];
+      const { render } = box.player.view.renderer.info, done = arguments[0];
+      requestAnimationFrame(() => requestAnimationFrame(() => done([render.calls, render.triangles])));
     """)
 
     assert calls[0] <= 4

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
+import numpy as np
 import pytest
 
 from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
 from spook_tracker.engine.forces import CentralGravity, Spring
-from spook_tracker.engine.joints import Distance, Hinge
+from spook_tracker.engine.joints import Distance, Hinge, Motor
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Box, Capsule, Compound, Part, Plane, Sphere
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
@@ -88,6 +91,72 @@ def test_a_hinge_stands_where_it_was_put() -> None:
     (link,) = drawing(scene).links
 
     assert link.ends == ((0.0, 0.0, 0.5), (0.0, 0.0, 0.5))
+
+
+def test_what_is_driven_is_drawn_apart_from_what_only_moves_or_stands() -> None:
+    ball = Sphere(0.1)
+    bodies = (
+        RigidBody(
+            name="belt", shape=ball, motion="kinematic", position=(0.0, 0.0, 0.0), velocity=(1.0, 0.0, 0.0)
+        ),
+        RigidBody(name="stand", shape=ball, motion="kinematic", position=(1.0, 0.0, 0.0)),
+        RigidBody(name="base", shape=ball, mass=1.0, position=(2.0, 0.0, 0.0)),
+        RigidBody(name="arm", shape=ball, mass=1.0, position=(3.0, 0.0, 0.0)),
+    )
+    hinge = Hinge(
+        name="h", between=("base", "arm"), at=(2.5, 0.0, 0.0), axis=(0.0, 0.0, 1.0), motor=Motor(speed=1.0)
+    )
+
+    drawn = drawing(Scene(bodies=bodies, constraints=(hinge,)))
+    picture = scenery(drawn)
+
+    assert [solid.driven for solid in drawn.solids] == [True, False, False, True]
+    assert picture is not None and picture.driven
+    assert "2 driven spheres, 1 fixed sphere, 1 sphere" in picture.description
+    assert sum(shape.classes == "driven f2" for shape in picture.shapes) == 2
+    assert not drawing(Scene(bodies=bodies[1:])).solids[0].driven
+
+
+def test_gears_have_their_teeth_and_pitch_circles_that_touch_and_their_carrier_is_an_arm() -> None:
+    """A planetary set of 20 and 30 teeth, .25 m apart; the wheel of a body without a relation stays its box."""
+    scene = CATALOGUE["gears"].example().scene
+    sun, arm, planet = drawing(scene).solids
+    corners = [
+        np.array(list(batched_corners(wheel.size))) for wheel in (sun, planet)
+    ]  # of all faces, in the axes of the wheel
+
+    assert [solid.kind for solid in (sun, arm, planet)] == ["facets", "box", "facets"]
+    assert (sun.driven, arm.driven, planet.driven) == (True, False, False)
+    radii = [np.hypot(c[:, 0], c[:, 1]) for c in corners]
+    pitch = [0.5 * (r.max() + r[r > 1e-9].min()) for r in radii]
+    assert sum(pitch) == pytest.approx(0.25, rel=1e-3) and pitch[1] / pitch[0] == pytest.approx(1.5, rel=1e-3)
+    outer = [
+        len(np.unique(np.round(c[np.isclose(r, r.max(), rtol=1e-3)][:, :2], 3), axis=0))
+        for c, r in zip(corners, radii, strict=True)
+    ]
+    assert outer == [40, 60], "two corners a tooth"
+    assert arm.position[:2] == pytest.approx((0.125, 0.0)) and arm.size[0] > 0.25
+    assert [s.kind for s in drawing(replace(scene, constraints=scene.constraints[:3])).solids] == 3 * ["box"]
+
+
+def batched_corners(size: Sequence[float]) -> Iterator[tuple[float, ...]]:
+    start = 0
+    while start < len(size):
+        end = start + 1 + 3 * int(size[start])
+        yield from zip(*[iter(size[start + 1 : end])] * 3, strict=True)
+        start = end
+
+
+def test_a_joint_without_a_place_is_at_its_second_bodys_centre() -> None:
+    ends = [
+        RigidBody(name=n, mass=1.0, inertia=(1.0, 1.0, 1.0), position=(x, 0.0, 0.0))
+        for n, x in (("a", 0.0), ("b", 1.0))
+    ]
+    scene = Scene(bodies=tuple(ends), constraints=(Hinge(name="h", between=("a", "b")),))
+
+    (link,) = drawing(scene).links
+
+    assert link.ends == ((1.0, 0.0, 0.0), (1.0, 0.0, 0.0))
 
 
 def test_turning_is_right_handed() -> None:

@@ -232,6 +232,8 @@ class LivePage {
   if (!box) { return; }
   try {
     await Promise.all([script(box.dataset.module), threeFrom(box.dataset.three)]);
+    prepareView();
+    await new Promise((done) => setTimeout(done));
     new LivePage(box);
   } catch (error) {
     box.querySelector(".live-note").textContent = `The engine cannot run in this browser: ${error.message}.`;

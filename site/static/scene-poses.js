@@ -124,6 +124,14 @@ function facesOf(size) {
   return faces;
 }
 
+// The corners of the box in its own axes around a box or facets.
+function cornersOf(solid) {
+  const half = solid.kind === "box" ? solid.size.map((v) => v / 2) : null, points = half ? [half, half.map((v) => -v)] : facesOf(solid.size).flat();
+  const ends = [0, 1, 2].map((k) => [Math.min(...points.map((p) => p[k])), Math.max(...points.map((p) => p[k]))]);
+  return Array.from({ length: 8 }, (_, i) => ends.map((pair, k) => pair[(i >> k) & 1]));
+}
+
+const MOST_TURNED = 200;  // bodies whose corners are followed; of more, spheres around them
 const EXPLODES = 10;  // times the extent of the first half: then that half is framed, and the rest leaves the picture
 
 function extentOf(movie, count = movie.count) {
@@ -131,7 +139,8 @@ function extentOf(movie, count = movie.count) {
   const see = (x, y, z, r) => [x, y, z].forEach((v, k) => {
     if (Math.abs(v) < 1e6) { low[k] = Math.min(low[k], v - r); high[k] = Math.max(high[k], v + r); }
   });
-  const reach = new Float64Array(movie.bodies), drawn = new Uint8Array(movie.bodies);
+  const reach = new Float64Array(movie.bodies), drawn = new Uint8Array(movie.bodies), corners = new Map();
+  const few = movie.orientation && movie.bodies <= MOST_TURNED, start = new Poses(movie, movie.position, movie.orientation), place = [0, 0, 0];
   for (const solid of movie.solids) {
     if (solid.kind === "plane") { continue; }
     if (solid.kind === "facets" && solid.fixed) {  // a ground is as far as it reaches, and flat
@@ -144,7 +153,20 @@ function extentOf(movie, count = movie.count) {
     }
     const r = solid.kind === "box" ? Math.hypot(...solid.size) / 2 : solid.kind === "capsule" ? solid.size[0] + solid.size[1] / 2 :
       solid.kind === "facets" ? Math.max(...facesOf(solid.size).flat().map((p) => Math.hypot(...p))) : solid.size[0] || 0;
-    if (solid.body === WORLD_BODY) { see(...solid.position, r); } else { reach[solid.body] = Math.max(reach[solid.body], r); drawn[solid.body] = 1; }
+    if (solid.body === WORLD_BODY) { see(...solid.position, r); continue; }
+    const aside = Math.hypot(...solid.position.map((v, k) => v - movie.position[3 * solid.body + k]));
+    drawn[solid.body] = 1;
+    if (few && ["box", "facets"].includes(solid.kind)) {  // a flat solid is framed as flat as it stays
+      start.at(solid.body, 0);
+      const away = [start.q[0], -start.q[1], -start.q[2], -start.q[3]], found = corners.get(solid.body) || [];
+      for (const corner of cornersOf(solid)) {
+        turnInto(place, solid.orientation, ...corner);
+        place.forEach((v, k) => { place[k] = v + solid.position[k] - start.p[k]; });
+        turnInto(place, away, ...place);
+        found.push([...place]);
+      }
+      corners.set(solid.body, found);
+    } else { reach[solid.body] = Math.max(reach[solid.body], r + aside); }
   }
   const stride = Math.max(1, Math.floor(count * movie.bodies / 60000));
   for (let sample = 0; sample < count; sample += stride) {
@@ -152,6 +174,12 @@ function extentOf(movie, count = movie.count) {
       if (!drawn[body]) { continue; }
       const i = 3 * (sample * movie.bodies + body);
       see(movie.position[i], movie.position[i + 1], movie.position[i + 2], reach[body]);
+      if (!corners.has(body)) { continue; }
+      start.at(body, sample);
+      for (const corner of corners.get(body)) {
+        turnInto(place, start.q, ...corner);
+        see(...place.map((v, k) => v + start.p[k]), 0);
+      }
     }
   }
   for (const link of movie.links) {
@@ -181,43 +209,4 @@ function axisOf(movie, body) {
     if (size > most) { most = size; found = turns.at(-1); }
   }
   return found && turns.every((turn) => Math.abs(turn.reduce((sum, v, k) => sum + v * found[k], 0)) > 0.999) ? found : null;
-}
-
-// Bodies that roll on each other: the ends of their joint, fixed in them, come apart while their centres keep the
-// sum of its radii. By body: radius, axis, teeth in the proportion of the radii, and the end of the joint as a mark.
-function wheelsOf(movie) {
-  const wheels = new Map(), poses = new Poses(movie, movie.position, movie.orientation), ends = [[0, 0, 0], [0, 0, 0]], centres = [[0, 0, 0], [0, 0, 0]];
-  for (const link of movie.links.slice(0, 200)) {
-    const radii = link.anchors.map((v) => Math.hypot(...v)), least = Math.min(...radii), sum = radii[0] + radii[1];
-    if (link.kind !== "joint" || link.bodies.includes(WORLD_BODY) || !(least > 0)) { continue; }
-    let apart = 0, kept = true;
-    for (let sample = 0; sample < movie.count && kept; sample += Math.max(1, Math.floor(movie.count / 40))) {
-      link.bodies.forEach((body, end) => {
-        poses.at(body, sample);
-        turnInto(ends[end], poses.q, ...link.anchors[end]);
-        for (let k = 0; k < 3; k += 1) { ends[end][k] += poses.p[k]; centres[end][k] = poses.p[k]; }
-      });
-      apart = Math.max(apart, Math.hypot(...ends[0].map((v, k) => v - ends[1][k])));
-      kept = Math.abs(Math.hypot(...centres[0].map((v, k) => v - centres[1][k])) - sum) < 0.02 * sum;
-    }
-    const axes = link.bodies.map((body) => axisOf(movie, body));
-    if (!kept || apart < 0.3 * least || axes.includes(null)) { continue; }
-    link.bodies.forEach((body, end) => {
-      if (!wheels.has(body)) { wheels.set(body, { radius: radii[end], axis: axes[end], teeth: Math.round((16 * radii[end]) / least), mark: link.anchors[end] }); }
-    });
-  }
-  return wheels;
-}
-
-// The faces of a wheel about the z-axis, half of each tooth outside its radius and half inside.
-function toothed(radius, thick, teeth) {
-  const rim = [], far = [1.06, 1.06, 0.94, 0.94], low = -thick / 2, high = thick / 2;
-  for (let i = 0; i < 4 * teeth; i += 1) {
-    const angle = (2 * Math.PI * i) / (4 * teeth), r = radius * far[i % 4];
-    rim.push([r * Math.cos(angle), r * Math.sin(angle)]);
-  }
-  return rim.flatMap(([x, y], i) => {
-    const [u, v] = rim[(i + 1) % rim.length];
-    return [[[0, 0, high], [x, y, high], [u, v, high]], [[0, 0, low], [u, v, low], [x, y, low]], [[x, y, low], [u, v, low], [u, v, high], [x, y, high]]];
-  });
 }

@@ -4,17 +4,28 @@
 // Needs scene-poses.js and scene-marks.js.
 "use strict";
 
-const MOST_ARROWS = 400, MOST_TRAILS = 3;
+const MOST_ARROWS = 400, MOST_TRAILS = 3, MOST_SHADES = 2000, DRIVEN = "--c6";
 const DOUBLE_SIDE = 2, WIDEST_CONE = 3;  // three.js' name for both sides of a surface; mu from which a cone is drawn no wider
 const SLIDES = 0.999;  // share of the friction bound from which a point is shown as sliding
 const TURN = Math.PI / 18, NEARER = 1.15;  // of one press of a key: rad; ratio of distances
+
+// A context takes long enough to be made in a task of its own, before there is anything to draw.
+let prepared = null;
+function renderer() {
+  const made = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
+  made.debug.checkShaderErrors = false;  // asking waits for the compiler
+  return made;
+}
+function prepareView() {
+  try { prepared = prepared || renderer(); } catch (error) { prepared = null; }  // SceneView says it again
+}
 
 class SceneView {
   // `host` is an empty element; throws where the browser has no WebGL.
   constructor(host, movie) {
     this.host = host;
-    this.renderer = new THREE.WebGLRenderer({ antialias: true, alpha: true, preserveDrawingBuffer: true });
-    this.renderer.debug.checkShaderErrors = false;  // asking waits for the compiler
+    this.renderer = prepared || renderer();
+    prepared = null;
     this.renderer.setPixelRatio(Math.min(devicePixelRatio || 1, 2));
     this.canvas = this.renderer.domElement;
     host.append(this.canvas);
@@ -26,8 +37,8 @@ class SceneView {
     this.camera.up.set(0, 0, 1);
     this.scene.add(new THREE.HemisphereLight(0xffffff, 0x8899aa, 1.7));
     const sun = new THREE.DirectionalLight(0xffffff, 1.9);
-    sun.position.set(0.4, -0.7, 1);
-    this.scene.add(sun);
+    this.scene.add(sun, sun.target);
+    this.sun = sun;
     this.controls = new THREE.OrbitControls(this.camera, this.canvas);
     this.controls.enableZoom = false;  // the wheel scrolls the page
     this.canvas.style.touchAction = "pan-y";  // and so does a finger up and down; across, it turns the scene
@@ -52,12 +63,25 @@ class SceneView {
     this.middle = low.map((v, k) => (v + high[k]) / 2);
     this.size = Math.max(...high.map((v, k) => v - low[k])) || 1;
     this.dot = 0.018 * this.size;
+    this.shade(0.5 * Math.hypot(...high.map((v, k) => v - low[k])) || this.size);
     this.build();
     if (!keepCamera) { this.home(low, high); }
     this.resize();
     this.paint();
     // Last: while something uses a shader it is not compiled again, which takes longer than a picture.
     before?.traverse((part) => { part.geometry?.dispose(); part.material?.dispose(); part.dispose?.(); });
+  }
+
+  // What lies on a floor or hangs above it is told by its shadow; where nothing can receive one, none is drawn.
+  shade(radius) {
+    const { solids } = this.movie, { shadow } = this.sun;
+    this.renderer.shadowMap.enabled = this.sun.castShadow = solids.length <= MOST_SHADES && solids.some((s) => s.kind === "plane" || s.fixed);
+    this.sun.target.position.set(...this.middle);
+    this.sun.position.set(...this.middle.map((v, k) => v + 2 * radius * [0.31, -0.55, 0.78][k]));
+    Object.assign(shadow.camera, { left: -radius, right: radius, bottom: -radius, top: radius, near: 0.1 * radius, far: 6 * radius });
+    shadow.camera.updateProjectionMatrix();
+    shadow.mapSize.set(1024, 1024);
+    shadow.normalBias = 0.004 * radius;
   }
 
   home(low, high) {
@@ -99,11 +123,10 @@ class SceneView {
 
   build() {
     const kinds = new Map();
-    const start = new Poses(this.movie, this.movie.position, this.movie.orientation), wheels = wheelsOf(this.movie);
+    const start = new Poses(this.movie, this.movie.position, this.movie.orientation);
     for (const solid of this.movie.solids) {
       if (solid.kind === "plane") { this.floor(solid); continue; }
-      if (solid.kind === "box" && wheels.has(solid.body)) { continue; }  // it stands for the inertia of the wheel
-      const key = (solid.kind === "particle" ? "sphere" : ["capsule", "facets"].includes(solid.kind) ? `${solid.kind} ${solid.size}` : solid.kind) + (solid.fixed ? " fixed" : "");
+      const key = (solid.kind === "particle" ? "sphere" : ["capsule", "facets"].includes(solid.kind) ? `${solid.kind} ${solid.size}` : solid.kind) + (solid.driven ? " driven" : solid.fixed ? " fixed" : "");
       if (!kinds.has(key)) { kinds.set(key, []); }
       // The solid in the axes of its body: a compound has several that move as one.
       start.at(solid.body, 0);
@@ -116,17 +139,19 @@ class SceneView {
     this.solids = [];
     for (const [key, items] of kinds) {
       const detail = items.length > 4000 ? [7, 5] : items.length > 800 ? [10, 6] : [28, 18];
-      const shape = key.split(" ")[0], fixed = key.endsWith("fixed");
+      const shape = key.split(" ")[0], still = key.endsWith("fixed"), driven = key.endsWith("driven");
       const geometry = () => shape === "facets" ? this.facets(key.split(" ")[1].split(",").map(Number)) : shape === "sphere" ? new THREE.SphereGeometry(1, ...detail) : shape === "box" ? new THREE.BoxGeometry(1, 1, 1) :
         new THREE.CapsuleGeometry(...key.split(" ")[1].split(",").map(Number), 6, 16).rotateX(Math.PI / 2);
       const solids = packed(items);
-      this.solids.push({ mesh: this.mesh(geometry(), items.length), solids, poses: this.poses, colour: fixed ? "--ink-3" : "--c0" });
-      if (this.ghost && !fixed) {
-        const mesh = this.mesh(geometry(), items.length, { transparent: true, opacity: 0.55, depthWrite: false, polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 4 });
-        this.solids.push({ mesh, solids, poses: this.ghost, colour: "--c1", ghost: true });
+      const mesh = this.mesh(geometry(), items.length);
+      mesh.castShadow = mesh.receiveShadow = true;
+      this.solids.push({ mesh, solids, poses: this.poses, colour: driven ? DRIVEN : still ? "--ink-3" : "--c0" });
+      if (this.ghost && !still) {
+        const ghost = this.mesh(geometry(), items.length, { transparent: true, opacity: 0.55, depthWrite: false, polygonOffset: true, polygonOffsetFactor: 2, polygonOffsetUnits: 4 });
+        this.solids.push({ mesh: ghost, solids, poses: this.ghost, colour: "--c1", ghost: true });
       }
     }
-    this.wheels(wheels);
+    this.axles();
     const rods = this.movie.links.filter((link) => link.kind !== "joint"), joints = this.movie.links.filter((link) => link.kind === "joint");
     const rod = new THREE.CylinderGeometry(1, 1, 1, 8).rotateX(Math.PI / 2);
     this.rods = rods.length ? { mesh: this.mesh(rod, rods.length), links: rods } : null;
@@ -150,26 +175,16 @@ class SceneView {
     this.violationScale = (this.movie.violation || []).reduce((a, v) => Math.max(a, Math.abs(v) || 0), 0);
   }
 
-  // Wheels with their teeth, the second in a second colour, and the axle of whatever the world holds and lets turn.
-  wheels(wheels) {
-    const add = (body, geometry, colour, offset, turn, scale) => {
-      const solids = packed([{ body, offset, turn, scale }]);
-      this.solids.push({ mesh: this.mesh(geometry, 1), solids, poses: this.poses, colour });
-    };
-    let place = 0;
-    for (const [body, { radius, axis, teeth, mark }] of wheels) {
-      const turn = aim(...axis, 1);
-      add(body, this.facesAsGeometry(toothed(radius, 0.3 * radius, teeth)), place++ % 2 ? "--c4" : "--c0", [0, 0, 0], turn, [1, 1, 1]);
-      const out = mark.map((v) => 0.45 * v);
-      add(body, new THREE.SphereGeometry(1, 16, 10), "--paper", out.map((v, k) => v + 0.13 * radius * axis[k]), [1, 0, 0, 0], [0.1 * radius, 0.1 * radius, 0.1 * radius]);
-    }
+  // The axle of whatever the world holds and lets turn.
+  axles() {
     for (const link of this.movie.links) {
       const end = link.kind === "joint" ? link.bodies.indexOf(WORLD_BODY) : -1, body = link.bodies[1 - end];
       const axis = end >= 0 && this.movie.bodies <= 60 ? axisOf(this.movie, body) : null;
       if (!axis) { continue; }
       const reach = Math.max(0.25 * this.size, ...this.movie.solids.filter((s) => s.body === body && s.kind === "box").map((s) => 1.35 * s.size[axis.map(Math.abs).indexOf(Math.max(...axis.map(Math.abs)))]));
       const long = link.anchors[1 - end].every((v) => Math.abs(v) < 1e-9) ? reach : 0.12 * this.size;  // of a hinge at the rim only its pin
-      add(body, new THREE.CylinderGeometry(1, 1, 1, 12).rotateX(Math.PI / 2), "--ink-3", link.anchors[1 - end], aim(...axis, 1), [0.5 * this.dot, 0.5 * this.dot, long]);
+      const solids = packed([{ body, offset: link.anchors[1 - end], turn: aim(...axis, 1), scale: [0.5 * this.dot, 0.5 * this.dot, long] }]);
+      this.solids.push({ mesh: this.mesh(new THREE.CylinderGeometry(1, 1, 1, 12).rotateX(Math.PI / 2), 1), solids, poses: this.poses, colour: "--ink-3" });
     }
   }
 
@@ -256,6 +271,7 @@ class SceneView {
       part.quaternion.set(q[1], q[2], q[3], q[0]);
       this.world.add(part);
     }
+    mesh.receiveShadow = true;
     mesh.userData.colour = "--line-soft";
     grid.userData.colour = "--line";
   }
@@ -377,6 +393,7 @@ class SceneView {
   }
 
   close() {
+    cancelAnimationFrame(this.due);
     this.watch.disconnect();
     this.controls.dispose();
     this.renderer.dispose();
@@ -416,8 +433,12 @@ class SceneView {
     this.marks.show(wide, high, [m[0], m[1], m[2]], [m[4], m[5], m[6]], high / (2 * reach * Math.tan((fov * Math.PI) / 360)));
   }
 
+  // One picture a frame, however often something changes before it.
   draw() {
-    this.renderer.render(this.scene, this.camera);
-    this.mark();
+    this.due = this.due || requestAnimationFrame(() => {
+      this.due = 0;
+      this.renderer.render(this.scene, this.camera);
+      this.mark();
+    });
   }
 }

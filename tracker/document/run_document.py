@@ -205,6 +205,7 @@ class DrawnSolid(Struct, frozen=True, kw_only=True):
     orientation: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
     size: tuple[float, ...] = ()
     fixed: bool = False
+    driven: bool = False  # by a motion that is given, or by a motor
     velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m/s
 
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 
 from msgspec.structs import replace
 
@@ -20,6 +19,7 @@ from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Compound, Shape
 from spook_tracker.tracker.document.quaternions import UPRIGHT, Quaternion, Vector, multiplied, turned
 from spook_tracker.tracker.document.run_document import DrawnLink, DrawnSolid, SceneDrawing
+from spook_tracker.tracker.measure.gear_drawing import gears_of
 
 MOST_SOLIDS = 300
 CLOSE = 0.7  # of the way to the nearest body, a box without a surface is long at most
@@ -27,9 +27,7 @@ CLOSE = 0.7  # of the way to the nearest body, a box without a surface is long a
 
 def drawing(scene: Scene) -> SceneDrawing:
     """The scene at its start; a very large one is drawn in part."""
-    solids: list[DrawnSolid] = []
-    for body in scene.bodies[:MOST_SOLIDS]:
-        solids += solids_of(body, scene.bodies)
+    solids = [solid for of_body in drawn_bodies(scene, scene.bodies[:MOST_SOLIDS]) for solid in of_body]
     places = {body.name: body.position for body in scene.bodies}
     turns = {body.name: getattr(body, "orientation", UPRIGHT) for body in scene.bodies}
     links: list[DrawnLink] = []
@@ -54,8 +52,39 @@ def drawing(scene: Scene) -> SceneDrawing:
     )
 
 
-def solids_of(body: Particle | RigidBody, beside: Sequence[Particle | RigidBody] = ()) -> list[DrawnSolid]:
-    """What is seen of one body among those beside it: several solids of a compound, one of any other."""
+def acted_on(joint: Joint) -> str:
+    """The second body of a joint, at whose centre it is unless it says where."""
+    return next(name for name in reversed(joint.between) if name != WORLD)
+
+
+def driven_bodies(scene: Scene) -> frozenset[str]:
+    """Names of the bodies whose motion is given, and of those that a motor acts on: of two the second."""
+    given = {
+        body.name
+        for body in scene.bodies
+        if isinstance(body, RigidBody)
+        and body.motion == "kinematic"
+        and (body.follows_time or any(body.velocity) or any(body.angular_velocity))
+    }
+    turned_by = {
+        acted_on(joint)
+        for joint in scene.constraints
+        if isinstance(joint, Joint) and getattr(joint, "motor", None) is not None
+    }
+    return frozenset(given | turned_by)
+
+
+def drawn_bodies(scene: Scene, bodies: Sequence[Particle | RigidBody]) -> list[list[DrawnSolid]]:
+    """What is seen of each of these bodies of a scene: several solids of a compound, one of most others."""
+    driven, gears = driven_bodies(scene), gears_of(scene)
+    found = [gears.get(body.name) or _solids_of(body, bodies) for body in bodies]
+    return [
+        [replace(solid, driven=True) for solid in solids] if body.name in driven else solids
+        for body, solids in zip(bodies, found, strict=True)
+    ]
+
+
+def _solids_of(body: Particle | RigidBody, beside: Sequence[Particle | RigidBody]) -> list[DrawnSolid]:
     if isinstance(body, Particle):
         return [DrawnSolid(kind="particle", position=body.position, velocity=body.velocity)]
     if body.shape is None:
@@ -123,11 +152,8 @@ def _end(end: object, anchor: Vector, places: dict[str, Vector], turns: dict[str
 
 
 def _joint(joint: Joint, places: dict[str, Vector]) -> list[DrawnLink]:
-    """A joint stands where it was put, else between its bodies."""
-    if joint.at is not None:
-        return [DrawnLink(kind="joint", ends=(joint.at, joint.at))]
-    ends = [places[name] for name in joint.between if name in places]
-    return [DrawnLink(kind="joint", ends=pair) for pair in pairwise(ends)]
+    at = places[acted_on(joint)] if joint.at is None else joint.at
+    return [DrawnLink(kind="joint", ends=(at, at))]
 
 
 def _moved(position: Vector, orientation: Quaternion, by: Vector) -> Vector:

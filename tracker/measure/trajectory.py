@@ -40,7 +40,7 @@ from spook_tracker.scalar_tests.case import Example, ScalarTest, Simulate
 from spook_tracker.tracker.document.quaternions import UPRIGHT, Vector, turned
 from spook_tracker.tracker.document.run_document import Channel, TrackedLink, Trajectory
 from spook_tracker.tracker.measure.question import ask
-from spook_tracker.tracker.measure.scene_drawing import MOST_SOLIDS, solids_of
+from spook_tracker.tracker.measure.scene_drawing import MOST_SOLIDS, acted_on, drawn_bodies
 
 SAMPLES = 241  # of a trajectory at most; between them the page interpolates
 MOST_STEPS = 60_000
@@ -112,7 +112,7 @@ def _told(
 ) -> Trajectory:  # fmt: skip
     """What is drawn of the scene, with how it moves."""
     bodies = scene.bodies[:MOST_SOLIDS]
-    solids = [solids_of(body, bodies) for body in bodies]
+    solids = drawn_bodies(scene, bodies)
     return Trajectory(
         test=name,
         name="example",
@@ -256,11 +256,11 @@ def channel(name: str, unit: str, values: Array) -> Channel:
     """Values of shape (samples, width) in sixteen bits each."""
     finite = values[np.isfinite(values)]
     low, high = (float(finite.min()), float(finite.max())) if finite.size else (0.0, 0.0)
-    step = (high - low) / CODES or 1.0
+    step = (high - low) / CODES  # 0 of what stays the same
     if not math.isfinite(step):  # a motion that exploded: what is off the scale is no value
         low, step = -1e300, 2e300 / CODES
     with np.errstate(invalid="ignore", over="ignore"):
-        places = np.rint((values - low) / step)
+        places = np.rint((values - low) / (step or 1.0))
     codes = np.where(np.isfinite(places) & (places >= 0) & (places <= CODES), places, CODES + 1).astype(
         np.uint16
     )
@@ -319,12 +319,10 @@ def _links(scene: Scene) -> Sequence[TrackedLink]:
 
 
 def _inverse_of(scene: Scene, joint: Joint) -> Callable[[str], Vector]:
-    """Where the joint is, in the axes of one of its bodies; midway between them if it has no place of its own."""
-    at = {body.name: body for body in scene.bodies}
-    ends = [at[name].position for name in joint.between if name in at]
-    middle = joint.at or tuple(sum(p[k] for p in ends) / len(ends) for k in range(3))
+    """Where the joint is, in the axes of one of its bodies: at the second's centre if it has no place of its own."""
+    place = scene.body(acted_on(joint)).position if joint.at is None else joint.at
 
-    return lambda name: _seen_from(scene, name, (middle[0], middle[1], middle[2]))
+    return lambda name: _seen_from(scene, name, place)
 
 
 def _seen_from(scene: Scene, name: str, point: Vector) -> Vector:

@@ -136,6 +136,7 @@ def motion_script(key: str, motion: Trajectory) -> bytes:
             "kind": solid.kind,
             "size": solid.size,
             "fixed": solid.fixed,
+            "driven": solid.driven,
             "position": solid.position,
             "orientation": solid.orientation,
             "body": body,

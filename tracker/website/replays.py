@@ -32,7 +32,7 @@ def replay(motions: Sequence[Motion]) -> Replay | None:
     note = (
         f"{tonight.count} samples, {number(tonight.step, 3)} s apart; h = {number(tonight.time_step, 6)} s."
     )
-    if place is not None:
+    if place is not None and place.step > 0.0:
         note += f" Places are stored within {number(place.step / 2.0, 2)} m."
     if tonight.failure:
         note += f" It ends early: {tonight.failure}."

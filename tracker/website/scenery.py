@@ -58,6 +58,7 @@ class Scenery:
     shapes: list[Shape] = field(default_factory=list)
     gravity: tuple[str, str, str, str] | None = None  # of the arrow in the corner
     bar: Mark | None = None
+    driven: bool = False  # whether a body in it is
     axes: list[Mark] = field(default_factory=list)
 
 
@@ -106,7 +107,7 @@ def scenery(drawn: SceneDrawing) -> Scenery | None:
             height / 2.0 - (y - (top + bottom) / 2.0) * scale,
         )
 
-    out = Scenery(WIDTH, round(height), _describe(drawn))
+    out = Scenery(WIDTH, round(height), _describe(drawn), driven=any(solid.driven for solid in drawn.solids))
     for quad in quads:
         out.shapes += _floor(quad, place)
     pieces: list[Shape] = []
@@ -141,7 +142,7 @@ def _camera(extent: Sequence[float], gravity: Vector) -> Camera:
 
 
 def _pieces(solid: DrawnSolid, camera: Camera, place: Place, scale: float, dot: float) -> list[Shape]:
-    kind = "fixed" if solid.fixed else "solid"
+    kind = "driven" if solid.driven else "fixed" if solid.fixed else "solid"
     depth = camera.see(solid.position)[2]
     if solid.kind in ("particle", "sphere"):
         radius = scale * (solid.size[0] if solid.kind == "sphere" else dot)
@@ -360,11 +361,17 @@ def _describe(drawn: SceneDrawing) -> str:
     counts: dict[str, int] = {}
     for solid in drawn.solids:
         kind = "many-sided solid" if solid.kind == "facets" else solid.kind
-        name = f"fixed {kind}" if solid.fixed and kind != "plane" else kind
+        how = "driven " if solid.driven else "fixed " if solid.fixed and kind != "plane" else ""
+        name = how + kind
         counts[name] = counts.get(name, 0) + 1
     for link in drawn.links:
         counts[link.kind] = counts.get(link.kind, 0) + 1
-    plural = {"box": "boxes", "fixed box": "fixed boxes", "distance": "distance constraints"}
+    plural = {
+        "box": "boxes",
+        "fixed box": "fixed boxes",
+        "driven box": "driven boxes",
+        "distance": "distance constraints",
+    }
     single = {"distance": "distance constraint"}
     words = [
         f"{n} {single.get(name, name) if n == 1 else plural.get(name, name + 's')}"
