@@ -20,7 +20,7 @@ from spook_tracker.engine import (
     Spring,
 )
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
-from spook_tracker.tracker.measure.ladder import step_cost
+from spook_tracker.tracker.measure.step_cost import step_cost
 
 STEPS = 120
 BESIDE_SHARE = 0.05  # of the step: keeping a state to go back to, checks of it, and the clock

@@ -9,7 +9,7 @@ import pytest
 from spook_tracker import engine
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.measure.cards import explained
-from spook_tracker.tracker.measure.ladder import SAVED_RUNS, saved_by_leaving_out
+from spook_tracker.tracker.measure.step_cost import ROUNDS, leaving_out
 from spook_tracker.tracker.website.nights import book
 from spook_tracker.tracker.website.stage_times import stage_times
 from tests.synthetic_history import history
@@ -54,11 +54,13 @@ def test_only_what_is_left_out_is_forced_in_and_timed(name: str, stages: set[str
         asked.append(options["steps"])
         return engine.simulate(scene, **options)
 
-    saved = saved_by_leaving_out({name: test}, simulate).get(name, {})
+    found = leaving_out(test, simulate)
     left_out = {choice.stage for choice in explained(test, engine) if not choice.kept}
 
-    assert set(saved) == stages
+    assert found is not None
+    assert set(found.saved) == set(found.stages) == stages
     assert stages <= left_out
-    assert all(seconds >= 0.0 for seconds in saved.values())
-    assert sum(steps > 1 for steps in asked) == SAVED_RUNS * (1 + len(stages)) * bool(stages)
-    assert sum(steps == 1 for steps in asked) <= 4
+    assert all(seconds >= 0.0 for seconds in found.saved.values())
+    assert len(found.times) == ROUNDS * bool(stages)
+    if not stages:
+        assert set(asked) == {1}

@@ -428,22 +428,22 @@ def explain(test: str, cost: bool, as_json: bool, engine: str, catalogue: str) -
     """Say which stages of the engine the test's scene needs, which are left out, and why."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.report_catalogue import stage_table
-    from spook_tracker.tracker.measure.ladder import saved_by_leaving_out, step_cost
     from spook_tracker.tracker.measure.run import Questions, select
+    from spook_tracker.tracker.measure.step_cost import leaving_out, step_cost
 
     source = Questions(
         catalogue=catalogue, engine=engine, limits=present().limits_of(engine), folder=present().modules
     )
     tests = select(source.tests(), [test])
-    costs = saved = None
+    costs = out = None
     if cost:
         simulate = source.simulate()
-        saved = saved_by_leaving_out(tests, simulate).get(test, {})
+        out = leaving_out(tests[test], simulate)
         costs = step_cost(tests[test], simulate)
     if as_json:
         from spook_tracker.tracker.cli.report_json import explain_json
         from spook_tracker.tracker.measure.cards import explained
 
-        click.echo(explain_json(test, explained(tests[test], source.module()), costs, saved))
+        click.echo(explain_json(test, explained(tests[test], source.module()), costs, out))
     else:
-        say(stage_table(test, tests[test], source.module(), costs, saved))
+        say(stage_table(test, tests[test], source.module(), costs, out))

@@ -13,8 +13,9 @@ from spook_tracker.tracker.cli.console import Column, table, width
 from spook_tracker.tracker.cli.report_sweep import seconds
 from spook_tracker.tracker.cli.report_table import number
 from spook_tracker.tracker.document.coverage import HEADINGS, Coverage, Rungs, coverage, rungs, summary
+from spook_tracker.tracker.document.coverage import saved as told_saving
 from spook_tracker.tracker.measure.cards import explained
-from spook_tracker.tracker.measure.ladder import StepCost
+from spook_tracker.tracker.measure.step_cost import LeavingOut, StepCost
 
 
 def catalogue_table(tests: Mapping[str, ScalarTest]) -> str:
@@ -37,7 +38,7 @@ def coverage_rows(tests: Mapping[str, ScalarTest], history: Any) -> list[Coverag
     runs = history.runs() if history is not None else ()
     latest = runs[-1].id if runs else None
     measured = rungs(history.samples(latest).values()) if latest else {}
-    stages = {card.name: card.stages for card in history.cards(latest)} if latest else {}
+    saving = {card.name: card.saving for card in history.cards(latest)} if latest else {}
     rows = []
     for name, test in tests.items():
         reached = measured.get(name, {})
@@ -52,7 +53,7 @@ def coverage_rows(tests: Mapping[str, ScalarTest], history: Any) -> list[Coverag
         ]
         points = sum(bool(study.unit or study.expected_source) for study in test.stability)
         maps = len(test.stability) - points
-        rows.append(coverage(name, test.title, ladders, points, maps, stages.get(name, ()), test.lacks))
+        rows.append(coverage(name, test.title, ladders, points, maps, saving.get(name), test.lacks))
     return rows
 
 
@@ -135,17 +136,30 @@ def stage_table(
     test: ScalarTest,
     engine: Any,
     costs: StepCost | None = None,
-    saved: Mapping[str, float] | None = None,
+    out: LeavingOut | None = None,
 ) -> str:
     """The stages of a step of this test's scene: first those kept, in order, then why.
 
-    `costs` are those of stages kept, `saved` seconds per step that leaving a stage out saves, if measured.
+    `costs` are those of stages kept, `out` what leaving out saves, if measured: of the stages that are left out only
+    what was measured has a line then.
     """
     choices = list(explained(test, engine))
+    saved = out.saved if out is not None else {}
     kept = [choice.stage for choice in choices if choice.kept]
     rows: list[tuple[str, ...]] = [("✓ kept" if c.kept else "· left out", c.stage, c.reason) for c in choices]
     columns: tuple[Column, ...] = (Column("stage"), Column("name"), Column("why", flexible=True))
-    if costs is not None and saved is not None:
+    after: list[str] = []
+    if costs is not None:
+        folded = [c.stage for c in choices if not c.kept and c.stage not in saved]
+        choices = [c for c in choices if c.kept] + [c for c in choices if c.stage in saved]
+        rows = [("✓ kept" if c.kept else "· left out", c.stage, c.reason) for c in choices]
+        after = [
+            "",
+            f"A step takes {seconds(costs.whole)} while its stages are timed: {seconds(sum(costs.stages.values()))} in them, "
+            f"{seconds(costs.beside)} between them.",
+        ]
+        after += [f"With all that can be forced in: {told_saving(out.told())}."] if out is not None else []
+        after += textwrap.wrap(f"Also left out: {', '.join(folded)}.", width()) if folded else []
         told = [
             _taken(c.stage, getattr(c, "within", ""), costs.stages)
             if c.kept
@@ -159,11 +173,4 @@ def stage_table(
         return click.style(text, fg="green" if choices[row].kept else None)
 
     lines = [f"{name}: {' → '.join(kept)}", ""]
-    lines += table(columns, rows, colour={0: paint})
-    if costs is not None:
-        lines += [
-            "",
-            f"A step takes {seconds(costs.whole)} while its stages are timed: {seconds(sum(costs.stages.values()))} in them, "
-            f"{seconds(costs.beside)} between them.",
-        ]
-    return "\n".join(lines)
+    return "\n".join([*lines, *table(columns, rows, colour={0: paint}), *after])

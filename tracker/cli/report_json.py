@@ -14,7 +14,7 @@ from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.series_history import Told
 
 if TYPE_CHECKING:
-    from spook_tracker.tracker.measure.ladder import StepCost
+    from spook_tracker.tracker.measure.step_cost import LeavingOut, StepCost
 
 
 def trend_json(trends: Iterable[Told], maps: Iterable[ToldMap] = ()) -> str:
@@ -128,13 +128,17 @@ def explain_json(
     name: str,
     choices: Iterable[Any],
     costs: StepCost | None = None,
-    saved: Mapping[str, float] | None = None,
+    out: LeavingOut | None = None,
 ) -> str:
     """The stages of a test's scene in order; `seconds_per_step` is what one takes or, left out, saves, `within` the stage
-    that has the time of one that is part of its loop. The times of stages and `beside_stages` add up to the whole step."""
+    that has the time of one that is part of its loop. The times of stages and `beside_stages` add up to the whole step.
+
+    `leaving_out`, where it was measured: how many times as long a step takes with all that could be forced in, and the
+    least and the largest of its rounds.
+    """
     told = []
     for choice in choices:
-        measured = (costs.stages if costs else {}) if choice.kept else (saved or {})
+        measured = (costs.stages if costs else {}) if choice.kept else (out.saved if out else {})
         told.append(
             {
                 "stage": choice.stage,
@@ -145,7 +149,8 @@ def explain_json(
             }
         )
     whole = {"seconds_per_step": costs.whole, "beside_stages": costs.beside} if costs else {}
-    return readable({"test": name, "stages": told} | whole)
+    saving = {} if out is None else {"leaving_out": out.told()}
+    return readable({"test": name, "stages": told} | whole | saving)
 
 
 def stats_json(found: Any) -> str:

@@ -9,7 +9,7 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, StageChoice
+from spook_tracker.tracker.document.run_document import Sample, Saving, SeriesDefinition
 from spook_tracker.tracker.document.wording import number
 
 SMALL = 1e-4  # an error that every ladder should come down to, in its own unit
@@ -49,18 +49,30 @@ def coverage(
     ladders: Iterable[Rungs],
     break_points: int,
     maps: int,
-    stages: Sequence[StageChoice],
+    saving: Saving | None,
     lacks: Mapping[str, str],
 ) -> Coverage:
     """One scene's row."""
     sweep = "; ".join(map(str, ladders)) or lacks.get("ladder", "")
     found = [f"{n} {what}{'s' * (n != 1)}" for n, what in ((break_points, "break point"), (maps, "map")) if n]
-    out = [stage for stage in stages if not stage.kept]
-    timed = sum(stage.saved_seconds_per_step is not None for stage in out)
-    saving = f"{timed} of {len(out)} stages timed" if timed else ""
     return Coverage(
-        test, title, (sweep, ", ".join(found) or lacks.get("stability", ""), saving), explained=bool(lacks)
+        test,
+        title,
+        (sweep, ", ".join(found) or lacks.get("stability", ""), saved(saving)),
+        explained=bool(lacks),
     )
+
+
+def saved(saving: Saving | None) -> str:
+    """How many times as long a whole step takes with what it leaves out, the least and the largest round, and whether it
+    gives the same values; "" where that is not measured."""
+    if saving is None:
+        return ""
+    if saving.factor is None or saving.spread is None:
+        return "nothing to leave out"
+    low, high = saving.spread
+    same = "to the bit" if saving.difference == 0.0 else f"to {number(saving.difference, 1)}"
+    return f"{number(saving.factor, 3)} times ({number(low, 3)} to {number(high, 3)}), same {same}"
 
 
 def rungs(pairs: Iterable[tuple[SeriesDefinition, Sample]]) -> dict[str, dict[str, Rungs]]:

@@ -196,6 +196,15 @@ class StageChoice(Struct, frozen=True, kw_only=True):
     saved_seconds_per_step: float | None = None  # measured by forcing the stage in
 
 
+class Saving(Struct, frozen=True, kw_only=True):
+    """What a whole step of a test's example scene saves by what it leaves out, measured by forcing all of it in."""
+
+    stages: tuple[Name, ...]  # left out, and can be forced in; none: every such stage is needed
+    factor: Number | None = None  # the step with them over the step as compiled, median of a few rounds
+    spread: tuple[float, float] | None = None  # the least and the largest round
+    difference: Number | None = None  # of the answers, over the largest; 0: the same to the bit
+
+
 class DrawnSolid(Struct, frozen=True, kw_only=True):
     """One body of a drawing. Size: sphere radius; box edges; capsule radius, length; plane normal; of facets the number
     of corners of each, followed by their places; m."""
@@ -287,6 +296,7 @@ class TestCard(Struct, frozen=True, kw_only=True):
     stages: tuple[StageChoice, ...]
     scene: SceneDrawing | None = None
     lacks: dict[Name, Text] = {}  # why it has no "ladder", or no "stability"
+    saving: Saving | None = None  # None: not measured
     measured: bool = False  # its right answer was measured in the world: validation, not verification
 
 

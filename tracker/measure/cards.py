@@ -13,10 +13,11 @@ from spook_tracker.tracker.document.run_document import EngineVersion, StageChoi
 from spook_tracker.tracker.measure.commit import changed_since, subject_and_author
 from spook_tracker.tracker.measure.question import ask, sentence
 from spook_tracker.tracker.measure.scene_drawing import drawing
+from spook_tracker.tracker.measure.step_cost import LeavingOut
 
 
-def test_card(name: str, test: ScalarTest, engine: Any, saved: Mapping[str, float]) -> TestCard:
-    """The test as it is worded now; `saved` are seconds per step by stage left out."""
+def test_card(name: str, test: ScalarTest, engine: Any, out: LeavingOut | None) -> TestCard:
+    """The test as it is worded now; `out` is what leaving stages out saves, if measured."""
     return TestCard(
         name=name,
         title=test.title,
@@ -30,9 +31,10 @@ def test_card(name: str, test: ScalarTest, engine: Any, saved: Mapping[str, floa
         source=test.source,
         misprints=test.misprints,
         seven=test.seven,
-        stages=stages(test, engine, saved),
+        stages=stages(test, engine, out.saved if out is not None else {}),
         scene=ask(lambda: drawing(test.example().scene)).value,
         lacks=dict(test.lacks),
+        saving=out.told() if out is not None else None,
         measured=test.measured,
     )
 

@@ -13,8 +13,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-from spook_tracker.engine.method import STAGES_THAT_CAN_BE_FORCED
-from spook_tracker.scalar_tests.case import Configuration, Example, Ladder, ScalarTest, Simulate
+from spook_tracker.scalar_tests.case import Configuration, Ladder, ScalarTest, Simulate
 from spook_tracker.tracker.document.json_form import NAN, Number
 from spook_tracker.tracker.document.order import error_in_time, in_range, observed_order, time_at_error
 from spook_tracker.tracker.document.run_document import (
@@ -25,12 +24,11 @@ from spook_tracker.tracker.document.run_document import (
 )
 from spook_tracker.tracker.measure.definition import definition_hash
 from spook_tracker.tracker.measure.question import Outcome, Witness, ask, sentence, series_key
-from spook_tracker.tracker.measure.timing import Prepare, Repeats, Timed, interleaved, once, stage_seconds
+from spook_tracker.tracker.measure.timing import Prepare, Repeats, Timed, interleaved
 from spook_tracker.tracker.measure.workers import NOWHERE, Lost, at
 
 LADDER_TIME_LIMIT = 60.0  # s per run: a point that takes longer is a point of its own class
 ORDER_BAND = 0.1
-SAVED_RUNS = 3
 
 
 @dataclass(frozen=True)
@@ -379,78 +377,3 @@ def _scalar(
         set_point_held=outcome in ("value", "out_of_limit"),
         failure=why_not if outcome in ("missing", "not_finite") else "",
     )
-
-
-def saved_by_leaving_out(tests: Mapping[str, ScalarTest], simulate: Simulate) -> dict[str, dict[str, float]]:
-    """Seconds per step each stage left out would cost, by forcing it into the test's example scene.
-
-    Timed are only stages that the scene does without and that forcing brings in, which one step tells.
-    """
-    saved: dict[str, dict[str, float]] = {}
-    for name, test in tests.items():
-        answer = ask(test.example)
-        if answer.value is None:
-            continue
-        example = answer.value
-        steps = max(1, min(2000, round(1.0 / example.time_step)))
-        kept = _stages_of(example, (), simulate)
-        added = {
-            option: stage
-            for option, stage in STAGES_THAT_CAN_BE_FORCED.items()
-            if kept and stage not in kept and stage in _stages_of(example, (option,), simulate)
-        }
-        if not added:
-            continue
-        runs = [_example_run(example, steps, forced) for forced in ((), *((option,) for option in added))]
-        rounds = [[once(run, simulate, LADDER_TIME_LIMIT) for run in runs] for _ in range(SAVED_RUNS)]
-        plain, *forced = (_least(taken) for taken in zip(*rounds, strict=True))
-        for stage, seconds in zip(added.values(), forced, strict=True):
-            if seconds is not None and plain is not None:
-                saved.setdefault(name, {})[stage] = max(0.0, seconds - plain) / steps
-    return saved
-
-
-def _least(taken: Sequence[float | None]) -> float | None:
-    """None if a run of them failed."""
-    seconds = [one for one in taken if one is not None]
-    return min(seconds) if len(seconds) == len(taken) else None
-
-
-def _stages_of(example: Example, forced: tuple[str, ...], simulate: Simulate) -> tuple[str, ...]:
-    """What a step of it goes through; nothing where it fails."""
-    answer = ask(lambda: tuple(_example_run(example, 1, forced)(simulate).stages))
-    return answer.value or ()
-
-
-@dataclass(frozen=True)
-class StepCost:
-    """Seconds per step, all of one run: of each stage with a clock of its own, and of the whole step."""
-
-    stages: Mapping[str, float]
-    whole: float
-
-    @property
-    def beside(self) -> float:
-        """Between the stages: keeping a state to go back to, checks of it, the clock itself."""
-        return self.whole - sum(self.stages.values())
-
-
-def step_cost(test: ScalarTest, simulate: Simulate) -> StepCost | None:
-    """Of the test's example scene with nothing observed, stages timed; the fastest of a few runs. None if it fails, or
-    the engine has no such clock."""
-    example = test.example()
-    steps = max(1, min(2000, round(1.0 / example.time_step)))
-    run = _example_run(example, steps, ())
-    costs = [stage_seconds(run, simulate) for _ in range(SAVED_RUNS)]
-    told = [
-        StepCost({stage: seconds / steps for stage, seconds in stages.items()}, whole / steps)
-        for stages, whole in costs
-        if stages
-    ]
-    return min(told, key=lambda cost: cost.whole, default=None)
-
-
-def _example_run(example: Example, steps: int, stages: tuple[str, ...]) -> Timed:
-    """The test's example scene with nothing observed and some stages forced in."""
-    method = replace(example.method, force_stages=stages)
-    return lambda simulate: simulate(example.scene, time_step=example.time_step, steps=steps, method=method)

@@ -210,7 +210,7 @@ def _document(
         ci_address=ci_address(os.environ),
         engine=version,
         machine=machine(),
-        tests=tuple(test_card(name, test, engine, timed[1].get(name, {})) for name, test in tests.items()),
+        tests=tuple(test_card(name, test, engine, timed[1].get(name)) for name, test in tests.items()),
         series=with_aliases((series for series, _ in measured), tests),
         samples=tuple(sample for _, sample in measured),
         figures=tuple(figures),

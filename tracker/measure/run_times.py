@@ -15,14 +15,17 @@ import spook_tracker.tracker.measure.workers as crew
 from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.tracker.measure import ladder as ladders
 from spook_tracker.tracker.measure.questions import Questions
+from spook_tracker.tracker.measure.step_cost import LeavingOut, step_costs
 from spook_tracker.tracker.measure.timing import Repeats
 
-Timed = tuple[list[ladders.Pair], Mapping[str, Mapping[str, float]]]  # s a step by test and stage left out
+Timed = tuple[
+    list[ladders.Pair], Mapping[str, LeavingOut]
+]  # series, and by test what leaving stages out saves
 
 
 @dataclass(frozen=True)
 class TimingPiece:
-    """Run times of the ladders of one test, or what leaving stages out of its example saves."""
+    """Run times of the ladders of one test, or what a step of its example costs."""
 
     test: str
     kind: Literal["ladders", "stages"]
@@ -38,7 +41,8 @@ def perform_timing(source: Questions, piece: TimingPiece) -> Timed:
         module = source.module()
         prepare = getattr(module, "prepare", None) if simulate is module.simulate else None
         return ladders.timed_series(tests, piece.errors, simulate, piece.repeats, prepare), {}
-    return [], ladders.saved_by_leaving_out(tests, simulate)
+    found, out = step_costs(piece.test, tests[piece.test], simulate, getattr(source.module(), "start", None))
+    return found, {} if out is None else {piece.test: out}
 
 
 def run_times(
@@ -49,9 +53,9 @@ def run_times(
     limits: crew.Limits | None,
     timed: Callable[[str], None],
 ) -> Timed:
-    """Run times of every ladder, and what leaving stages out saves; `timed` is told of each test that is done.
+    """Run times of every ladder, and what steps cost; `timed` is told of each test that is done.
 
-    `limits` are those of one ladder; None: in this process, where nothing can be ended. What stages save is left
+    `limits` are those of one ladder; None: in this process, where nothing can be ended. What steps cost is left
     out where its process is lost.
     """
     stages_can_be_forced = not hasattr(source.module(), "configurations")  # ours only
@@ -67,10 +71,12 @@ def run_times(
             partial(perform_timing, source), pieces, 1, replace(limits, seconds=limits.seconds * most)
         )
     series: list[ladders.Pair] = []
-    saved: dict[str, Mapping[str, float]] = {}
+    saved: dict[str, LeavingOut] = {}
     for piece, answer in answers:
         if piece.kind == "stages":
-            saved |= {} if isinstance(answer, crew.Lost) else answer[1]
+            if not isinstance(answer, crew.Lost):
+                series += answer[0]
+                saved |= answer[1]
             continue
         if isinstance(answer, crew.Lost):
             series += ladders.untimed_series({piece.test: tests[piece.test]}, piece.errors, answer)

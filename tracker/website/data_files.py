@@ -248,7 +248,9 @@ def test_json(book: Book, test: TestHistory) -> bytes:
     series = [_series(t, definitions, nights, book.nights) for t in steady(test)]
     whole = {
         "test": structs.replace(
-            test.card, stages=tuple(structs.replace(s, saved_seconds_per_step=None) for s in test.card.stages)
+            test.card,
+            stages=tuple(structs.replace(s, saved_seconds_per_step=None) for s in test.card.stages),
+            saving=None,
         ),
         "nights": nights,
         "definitions": [json.loads(text) for text in definitions],

@@ -98,7 +98,7 @@ def covered(book: Book) -> Page:
             ladders.get(test.name, {}).values(),
             len(test.of_kind("break_point")),
             len(test.maps),
-            test.card.stages,
+            test.card.saving,
             test.card.lacks,
         )
         rows.append((told, address(test)))

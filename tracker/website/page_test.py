@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from spook_tracker.tracker.document.coverage import saved
 from spook_tracker.tracker.document.wording import clean, day, slug
 from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.broken import MOST_CARDS, MOST_CHARTS, broken, shown
@@ -94,6 +95,7 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
     told: dict[str, object] = {
         "rows": [every[id(t)] for t in times],
         "stage_times": stage_times(test),
+        "saving": saved(test.card.saving),
         "saved": [s for s in test.card.stages if not s.kept and s.saved_seconds_per_step],
     }
     page = Page(here, "test.html", clean(test.card.title), clean(test.card.question), context, plotly=True)
