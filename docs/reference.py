@@ -1,9 +1,16 @@
-"""Pages that are made from the code when the documentation is built: commands, tables and views, the library."""
+"""What is made when the documentation is built: pages from the code (commands, tables and views, the library), and the search.
+
+The search is a script with the text of every section, so that it also works from a folder, where a page may not fetch.
+"""
 
 from __future__ import annotations
 
+import html
 import inspect
+import json
+import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import click
@@ -16,6 +23,34 @@ def on_files(files: Any, config: Any) -> Any:
     for name, page in PAGES.items():
         files.append(File.generated(config, f"reference/{name}.md", content="\n".join(page()) + "\n"))
     return files
+
+
+SECTION = re.compile(r'<h[1-4] id="([^"]*)">(.*?)</h[1-4]>', re.DOTALL)
+sections: list[tuple[str, str, str, str]] = []  # address, page, heading, text
+
+
+def on_pre_build(config: Any) -> None:
+    """A server builds again and again."""
+    sections.clear()
+
+
+def on_page_content(content: str, page: Any, config: Any, files: Any) -> str:
+    """MkDocs asks what to do with a page: its sections are remembered for the search."""
+    parts = SECTION.split(content)
+    for anchor, heading, text in zip(parts[1::3], parts[2::3], parts[3::3], strict=True):
+        told = (page.title or "", *(_text(part) for part in (heading, text)))
+        sections.append((f"{page.url}#{anchor}", *told))
+    return content
+
+
+def on_post_build(config: Any) -> None:
+    """The sections as a script beside the pages."""
+    written = f"const SECTIONS = {json.dumps(sections, ensure_ascii=False, separators=(',', ':'))};\n"
+    (Path(config.site_dir) / "search-sections.js").write_text(written, encoding="utf-8")
+
+
+def _text(part: str) -> str:
+    return " ".join(html.unescape(re.sub(r"<[^>]*>", " ", part)).split())
 
 
 def commands() -> Iterator[str]:

@@ -232,6 +232,17 @@ def test_a_night_of_a_teams_own_questions_needs_no_extra_and_no_compiler(
     }
 
 
+DRAWN = """
+from spook_tracker import tracker
+from spook_tracker.engine import Particle, Position, Scene, Trace, simulate
+ball = Scene(bodies=(Particle(name="ball", mass=1.0, position=(0.0, 0.0, 0.0)),), gravity=(0.0, 0.0, -9.81))
+fallen = simulate(ball, time_step=0.1, steps=9, observe={"place": Trace(quantity=Position("ball"))})
+with tracker.History.open("sqlite:///tracker.db") as history:
+    print(fallen.show()._repr_html_()[1:7], type(history.plot("falling_object")).__name__, end=" ")
+    print(type(history.to_dataframe()).__name__)
+"""
+
+
 def megabytes(folder: Path) -> float:
     """What a folder takes on the disk, in 10⁶ bytes."""
     return sum(path.lstat().st_blocks * 512 for path in folder.rglob("*")) / 1e6
@@ -273,6 +284,31 @@ def test_everything_installed_is_small(wheel: Path, tmp_path: Path) -> None:
         f"everything ({OURS}): {installed:.0f} MB; used {after:.0f} MB; all compiled {megabytes(site):.0f} MB"
     )
     assert installed <= EVERYTHING
+
+
+@pytest.mark.package
+def test_a_commit_is_installed_from_its_repository(tmp_path: Path) -> None:
+    """As README says before an index has the package: the version counts the commits, and compare takes it as printed."""
+    origin = tmp_path / "origin.git"
+    done = subprocess.run(
+        ["git", "clone", "-q", "--bare", str(ROOT), str(origin)], capture_output=True, check=False
+    )
+    if done.returncode or (origin / "shallow").exists():
+        pytest.skip("not a full clone, so its commits cannot be counted")
+    python, _ = environment(tmp_path / "environment")
+    pip(python, f"spook-tracker[standard] @ git+{origin.as_uri()}@{head()}")
+    team = tmp_path / "team"
+    team.mkdir()
+    printed = run(team, python.parent, "tracker", "--version").stdout.split()[1].rstrip(",")
+
+    for _ in range(2):
+        assert run(team, python.parent, "tracker", "run", "falling_object").returncode == 0
+    compared = run(team, python.parent, "tracker", "compare", printed, printed.partition("+")[0])
+    drawn = run(team, python.parent, "python", "-c", DRAWN)
+
+    assert re.fullmatch(rf"\S+\+g{head()[:9]}", printed)
+    assert compared.returncode == 0, compared.stderr
+    assert drawn.stdout.split() == ["iframe", "Figure", "DataFrame"], drawn.stderr
 
 
 @pytest.mark.package

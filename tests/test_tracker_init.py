@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tomllib
 from pathlib import Path
+from urllib.parse import urlsplit
 
 import pytest
 
@@ -14,7 +15,7 @@ yaml = pytest.importorskip("yaml", reason="PyYAML is not installed here")
 from click.testing import CliRunner, Result  # noqa: E402
 
 from spook_tracker.engine.build_info import build_info  # noqa: E402
-from spook_tracker.tracker.beginning import Home, first_files  # noqa: E402
+from spook_tracker.tracker.beginning import Home, first_files, home  # noqa: E402
 from spook_tracker.tracker.cli.main import main  # noqa: E402
 from tests.workflow_service import Service  # noqa: E402 (needs yaml)
 
@@ -161,3 +162,18 @@ def test_a_folder_of_adapters_that_is_there_keeps_what_it_says(
 
     assert init(tmp_path, monkeypatch, "marble").exit_code == 0
     assert (tmp_path / "tracking" / "__init__.py").read_text() == "# ours\n"
+
+
+def test_where_the_sources_are_kept_is_said_once() -> None:
+    """In pyproject.toml, which the installed package tells, and in the example that a reader copies: both alike."""
+    told = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["urls"]
+    place = urlsplit(told["Source"]).path.strip("/")
+    example = yaml.safe_load((ROOT / "examples/pebble/.github/workflows/physics.yml").read_text())
+    listed = subprocess.run(
+        ["git", "grep", "-l", "OWNER/", "--", ":!tests", ":!*.min.js"], cwd=ROOT, capture_output=True, text=True, check=False
+    )  # fmt: skip
+
+    assert all(url.startswith(told["Source"]) for url in told.values())
+    assert example["jobs"]["track"]["uses"] == f"{place}/.github/workflows/track.yml@HASH"
+    assert set(listed.stdout.split()) <= {"pyproject.toml", "examples/pebble/.github/workflows/physics.yml"}
+    assert home("").url == told["Source"]
