@@ -203,7 +203,7 @@ def test_no_file_is_longer_than_contributing_says() -> None:
 def test_any_becomes_rarer_in_the_tracker() -> None:
     """What is `Any` is checked by no tool; sixty are meant to be left. A change that removes some lowers the number."""
     sources = (path.read_text(encoding="utf-8") for path in (ROOT / "tracker").rglob("*.py"))
-    assert sum(len(re.findall(r"\bAny\b", source)) for source in sources) <= 526
+    assert sum(len(re.findall(r"\bAny\b", source)) for source in sources) <= 455
 
 
 def test_what_marks_a_module_is_said_once() -> None:

@@ -84,7 +84,8 @@ def _from_history(test: str, accepted: Path | None, database: str) -> tuple[str,
         for told in trend(history, test, None, accepted_levels(accepted)):
             last = told.nights[-1]
             if last.red and last.accused is not None:
-                ends.append(tuple(night.run.engine.git_hash for night in last.accused))
+                good, bad = (night.run.engine.git_hash for night in last.accused)
+                ends.append((good, bad))
             elif last.red and last.worse_at is not None and last.before_worse is not None:
                 ends.append((last.before_worse.run.engine.git_hash, last.worse_at.run.engine.git_hash))
     if not ends or not all(ends[-1]):

@@ -4,23 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from datetime import UTC, datetime
-from typing import Any
+from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.document.wording import instant
 
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.run_document import Run
 
-def about(runs: Sequence[Any]) -> str:
+
+def about(runs: Sequence[Run]) -> str:
     """The engine of the newest run that has gates; imported runs, and engines only shown, stand back.
 
     `runs`, at least one, are as a history has them (tracker.store.versions.RunInfo).
     """
     own = [run for run in runs if run.trigger != "import"] or runs
     gating = [run for run in own if getattr(run, "gates", 1)] or own
-    name: str = max(gating, key=started).engine.name
-    return name
+    return max(gating, key=started).engine.name
 
 
-def started(run: Any) -> datetime:
+def started(run: Run) -> datetime:
     """When a run began, for order; long ago where that cannot be read."""
     known: datetime | None = getattr(run, "started_at", None)
     return known or instant(run.started) or datetime.min.replace(tzinfo=UTC)

@@ -8,7 +8,7 @@ imported with nothing else.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, NamedTuple, Protocol
+from typing import Annotated, Literal, NamedTuple, Protocol
 
 import msgspec
 
@@ -343,15 +343,19 @@ class Run(Protocol):
     @property
     def started(self) -> str: ...
     @property
+    def trigger(self) -> str: ...
+    @property
     def engine(self) -> EngineVersion: ...
     @property
     def machine(self) -> Machine: ...
+    @property
+    def asked(self) -> Asked | None: ...
 
 
 class Point(NamedTuple):
     """One value of a series over versions, and the definition hash it was measured under."""
 
-    run: Any  # a Run
+    run: Run
     sample: Sample
     test_version: str
     recorded: bool = True  # False: asked for and not answered; no document has this sample

@@ -10,9 +10,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
-from spook_tracker.tracker.document.run_document import SeriesDefinition
+from spook_tracker.tracker.document.run_document import Point, Run, SeriesDefinition
 from spook_tracker.tracker.document.wording import number, times
 from spook_tracker.tracker.judge.events import name_of
 from spook_tracker.tracker.judge.judged import Judged, blame
@@ -38,11 +38,11 @@ class Hit:
     stands: Class
     before: float  # in the last good run; NaN if there is none, or for a map
     value: float  # in the first bad run
-    good: Any  # the last good run; None if history knows none
-    bad: Any  # the first bad run; None where only a comparison knows
+    good: Run | None  # the last good run; None if history knows none
+    bad: Run | None  # the first bad run; None where only a comparison knows
     standing: Standing
-    end: Any = None  # the run where it came back or was accepted; None while it lasts
-    told: Any = None  # the run whose verdict said it first: of a run time perhaps some nights later
+    end: Run | None = None  # the run where it came back or was accepted; None while it lasts
+    told: Run | None = None  # the run whose verdict said it first: of a run time perhaps some nights later
 
     @property
     def margin(self) -> float:
@@ -89,8 +89,8 @@ class Hit:
 class Cause:
     """What became worse with one range of commits."""
 
-    good: Any  # the last run without it; None if history knows none
-    bad: Any  # the first run with it
+    good: Run | None  # the last run without it; None if history knows none
+    bad: Run | None  # the first run with it
     hits: tuple[Hit, ...]  # the worst first
 
     @property
@@ -168,7 +168,7 @@ def hits_of(told: Told) -> list[Hit]:
 def _hits_in(told: Told, nights: Sequence[Judged], over: Judged | None) -> list[Hit]:
     found: list[Hit] = []
     open_from = 0  # hits from here on are of the present red stretch
-    last: Any = None  # where the series last became worse
+    last: Point | None = None  # where the series last became worse
     for judged in nights:
         if judged.red:
             if judged.news or open_from == len(found):
@@ -245,5 +245,5 @@ def _order(told: Mapping[str, Told]) -> dict[str, int]:
     return place
 
 
-def _id(run: Any) -> str:
+def _id(run: Run | None) -> str:
     return "" if run is None else str(run.id)

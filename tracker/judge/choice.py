@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -42,7 +42,7 @@ class Choice:
         asked = (("test", self.tests), ("kind", self.kinds), ("role", self.roles))
         return " ".join(f"--{name} {value}" for name, values in asked for value in values)
 
-    def _some(self, chosen: Sequence[Any], among: Sequence[Any]) -> None:
+    def _some(self, chosen: Sized, among: Sized) -> None:
         if among and not chosen:
             raise UnknownName(f"none of {len(among)} series fits {self}; ask for fewer things at once")
 

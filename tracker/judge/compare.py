@@ -10,11 +10,11 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
-from typing import Any, Literal
+from typing import Literal
 
 import msgspec
 
-from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesDefinition
+from spook_tracker.tracker.document.run_document import MapData, Run, Sample, SeriesDefinition
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.compare_ladders import frontiers, run_times
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Side
@@ -60,7 +60,7 @@ class ComparedRun:
         return datetime.fromisoformat(self.side.started).astimezone(UTC).date()
 
 
-def side_of(run: Any) -> Side:
+def side_of(run: Run) -> Side:
     """The run (tracker.store.history.RunInfo or a RunDocument) as one side."""
     return Side(
         run=run.id,
@@ -105,8 +105,8 @@ def compare(
 
 def compare_in(
     records: Records,
-    before: tuple[Any, ComparedRun],
-    after: tuple[Any, ComparedRun],
+    before: tuple[Run, ComparedRun],
+    after: tuple[Run, ComparedRun],
     accepted: Sequence[Accepted] = (),
     against_history: bool = False,
 ) -> CompareDocument:

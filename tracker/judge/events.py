@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
-from spook_tracker.tracker.document.run_document import SeriesDefinition
+from spook_tracker.tracker.document.run_document import Run, SeriesDefinition
 from spook_tracker.tracker.judge.judged import Judged
 from spook_tracker.tracker.judge.series_history import Told
 from spook_tracker.tracker.judge.vocabulary import Class, Word
@@ -24,15 +24,15 @@ class Event:
     name: str  # what happened: "limit crossed", "drift", "slower"
     sentence: str
     stands: Class  # FAIL or WATCH, of its last red night
-    first: Any  # the run where it began
-    last: Any  # the last red run
-    good: Any  # the run it is compared with; None if there was nothing good before
+    first: Run  # the run where it began
+    last: Run  # the last red run
+    good: Run | None  # the run it is compared with; None if there was nothing good before
     before: float  # the value then; NaN if there was none
     value: float  # the last value of the stretch
     standing: Standing
-    end: Any  # the run where it came back or was accepted; None while it lasts
+    end: Run | None  # the run where it came back or was accepted; None while it lasts
     accepted: str = ""
-    worse_at: Any = None  # the run where it last became worse; `first`, or a later one
+    worse_at: Run | None = None  # the run where it last became worse; `first`, or a later one
 
     @property
     def lasting(self) -> bool:

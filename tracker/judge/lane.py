@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from functools import cache, partial
-from typing import Any, Protocol
+from typing import Protocol, TypeVar
 
 import msgspec
 
@@ -26,6 +26,7 @@ from spook_tracker.tracker.judge.calibration import ladder_timing, that_counts
 from spook_tracker.tracker.judge.work import FAMILIES, Samples, families_of, with_work
 
 _point = partial(tuple.__new__, Point)  # a point of its four parts, in a third of the time
+OneRun = TypeVar("OneRun", bound=Run)
 RECENT = 60  # runs read with all their evidence: state hashes, failures, counters, timings;
 SPARSE = 16  # of those before them one in so many, so that what was lost then is not forgotten
 
@@ -33,8 +34,10 @@ SPARSE = 16  # of those before them one in so many, so that what was lost then i
 class Records(Protocol):
     """What is read of a history (tracker.store.history.History)."""
 
-    def runs(self, engine: str | None = None) -> Sequence[Any]: ...
-    def series(self, keys: Iterable[str] | None = None, *, evidence: bool = True) -> Mapping[str, Any]: ...
+    def runs(self, engine: str | None = None) -> Sequence[Run]: ...
+    def series(
+        self, keys: Iterable[str] | None = None, *, evidence: bool = True
+    ) -> Mapping[str, SeriesHistory]: ...
     def samples(self, run_id: str) -> Samples: ...
     def samples_of(
         self, run_ids: Sequence[str], tests: set[str] | None = None, keys: Iterable[str] | None = None
@@ -44,7 +47,7 @@ class Records(Protocol):
     def with_maps(self) -> Collection[str]: ...
 
 
-def line_of(runs: Sequence[Any], run: Any) -> list[Any]:
+def line_of(runs: Sequence[OneRun], run: OneRun) -> list[OneRun]:
     """The runs of its engine that come before a run in commit order and on its own branch, and the run itself.
 
     A build with local changes or without a commit has no place in that order: it stands in nobody's history,
@@ -60,7 +63,7 @@ def line_of(runs: Sequence[Any], run: Any) -> list[Any]:
     return [*before, of_engine[place]]
 
 
-def forked_from(runs: Sequence[Any], run: Any, main_line: set[str]) -> Any:
+def forked_from(runs: Sequence[OneRun], run: OneRun, main_line: set[str]) -> OneRun | None:
     """The nearest measured ancestor of a run on the main line; where that is not known, the run before it.
 
     None if nothing was measured before.
@@ -71,7 +74,7 @@ def forked_from(runs: Sequence[Any], run: Any, main_line: set[str]) -> Any:
     return next(reversed(on_main or others), None)
 
 
-def elsewhere(runs: Sequence[Any], run: Any) -> set[str]:
+def elsewhere(runs: Sequence[Run], run: Run) -> set[str]:
     """Commits among these runs that lie on another branch than a run's commit, as far as parents tell.
 
     From both commits back along measured parents: a commit is elsewhere if both ways meet and it is on one
@@ -97,7 +100,7 @@ def elsewhere(runs: Sequence[Any], run: Any) -> set[str]:
     }
 
 
-def lines(runs: Sequence[Any]) -> list[list[Any]]:
+def lines(runs: Sequence[OneRun]) -> list[list[OneRun]]:
     """One line of runs per engine, up to its newest; first that of the engine which the history is about.
 
     Runs of other branches stand in no line: they are judged by themselves, against the commit they forked from.
@@ -109,7 +112,7 @@ def lines(runs: Sequence[Any]) -> list[list[Any]]:
     return [_line([run for run in runs if run.engine.name == name]) for name in engines]
 
 
-def _line(runs: Sequence[Any]) -> list[Any]:
+def _line(runs: Sequence[OneRun]) -> list[OneRun]:
     """The runs with a place in the commit order, and the newest one whatever it was built from.
 
     This is what `latest` and `previous` choose from on the command line.
@@ -126,7 +129,7 @@ def _line(runs: Sequence[Any]) -> list[Any]:
     return line if is_placed(newest) else [*line, newest]
 
 
-def is_placed(run: Any) -> bool:
+def is_placed(run: Run) -> bool:
     """Whether a run has a place in the commit order: of a commit, and without local changes."""
     return bool(run.engine.git_hash) and not run.engine.dirty
 
@@ -141,7 +144,7 @@ def histories(
     recent = records.samples_of([run.id for run in looked_at], tests)
     found: dict[str, SeriesHistory] = {}
     known: dict[
-        int, tuple[Any, Samples]
+        int, tuple[Run | None, Samples]
     ] = {}  # of a stored run: its run here (None: not of this line), its evidence
     nothing: Samples = {}
     for key, stored in records.series(keys, evidence=False).items():
@@ -191,7 +194,7 @@ def looked_at_again(count: int, recent: int) -> list[int]:
     return [*range(0, dense, SPARSE), *range(dense, count)]
 
 
-def _says(run: Any) -> bool:
+def _says(run: Run) -> bool:
     """Whether a run tells what it was asked for."""
     return getattr(run, "asked", None) is not None
 
@@ -285,7 +288,7 @@ def _begun(series: SeriesHistory, place: Mapping[str, int]) -> dict[str, int]:
     return first
 
 
-def asked_for(run: Any, samples: Samples) -> dict[str, set[str]]:
+def asked_for(run: Run, samples: Samples) -> dict[str, set[str]]:
     """The tests a run was asked for, by family."""
     stored = getattr(run, "asked", None)
     if stored is not None:
@@ -306,7 +309,7 @@ def _families(answered: Iterable[tuple[str, str]]) -> dict[str, set[str]]:
     return asked
 
 
-def asked_whole(run: Any) -> bool:
+def asked_whole(run: Run) -> bool:
     """Whether a run was asked for the whole catalogue."""
     stored = getattr(run, "asked", None)
     return getattr(run, "trigger", "") == "nightly" if stored is None else bool(stored.whole)

@@ -11,9 +11,8 @@ import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
-from spook_tracker.tracker.document.run_document import MapData
+from spook_tracker.tracker.document.run_document import MapData, Run
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.judged import night_of
 from spook_tracker.tracker.judge.lane import Records, asked_for, is_placed
@@ -24,7 +23,8 @@ from spook_tracker.tracker.judge.work import FAMILIES
 NO_MAP = Verdict(word="missing", sentence="a stability map asked for and not answered", name="missing")
 GIVEN_UP = Verdict(word="accepted", sentence=NO_MAP.sentence)
 STABILITY = [kind for kind, family in FAMILIES.items() if family == "stability"]
-Held = dict[str, list[tuple[int, Any, MapData]]]  # by key, newest first: place in the line, run, map
+Kind = tuple[str, str, bool]  # of runs: engine, floating-point environment, whether it has a place
+Held = dict[str, list[tuple[int, Run, MapData]]]  # by key, newest first: place in the line, run, map
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -33,8 +33,8 @@ class ToldMap:
 
     newest: MapData  # as last held
     verdict: Verdict
-    good: Any  # the run it is compared with; of a lost map the newest that holds it
-    bad: Any  # the run the verdict is about: the newest that holds the map, or the first without it
+    good: Run  # the run it is compared with; of a lost map the newest that holds it
+    bad: Run  # the run the verdict is about: the newest that holds the map, or the first without it
     tonight: bool  # whether the newest run tells of it: holds it, or was asked for it
     news: bool  # whether `bad` is the newest run
     gone: bool = False  # asked for and not answered, given up or not
@@ -67,7 +67,7 @@ def stands_of(verdict: Verdict) -> Class:
     return "watch" if verdict.red else "pass"
 
 
-def told_maps(records: Records, line: Sequence[Any], accepted: Sequence[Accepted] = ()) -> list[ToldMap]:
+def told_maps(records: Records, line: Sequence[Run], accepted: Sequence[Accepted] = ()) -> list[ToldMap]:
     """Every stability map that runs of a line hold, compared with the run before that has it, or lost since when."""
     if not line:
         return []
@@ -86,10 +86,10 @@ def told_maps(records: Records, line: Sequence[Any], accepted: Sequence[Accepted
     return sorted(found, key=lambda told: told.key)
 
 
-def may_be_dropped(records: Records, runs: Sequence[Any]) -> dict[str, set[str]]:
+def may_be_dropped(records: Records, runs: Sequence[Run]) -> dict[str, set[str]]:
     """By run: keys of the maps that a later run of its kind holds, so that it may have had and lost them to retention."""
     having, wanted = records.with_maps(), {run.id for run in runs}
-    later: dict[Any, set[str]] = {}
+    later: dict[Kind, set[str]] = {}
     found: dict[str, set[str]] = {}
     for run in reversed(records.runs()):
         of_kind = later.setdefault(_kind(run), set())
@@ -101,9 +101,9 @@ def may_be_dropped(records: Records, runs: Sequence[Any]) -> dict[str, set[str]]
 
 
 def _told(
-    line: Sequence[Any],
-    lane: Sequence[tuple[int, Any, MapData]],
-    blind: Mapping[tuple[str, Any], int],
+    line: Sequence[Run],
+    lane: Sequence[tuple[int, Run, MapData]],
+    blind: Mapping[tuple[str, Kind], int],
     asked: Callable[[int, str], bool],
     accepted: Sequence[Accepted],
 ) -> ToldMap | None:
@@ -142,7 +142,7 @@ def _told(
     )
 
 
-def _held(records: Records, line: Sequence[Any]) -> Held:
+def _held(records: Records, line: Sequence[Run]) -> Held:
     having = records.with_maps()
     found: Held = {}
     for place in range(len(line) - 1, -1, -1):
@@ -152,11 +152,11 @@ def _held(records: Records, line: Sequence[Any]) -> Held:
     return found
 
 
-def _blind(records: Records, line: Sequence[Any], held: Held) -> dict[tuple[str, Any], int]:
+def _blind(records: Records, line: Sequence[Run], held: Held) -> dict[tuple[str, Kind], int]:
     """By map and kind of run: up to which place of the line it may have been dropped for a run beside or after it."""
     here = {run.id: place for place, run in enumerate(line)}
     having = records.with_maps()
-    blind: dict[tuple[str, Any], int] = {}
+    blind: dict[tuple[str, Kind], int] = {}
     reached = -1
     for run in records.runs():
         if run.id in here:
@@ -168,7 +168,7 @@ def _blind(records: Records, line: Sequence[Any], held: Held) -> dict[tuple[str,
     return blind
 
 
-def _asked(records: Records, line: Sequence[Any], oldest: int) -> Callable[[int, str], bool]:
+def _asked(records: Records, line: Sequence[Run], oldest: int) -> Callable[[int, str], bool]:
     """Whether a run, at `oldest` or after, was asked for the stability of a test; silent ones tell by their answers."""
 
     @cache
@@ -184,10 +184,10 @@ def _asked(records: Records, line: Sequence[Any], oldest: int) -> Callable[[int,
     return asked
 
 
-def _floats(run: Any) -> str:
+def _floats(run: Run) -> str:
     return str(run.machine.float_environment)
 
 
-def _kind(run: Any) -> tuple[str, str, bool]:
+def _kind(run: Run) -> Kind:
     """Runs among which retention keeps one of each map."""
     return run.engine.name, _floats(run), is_placed(run)

@@ -6,7 +6,6 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import timedelta
-from typing import Any
 
 from spook_tracker.tracker.document.about import started
 from spook_tracker.tracker.document.run_document import Run, SeriesDefinition
@@ -39,8 +38,8 @@ class Finding:
     verdict: Verdict
     red: bool
     news: bool = True  # red for a reason of tonight, not only still red
-    good: Any = None  # of a map: the run it is compared with
-    bad: Any = None  # of a map: the run it is of, or the first that has lost it
+    good: Run | None = None  # of a map: the run it is compared with
+    bad: Run | None = None  # of a map: the run it is of, or the first that has lost it
     state: State  # red, accepted, recovered …
     machine: str = ""  # where another than the run's own measured it
 
@@ -65,7 +64,7 @@ class Finding:
         return self.judged.stands if self.judged is not None else stands_of(self.verdict)
 
     @property
-    def _range(self) -> tuple[Any, Any]:
+    def _range(self) -> tuple[Run | None, Run | None]:
         """The last good run and the first bad one, each None where history knows none."""
         if self.judged is None:
             return (self.good, self.bad) if self.red else (None, None)
@@ -93,7 +92,7 @@ class Finding:
 
 
 def tonight(
-    records: Records, run: Any, accepted: Sequence[Accepted] = (), others: bool = False
+    records: Records, run: Run, accepted: Sequence[Accepted] = (), others: bool = False
 ) -> list[Finding]:
     """Findings of one recorded run against its history (tracker.store.history.History); red first.
 

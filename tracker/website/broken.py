@@ -12,7 +12,7 @@ from spook_tracker.tracker.document.wording import clean, conditions, day, numbe
 from spook_tracker.tracker.judge.causes import Hit, hits_of
 from spook_tracker.tracker.judge.standing import expected
 from spook_tracker.tracker.website.motions import Motion, Parting, parting
-from spook_tracker.tracker.website.nights import Book, Night, TestHistory, Trend
+from spook_tracker.tracker.website.nights import Book, TestHistory, Trend, as_night
 
 MOST_CARDS = 6
 MOST_CHARTS = 3
@@ -80,8 +80,8 @@ def shown(test: TestHistory, found: Sequence[Broken], book: Book) -> Shown:
     commands = [f"tracker trend {name}"]
     if hit is None:
         return Shown("", "", tuple(commands))
-    good: Night = hit.good
-    versions = short_hash(good.engine), short_hash(hit.bad.engine)
+    good, bad = as_night(hit.good), as_night(hit.bad)
+    versions = short_hash(good.engine), short_hash(bad.engine)
     if all(versions):
         commands = [f"tracker compare {versions[0]} {versions[1]}", f"tracker bisect {name}", *commands]
     motions = {motion.night.id: motion for motion in book.motions[test.name]}

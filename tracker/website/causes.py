@@ -25,7 +25,7 @@ from spook_tracker.tracker.judge.judged import blame
 from spook_tracker.tracker.judge.maps import map_key
 from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.motions import SEEN, apart
-from spook_tracker.tracker.website.nights import Book, Night, TestHistory
+from spook_tracker.tracker.website.nights import Book, Night, TestHistory, as_night
 from spook_tracker.tracker.website.page_rows import address
 
 SAID = {"detected": "RED", "accepted": "ACCEPTED", "recovered": "RECOVERED"}
@@ -105,7 +105,7 @@ def lasting(found: Sequence[Cause]) -> list[Cause]:
 
 def told(cause: Cause, book: Book) -> ToldCause:
     """A cause in words; its runs are the nights of the book."""
-    night, good = cause.bad, cause.good
+    night, good = as_night(cause.bad), None if cause.good is None else as_night(cause.good)
     red = [hit for hit in cause.hits if hit.standing == "detected"]
     shown = red or list(cause.hits)
     by_test: dict[str, list[Hit]] = {}
@@ -123,7 +123,9 @@ def told(cause: Cause, book: Book) -> ToldCause:
         )
         for name, hits in by_test.items()
     ]
-    ends = sorted({hit.end.index: hit.end for hit in cause.hits if hit.end is not None}.items())
+    ends = sorted(
+        {as_night(hit.end).index: as_night(hit.end) for hit in cause.hits if hit.end is not None}.items()
+    )
     return ToldCause(
         anchor=anchor(cause),
         state=state,
@@ -147,7 +149,7 @@ def told(cause: Cause, book: Book) -> ToldCause:
 
 def anchor(cause: Cause) -> str:
     """Where a cause stands on the page of regressions: the same every night."""
-    return f"c-{hashlib.sha256(cause.bad.id.encode('utf-8', 'replace')).hexdigest()[:10]}"
+    return f"c-{hashlib.sha256(as_night(cause.bad).id.encode('utf-8', 'replace')).hexdigest()[:10]}"
 
 
 def damage_of(hits: Sequence[Hit]) -> list[tuple[str, int]]:
@@ -214,7 +216,7 @@ def line(cause: Cause) -> str:
     count, tests = len(cause.hits), len(cause.tests)
     series = "1 series" if count == 1 else f"{count} series"
     damage = ", ".join(f"{number} {words}" for words, number in damage_of(cause.hits))
-    engine = cause.bad.engine
+    engine = as_night(cause.bad).engine
     commit = short_hash(engine) or version(engine)
     subject = f" “{clean(engine.subject)}”" if engine.subject else ""
     return f"{commit}{subject}: {damage} ({series} of {tests} {'test' if tests == 1 else 'tests'})"

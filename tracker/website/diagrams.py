@@ -24,7 +24,7 @@ from spook_tracker.tracker.website.charts import Band, Chart, Grid, Line, Scale,
 from spook_tracker.tracker.website.earlier_nights import Earlier
 from spook_tracker.tracker.website.events import Event
 from spook_tracker.tracker.website.figures import figure, grid_figure
-from spook_tracker.tracker.website.nights import Night, TestHistory, Trend
+from spook_tracker.tracker.website.nights import Night, TestHistory, Trend, as_night
 from spook_tracker.tracker.website.svg import describe
 
 MOST_NIGHTS = 1500  # points of one trend; a value that stands still costs two, so this is many years
@@ -124,7 +124,7 @@ def trend_chart(
                     notes=tuple(f"{nights[at[i]].label}\n{told[values[i], outcome]}" for i in broken),
                 )
             )  # fmt: skip
-    began = [e for e in events if e.definition.key == trend.definition.key and e.first.index in at]
+    began = [e for e in events if e.definition.key == trend.definition.key and as_night(e.first).index in at]
     if began:
         lines.append(_beginnings(began, trend))
     scale, bounds, note = _axis_of(trend)
@@ -169,7 +169,7 @@ def trend_chart(
 
 def _beginnings(events: Sequence[Event], trend: Trend) -> Line:
     """A mark at each first bad commit."""
-    places = [trend.nights.index(event.first.index) for event in events]
+    places = [trend.nights.index(as_night(event.first).index) for event in events]
     notes = [
         f"{event.name}: {event.sentence}\nfirst bad commit {short_hash(event.first.engine) or 'unknown'}, "
         f"{day(event.first.started)}\nnow {event.standing}"
@@ -177,7 +177,7 @@ def _beginnings(events: Sequence[Event], trend: Trend) -> Line:
     ]
     return Line(
         name="became worse",
-        x=tuple(float(event.first.index) for event in events),
+        x=tuple(float(as_night(event.first).index) for event in events),
         y=tuple(trend.values[place] for place in places),
         style="points",
         colour=3,

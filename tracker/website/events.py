@@ -8,7 +8,7 @@ from spook_tracker.tracker.judge import events
 from spook_tracker.tracker.judge.events import Event, events_of
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK
-from spook_tracker.tracker.website.nights import Book, TestHistory
+from spook_tracker.tracker.website.nights import Book, TestHistory, as_night
 
 __all__ = ["Event", "all_events", "events_of", "map_verdicts", "of_test"]
 
@@ -19,7 +19,7 @@ def all_events(book: Book) -> list[Event]:
 
     def rank(event: Event) -> tuple[int, int, str]:
         stands = CLASS_RANK[event.stands] if event.lasting else len(CLASS_RANK)
-        return stands, -event.first.index, event.definition.key
+        return stands, -as_night(event.first).index, event.definition.key
 
     return sorted(found, key=rank)
 

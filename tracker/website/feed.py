@@ -13,7 +13,7 @@ from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.standing import Count
 from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.causes import anchor, line
-from spook_tracker.tracker.website.nights import Book, Night
+from spook_tracker.tracker.website.nights import Book, Night, as_night
 
 ATOM = "http://www.w3.org/2005/Atom"
 MOST_ENTRIES = 100
@@ -30,12 +30,12 @@ def atom(book: Book, causes: Sequence[Cause], publisher: str = "SPOOK tracker") 
     ElementTree.SubElement(feed, f"{{{ATOM}}}link", {"href": "regressions.html"})
     author = ElementTree.SubElement(feed, f"{{{ATOM}}}author")
     _put(author, "name", publisher)
-    news: list[tuple[Night, str, Cause]] = [(cause.bad, "red", cause) for cause in causes]
+    news: list[tuple[Night, str, Cause]] = [(as_night(cause.bad), "red", cause) for cause in causes]
     for cause in causes:
-        ends = [hit.end for hit in cause.hits if hit.end is not None]
+        ends = [as_night(hit.end) for hit in cause.hits if hit.end is not None]
         if cause.standing != "detected" and ends:
-            news.append((max(ends, key=lambda night: int(night.index)), cause.standing, cause))
-    news.sort(key=lambda item: (-item[0].index, item[1], item[2].bad.id))
+            news.append((max(ends, key=lambda night: night.index), cause.standing, cause))
+    news.sort(key=lambda item: (-item[0].index, item[1], as_night(item[2].bad).id))
     for night, word, cause in news[:MOST_ENTRIES]:
         _entry(feed, night, word, cause)
     told: bytes = ElementTree.tostring(feed, encoding="utf-8", xml_declaration=True)
@@ -45,7 +45,7 @@ def atom(book: Book, causes: Sequence[Cause], publisher: str = "SPOOK tracker") 
 def _entry(feed: ElementTree.Element, night: Night, word: str, cause: Cause) -> None:
     entry = ElementTree.SubElement(feed, f"{{{ATOM}}}entry")
     _put(entry, "title", f"{word}: {line(cause)}")
-    _put(entry, "id", f"tag:spook-tracker,2026:{_code(cause.bad.id, night.id, word)}")
+    _put(entry, "id", f"tag:spook-tracker,2026:{_code(as_night(cause.bad).id, night.id, word)}")
     _put(entry, "updated", _moment(night))
     ElementTree.SubElement(entry, f"{{{ATOM}}}link", {"href": f"regressions.html#{anchor(cause)}"})
     worst = cause.worst
@@ -55,7 +55,8 @@ def _entry(feed: ElementTree.Element, night: Night, word: str, cause: Cause) -> 
         told += f", {quantity(worst.before, unit, 6)} before" if math.isfinite(worst.before) else ""
         told += f", {quantity(worst.value, unit, 6)} after" if math.isfinite(worst.value) else ", no value"
         told += f", limit {limit(worst.definition)}" if worst.definition.limit is not None else ""
-    written = f" by {clean(cause.bad.engine.author)}" if cause.bad.engine.author else ""
+    author = as_night(cause.bad).engine.author
+    written = f" by {clean(author)}" if author else ""
     tests = ", ".join(clean(test)[:60] for test in cause.tests[:20])
     _put(entry, "summary", f"Tests: {tests}. The worst: {told}. {opening(clean(cause.blame))}{written}.")
 

@@ -13,10 +13,12 @@ from functools import cached_property
 from typing import Any, Protocol
 
 from spook_tracker.tracker.document.run_document import (
+    Asked,
     EngineVersion,
     FigureData,
     Machine,
     MapData,
+    Run,
     Sample,
     SeriesDefinition,
     TestCard,
@@ -48,7 +50,7 @@ class Night:
     tracker_version: str
     engine: EngineVersion
     machine: Machine
-    asked: Any = None  # tracker.document.run_document.Asked; None: not known
+    asked: Asked | None = None  # None: not known
     content: str = ""  # hash of what was measured; empty: not known
     lineage: str = ""  # as in tracker.store.versions.RunInfo
 
@@ -57,6 +59,13 @@ class Night:
         """Version, commit and day in a line."""
         words = (version(self.engine), short_hash(self.engine), day(self.started))
         return " · ".join(filter(None, words))
+
+
+def as_night(run: Run | None) -> Night:
+    """A run of a history that was read for the website: its runs are nights."""
+    if not isinstance(run, Night):
+        raise TypeError(f"{run!r} is no night")
+    return run
 
 
 @dataclass
@@ -243,7 +252,7 @@ def _chapter(
         samples = [point.sample for point in points]
         trends[key] = Trend(
             told,
-            nights=[point.run.index for point in points],
+            nights=[as_night(point.run).index for point in points],
             values=[sample.value for sample in samples],
             outcomes=[sample.outcome for sample in samples],
             held=[sample.set_point_held for sample in samples],
