@@ -14,6 +14,7 @@ import pytest
 from spook_tracker import engine
 from spook_tracker.engine.observe import Quantity
 from spook_tracker.scalar_tests.catalogue import CATALOGUE, QUESTIONS
+from tests.test_changelog import faults
 
 ROOT = Path(__file__).parent.parent
 PYTHON_FILES = sorted(
@@ -198,6 +199,10 @@ def test_no_file_is_longer_than_contributing_says() -> None:
     assert len(files) > 500
     assert {".js", ".css", ".html"} <= {path.suffix for path in files}
     assert {path.name: n for path in files if (n := len(path.read_text().splitlines())) > most} == {}
+
+
+def test_the_changelog_is_one_effect_a_line_under_its_kind() -> None:
+    assert faults((ROOT / "CHANGELOG.md").read_text(encoding="utf-8")) == []
 
 
 def test_any_becomes_rarer_in_the_tracker() -> None:
