@@ -122,6 +122,7 @@ def test_the_printed_energy_swings_by_symplectic_euler_and_less_on_the_exact_orb
     assert asked.holds_set_point(printed_swing(places, np.array(squares)))
     assert printed_swing(exact, by_vis_viva) == pytest.approx(2.266, abs=1e-3)
     assert "2.2857 %" in asked.set_point_source and "2.266 %" in asked.set_point_source
+    assert "the exact orbit swings by 2.266 %" in CATALOGUE["planetarium"].misprints[0]
 
 
 def test_the_chain_prototype_gives_the_modes_as_far_off_as_compliance_takes_them() -> None:

@@ -39,7 +39,6 @@ FACTS = {  # of the thesis, of theory, of a scene: true whatever an engine gives
     "The thesis' 30 m at 0.1 s is this read one sample late",
     "The thesis' beam bends too far, because its compliance was tuned by hand",
     "The thesis' beam rings at this time step (about −1e-6 %)",
-    "The thesis' engine exploded above 100",
     "The thesis' figure reads −5e-9 m at the middle, ten times its own limit",
     "The thesis' jump near zero is the constant of the printed sign",
     "Verlet's is a little above",

@@ -19,6 +19,7 @@ from spook_tracker.scalar_tests.case import Curve, Drawing, Simulate
 from spook_tracker.scalar_tests.sweep import told
 
 LADDER_COUNT = 20
+HIDDEN = 2.3e-15  # m/N in every lock row: sags by the printed limit
 
 
 def _measure_gate(simulate: Simulate) -> dict[str, float]:
@@ -75,17 +76,17 @@ def draw_against_time(simulate: Simulate) -> Drawing:
 
 def draw_along_the_beam(simulate: Simulate) -> Drawing:
     rigid = heights(simulate)
-    soft = heights(simulate, compliance=2.2e-15)
+    soft = heights(simulate, compliance=HIDDEN)
     bent = 100.0 * float(np.abs(soft).max()) / (COUNT * SIZE[0])
     boxes = tuple(float(i + 1) for i in range(COUNT))
     return Drawing(
         curves=(
             Curve(name="compliance 0", x=boxes, y=tuple(map(float, 1e6 * rigid))),
-            Curve(name="compliance 2.2e-15", x=boxes, y=tuple(map(float, 1e6 * soft)), style="line"),
+            Curve(name="compliance 2.3e-15", x=boxes, y=tuple(map(float, 1e6 * soft)), style="line"),
         ),
         x_label="box",
         y_label="height deviation [µm]",
-        note=f"A compliance of 2.2e-15 in every lock row gives {told(bent)} % of the length; the printed limit is 4.9e-9 %. "
+        note=f"A compliance of 2.3e-15 in every lock row gives {told(bent)} % of the length; the printed limit is 4.9e-9 %. "
         "The thesis' figure reads −5e-9 m at the middle, ten times its own limit.",
     )
 
@@ -93,8 +94,17 @@ def draw_along_the_beam(simulate: Simulate) -> Drawing:
 def draw_against_count(simulate: Simulate) -> Drawing:
     counts = (10, 20, 40, 60, 80, 100, 150, 200)
     values = tuple(deviation(simulate, count=count) for count in counts)
+    hidden = tuple(-100.0 * sag_of_compliant_beam(n, HIDDEN) / (n * SIZE[0]) for n in counts)
     return Drawing(
-        curves=(Curve(name="compliance 0", x=tuple(map(float, counts)), y=values),),
+        curves=(
+            Curve(name="compliance 0", x=tuple(map(float, counts)), y=values),
+            Curve(
+                name="statics with compliance 2.3e-15",
+                x=tuple(map(float, counts)),
+                y=hidden,
+                style="reference",
+            ),
+        ),
         x_label="boxes",
         y_label="largest height deviation over length [%]",
         x_scale="log",

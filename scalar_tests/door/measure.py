@@ -18,6 +18,9 @@ COUNTS_TO_200 = (1, 2, 3, 5, 10, 20, 50, 100, 200)
 MASSES = (1.0, 10.0, 45.0, 100.0, 200.0, 300.0, 400.0, 500.0, 600.0)
 
 
+SINGLE = 100.0 * 2.0**-24  # %, of a number with 24 bits
+
+
 def _largest(values: np.ndarray) -> float:
     return float(values[np.argmax(np.abs(values))])
 
@@ -68,6 +71,7 @@ def draw_against_count(simulate: Simulate) -> Drawing:
             Curve(name="printed damping 1e-13 s", x=counts, y=tuple(printed)),
             Curve(name="damping 2 h, settled", x=counts, y=tuple(damped)),
             Curve(name="limit", x=(1.0, 80.0), y=(0.02, 0.02), style="limit"),
+            Curve(name="what 32 bits resolve", x=(1.0, 80.0), y=(SINGLE, SINGLE), style="reference"),
         ),
         x_label="hinges",
         y_label="largest deviation of the vertical force [% of weight]",
@@ -103,6 +107,9 @@ def draw_against_mass(simulate: Simulate) -> Drawing:
             Curve(name="printed damping 1e-13 s", x=MASSES, y=tuple(printed)),
             Curve(name="damping 2 h, settled", x=MASSES, y=tuple(damped)),
             Curve(name="limit", x=(MASSES[0], MASSES[-1]), y=(0.02, 0.02), style="limit"),
+            Curve(
+                name="what 32 bits resolve", x=(MASSES[0], MASSES[-1]), y=(SINGLE, SINGLE), style="reference"
+            ),
         ),
         x_label="mass of the door [kg]",
         y_label="largest deviation of the vertical force [% of weight]",

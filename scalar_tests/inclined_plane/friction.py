@@ -35,6 +35,7 @@ from spook_tracker.scalar_tests.inclined_plane.scene import (
     force_ratio,
     scene,
     slide,
+    unloaded,
 )
 from spook_tracker.scalar_tests.sweep import told
 
@@ -42,6 +43,7 @@ DIRECTIONS = tuple(2.0 * math.pi * i / 36.0 for i in range(36))
 LADDER_DIRECTIONS = DIRECTIONS[:9:3] + DIRECTIONS[1:9:3]
 STILL = 1e-9  # m/s
 SLIDING = 0.6  # tan θ, above the friction coefficient
+STEEP, PRESSED = 0.8, 0.2  # tan θ; the share of the weight that goes as the last step begins
 
 
 def ratios(simulate: Simulate, slope: float, method: Method) -> tuple[float, ...]:
@@ -104,6 +106,23 @@ def _draw_polar(slope: float) -> object:
     return draw
 
 
+def draw_unloaded(simulate: Simulate) -> Drawing:
+    """F_t/F_n against direction in the step in which the normal force falls: the box model still has the one before."""
+    angles = (*tuple(math.degrees(alpha) for alpha in DIRECTIONS), 360.0)
+    curves, said = [], []
+    for name, method in MODELS.items():
+        values = [force_ratio(unloaded(simulate, STEEP, alpha, PRESSED, method)) for alpha in DIRECTIONS]
+        said.append(f"{name}: {told(min(values), 3)} to {told(max(values), 3)}")
+        curves.append(Curve(name=name, x=angles, y=(*values, values[0])))
+    return Drawing(
+        curves=tuple(curves),
+        x_label="direction of the slope [degrees]",
+        y_label="F_t/F_n",
+        x_scale="angle",
+        note=", ".join(said) + ".",
+    )
+
+
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Largest |F_t/F_n − µ| over six directions after sliding for a second."""
     worst = 0.0
@@ -154,7 +173,9 @@ TEST = ScalarTest(
     source="thesis, sections 3.2.4 and 4.2",
     misprints=(
         "Equations 3.11 and 3.12 have sine and cosine swapped: F_t = m g sin θ and F_n = m g cos θ.",
-        "The printed test measures at tan θ = µ, where the box only stands; there even the box model reads 0.5.",
+        "The printed test measures at tan θ = µ, where the box only stands; there even the box model reads 0.5, in every direction. "
+        "Fig 3.18 draws three models apart, up to 0.8: so they are where the box slides and its load changes, since the box model "
+        "takes its bound from the step before.",
     ),
     measurements=(
         Measurement(
@@ -252,6 +273,12 @@ TEST = ScalarTest(
             title="Force ratio against direction at tan θ = µ",
             draw=_draw_polar(FRICTION),  # type: ignore[arg-type]
             thesis="Fig 3.18",
+        ),
+        Figure(
+            name="force-ratio-against-direction-unloaded",
+            title="Force ratio against direction at tan θ = 0.8, as a fifth of the weight goes",
+            draw=draw_unloaded,
+            thesis="Fig 3.18, as drawn",
         ),
         Figure(
             name="force-ratio-against-direction-sliding",

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from spook_tracker.engine import (
     Box,
     ContactForce,
     Final,
+    Load,
     Material,
     Method,
     Plane,
     RigidBody,
     Scene,
+    Table,
     Trace,
     Velocity,
 )
@@ -67,6 +70,27 @@ def slide(
             "force": Trace(quantity=ContactForce("box"), first=steps // 2),
             "velocity": Final(quantity=Velocity("box")),
         },
+    )
+
+
+def unloaded(
+    simulate: Simulate, slope: float, direction: float, share: float, method: Method, steps: int = 10
+) -> Result:
+    """The box while `share` of its weight presses it on as well, which goes as the last step begins; observes as `slide`."""
+    before = (steps - 1.5) * TIME_STEP
+    weight = MASS * GRAVITY * math.cos(math.atan(slope))
+    press = Load(
+        name="press",
+        body="box",
+        force=(0.0, 0.0, -share * weight),
+        factor=Table(times=(0.0, before, before + 0.1 * TIME_STEP), values=(1.0, 1.0, 0.0)),
+    )
+    return simulate(
+        replace(scene(slope, direction), forces=(press,)),
+        time_step=TIME_STEP,
+        steps=steps,
+        method=method,
+        observe={"force": Trace(quantity=ContactForce("box"), first=steps)},
     )
 
 

@@ -34,8 +34,8 @@ TEST = ScalarTest(
     source="thesis, section 3.2.7 and section 4.2",
     seven=True,
     misprints=(
-        "Eq 3.18 has ½v² + k²/r. It must be a minus: with the plus even the exact orbit swings by 2.286 %, which "
-        "is what Figs 3.33 and 3.35 and the limit of 2.37 % show. Both readings are gated here.",
+        "Eq 3.18 has ½v² + k²/r. It must be a minus: with the plus even the exact orbit swings by 2.266 %, "
+        "and this step's by 2.286 %, which is what Figs 3.33 and 3.35 and the limit of 2.37 % show. Both readings are gated here.",
         "The period is 365.16 s, not 363 s.",
         "The axis labels of Figs 3.34 and 3.35 are swapped.",
     ),
