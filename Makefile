@@ -7,7 +7,7 @@ WORKERS ?= auto  # of the tests in Python: as many as there are cores
 BIN    := $(VENV)/bin
 export PIP_BUILD_CONSTRAINT ?= $(CURDIR)/.ci/build-constraints.txt
 
-.PHONY: help lint tools tidy tidy-deep engines engine-releases recorded wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-smooth bench-replay pictures looks heaps campaign campaign-wide mutants mutants-tonight past mutation detectors pairs aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-threads sanitize-python FORCE
+.PHONY: help lint tools tidy tidy-deep engines engine-releases recorded wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-smooth bench-replay pictures looks heaps campaign campaign-wide mutants mutants-tonight past mutation tolerances detectors pairs aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-threads sanitize-python FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -35,6 +35,7 @@ help:
 	@echo "make mutants-tonight  four of them, others every night"
 	@echo "make past      a wrong commit planted in this history and found, and ten old commits asked: many builds"
 	@echo "make mutation  the judge's rules changed one at a time: do its tests notice?"
+	@echo "make tolerances the numbers contacts are tuned by, times and by ten: which tests and bits notice?"
 	@echo "make pairs      how many unchanged changes are blocked beside their base, and how many slower ones found"
 	@echo "make detectors  what the judge of run times finds and cries over, beside asv and Otava"
 	@echo "make aa        twenty nights of one build beside two busy processes: is any of them red?"
@@ -135,6 +136,9 @@ past: develop
 
 mutation: develop
 	$(BIN)/python bench/mutation.py
+
+tolerances: develop
+	$(BIN)/python bench/tolerances.py $(PARTS)
 
 # asv and Otava stand in an environment of their own: Otava pins its NumPy.
 pairs: develop

@@ -1,4 +1,5 @@
 #include "contacts/bilateral_rows.hpp"
+#include "contacts/tolerances.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +8,7 @@ namespace spook {
 
 namespace {
 
-constexpr double relief = 1e-10;  // of a row's own G M⁻¹ Gᵀ, in the factor only
+using namespace tolerances::bilateral_rows;
 
 }  // namespace
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contacts/tolerances.hpp"
 #include "linear/elementary.hpp"
 #include "run/watch.hpp"
 
@@ -10,24 +11,7 @@ namespace spook {
 
 namespace {
 
-constexpr double tightest = 1e-14, loosest = 1e-9;  // residuals, of the speeds in the system
-constexpr double known = 1e-13;                     // of a start that is an answer already
-constexpr double refined = 1e-16;                   // of the square of what Newton's direction is to answer
-constexpr double roughly = 1e-6;    // the same along the path, which only leads to the next point
-constexpr double start_blur = 0.2;  // of the largest natural map
-constexpr double nearest = 1.0;     // of the blur: how far units may be from the path, in the mean
-constexpr double narrow = 0.03;     // a step so short has lost the path
-// Of a unit's own inverse mass: dz/dv is at most its mass over hold. The loosest leaves the matrix well conditioned
-// however redundant the points; with the tightest, what holding leaves is rounding soon after.
-constexpr double loosest_hold = 3e-4, tightest_hold = 1e-10;
-constexpr double hardest_hold = 0.1, brief = 0.3;  // beside joints, after a step so short
-constexpr double behind = 10.0, slow = 0.1;        // of the blur, and of itself: what holding back leaves
-constexpr double far = 1e-3;                       // a residual, of the speeds, from which the path may crawl
-constexpr int backoff = 3, long_patience = 12;     // iterations without half the residual, or much less blur
-constexpr int max_jumps = 3;                       // without half the least they met
-// The path is sought again
-constexpr double back = 10.0;   //   so many blurs away,
-constexpr double nearer = 0.1;  //   and kept so much nearer to
+using namespace tolerances::cone_newton;
 
 /// M⁻¹ from its factor: good enough for directions, which are refined.
 Mat6 inverse_six(const Mat6& factor) noexcept {

@@ -6,6 +6,7 @@
 #include "collision/shape_cast.hpp"
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "contacts/tolerances.hpp"
 #include "linear/ahead.hpp"
 #include "run/watch.hpp"
 
@@ -15,7 +16,7 @@ namespace {
 
 bool by_key(const Contact& a, const Contact& b) noexcept { return a.key < b.key; }
 bool round_or_plane(const Primitive& shape) noexcept { return !shape.faceted(); }
-constexpr double vanishing = 1e-8;  // a direction so steep on the surface has no shadow
+using namespace tolerances::contact_detect;
 
 }  // namespace
 

@@ -7,13 +7,9 @@
 #include "collision/shape.hpp"
 #include "contacts/pivot_system.hpp"
 #include "linear/vec.hpp"
+#include "contacts/tolerances.hpp"
 
 namespace spook {
-
-inline constexpr double closed = 1e-9;  // gaps up to this part of the larger body's radius count as closed
-inline constexpr unsigned pairs_a_look = 256;    // of shapes, between two looks at the clock
-inline constexpr std::size_t many_pairs = 512;   // of them: worth several threads
-inline constexpr std::size_t many_bodies = 512;  // the same
 
 inline Vec3 linear(const Vec6& v) noexcept { return {v[0], v[1], v[2]}; }
 inline Vec3 angular(const Vec6& v) noexcept { return {v[3], v[4], v[5]}; }

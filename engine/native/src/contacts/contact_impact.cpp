@@ -12,20 +12,13 @@
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "contacts/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr int simultaneous_rounds = 20;  // of impacts that follow from impacts in one step
-constexpr double gain = 1e-14;           // rise of kinetic energy that is rounding, relative
-constexpr double impact_compliance =
-    1e-3;  // of a point's own inverse inertia: what it gives way while an impact is shared
-constexpr int determined = 3;    // points of a pair whose normal impulses its motion fixes
-constexpr int most_again = 8;    // solves until the give is gone: each leaves about impact_compliance of it
-constexpr double left = 1e-16;   // of the fastest row: a give that is rounding
-constexpr double broken = 1e-6;  // of the fastest row: what a row may be short of
-constexpr double tolerated = 1e-9;  // of the fastest row: a give that need not be told
+using namespace tolerances::contact_impact;
 
 /// Of successive impacts in one step.
 int most_rounds(std::size_t points) noexcept { return 100 + 20 * static_cast<int>(points); }

@@ -5,13 +5,14 @@
 #include <optional>
 #include <span>
 
+#include "contacts/tolerances.hpp"
 #include "run/watch.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr std::size_t few_blocks = 48;  // blocks in all: not worth other threads
+using namespace tolerances::contact_islands;
 
 }  // namespace
 

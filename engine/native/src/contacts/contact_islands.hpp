@@ -10,10 +10,9 @@
 #include "contacts/friction_direct.hpp"
 #include "contacts/islands.hpp"
 #include "run/team.hpp"
+#include "contacts/tolerances.hpp"
 
 namespace spook {
-
-inline constexpr std::size_t few_rows = 24;  // blocks: so many are solved directly at little cost
 
 /// Splits a system into its islands and solves each with a solver and arrays of its own, which are kept from solve to
 /// solve, and the solver's analysis as long as the island does not change. Equal input gives equal bits, on however many threads islands are shared out.

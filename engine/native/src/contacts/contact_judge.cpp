@@ -4,6 +4,7 @@
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "contacts/tolerances.hpp"
 #include "linear/elementary.hpp"
 
 namespace spook {
@@ -28,7 +29,7 @@ double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
 
 namespace {
 
-constexpr double sunk = 0.02;  // of the smaller body's radius: an overlap that a solve has left
+using namespace tolerances::contact_judge;
 
 /// About G M⁻¹ Gᵀ of one row: off-diagonal inertia left out, since every step asks.
 double nearly_own(const MixedSystem& system, const RowBlock& block, int i) {

@@ -6,6 +6,7 @@
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "contacts/tolerances.hpp"
 
 namespace spook {
 
@@ -13,7 +14,7 @@ namespace {
 
 constexpr char rebounds = 1,
                held = 2;  // of an island: some impact in it has a restitution; not all in it is free
-constexpr std::size_t event_bodies = 8;  // a larger island is not moved to the time of one impact in it
+using namespace tolerances::contact_order;
 
 }  // namespace
 

@@ -4,6 +4,7 @@
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "contacts/tolerances.hpp"
 #include "linear/ahead.hpp"
 #include "linear/regularisation.hpp"
 
@@ -11,15 +12,7 @@ namespace spook {
 
 namespace {
 
-constexpr int most_turns = 16;    // times the work of `iterations`, where a step would be unsettled otherwise
-constexpr int joint_turns = 4;    // the same where a joint is furthest off: all of them are updated each time
-constexpr double too_much = 1e6;  // times the energy there is
-constexpr double focus = 0.5;  // of the residual allowed: contacts that change less are unfinished alone then
-// Before points found late are solved for:
-constexpr int warm_start_iterations = 100;  // iterations at most
-constexpr double warm_started = 1e-6;       // of the speeds: what changes less is
-constexpr std::size_t few_points = 100;     // points of an island: so many are solved for again at less cost
-constexpr int many_rounds = 8;              //   unless that has been done so often
+using namespace tolerances::contact_pgs;
 
 }  // namespace
 

@@ -4,16 +4,14 @@
 #include <cmath>
 
 #include "contacts/contact_geometry.hpp"
+#include "contacts/tolerances.hpp"
 #include "linear/regularisation.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr std::size_t not_too_large = 500;  // blocks
-constexpr double slack_share = 1e-10;       // of the smaller body's radius
-constexpr double rounding = 1e-15;          // of a place and of a size: four roundings
-constexpr int late_rounds = 64;  // of solves that set others in motion towards a third: each finds pairs anew
+using namespace tolerances::contact_stage;
 
 FrictionReport iterate(const ContactOptions& o, FrictionModel model, MixedSystem& island,
                        std::vector<FrictionPoint>& points, DirectSolver& solver) {

@@ -10,15 +10,14 @@
 #include "collision/shape_cast.hpp"
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "contacts/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr std::uint64_t swung_in = 1u << 15;    // marks a point whose feature has one in the manifold already
-constexpr double deep = 2e-3;                   // of the larger body's radius: what curved paths may overlap
-constexpr double same_place = 0.1;              // of it: points of one feature
-constexpr double same_direction_cosine = 0.95;  // cosine of their normals
+constexpr std::uint64_t swung_in = 1u << 15;  // marks a point whose feature has one in the manifold already
+using namespace tolerances::contact_turning;
 
 /// Two of these touch at one point, wherever they turn.
 bool is_single(const Primitive& shape) noexcept {

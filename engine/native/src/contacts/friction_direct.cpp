@@ -5,6 +5,7 @@
 
 #include "contacts/friction_acceleration.hpp"
 #include "contacts/friction_pgs.hpp"
+#include "contacts/tolerances.hpp"
 #include "linear/elementary.hpp"
 #include "linear/vec.hpp"
 
@@ -12,21 +13,7 @@ namespace spook {
 
 namespace {
 
-constexpr double settled = 1e-10;  // of the largest normal impulse
-constexpr double exact = 1e-12;    // the same: an answer that another round would not better
-constexpr double falling = 0.1;    // of the residual before: worth another round
-constexpr double loosest = 1e-6;
-constexpr double direction_hysteresis =
-    0.01;  // of a stuck point at the disc's edge to leave the direction it was turned to
-constexpr std::size_t few_blocks = 24;  // up to so many pivoting shares redundant loads evenly at little cost
-constexpr int plain_rounds = 3;         // most systems settle within these
-constexpr double poor = 1e-4;           // a residual, of the speeds: beyond it another way is tried
-constexpr double fair = 1e-9;           // one that is an answer
-// One that is not worth another try; where points are redundant, tries rarely settle and about halve it.
-constexpr double near = 1e-6, redundant_near = 3e-5;
-// Beside joints: iterations, four times as many each turn, and paths of the convex part.
-constexpr int joint_turns = 3, first_iterations = 8, max_frozen = 8;
-constexpr int pgs_turns = 1, iterations_per_turn = 100;  // where Newton's path ends without an answer
+using namespace tolerances::friction_direct;
 
 /// How much is spent on rounds of pivoting.
 struct IterationBudget {

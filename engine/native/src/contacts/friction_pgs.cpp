@@ -4,13 +4,14 @@
 #include <cmath>
 
 #include "contacts/pgs_rows.hpp"
+#include "contacts/tolerances.hpp"
 #include "run/watch.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr int search_rounds = 200;  // of pivoting: searches that end take fewer
+using namespace tolerances::friction_pgs;
 
 /// One per thread: its memory outlives a solve, its values do not.
 PgsRows& pgs_rows() {

@@ -5,6 +5,7 @@
 #include "collision/shape_cast.hpp"
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "contacts/tolerances.hpp"
 #include "linear/ahead.hpp"
 #include "run/watch.hpp"
 
@@ -12,9 +13,7 @@ namespace spook {
 
 namespace {
 
-constexpr double same_side = 1.0 - 1e-9;  // cosine of normals
-constexpr double other_side = 0.5;        // the same
-constexpr double most_met = 0.1;          // of the open pairs: more are not kept in the list
+using namespace tolerances::impact_search;
 
 }  // namespace
 

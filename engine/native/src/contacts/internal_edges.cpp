@@ -13,19 +13,13 @@
 #include "collision/shape_cast.hpp"
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "contacts/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr double share = 0.25;            // of the overlap at which pairs count as met: less is none
-constexpr double same_face_cosine = 0.9;  // cosine of normals: what both lie on
-constexpr std::size_t max_earlier = 8;    // of the meetings of a body, that may occlude later ones
-constexpr double simultaneous = 0.05;     // of a step: which of two meetings comes first is not known
-constexpr double same_direction_cosine = 1.0 - 1e-12;  // the same of one face met twice
-constexpr double free_fall_allowance = 3.0;  // of a fall in a step: what sinks before iterations hold it
-constexpr double residual_motion = 10.0;  // of that overlap: what they leave of motion where all is at rest
-constexpr double side_cosine = 0.5;  // cosine of the normal of a meeting: no more of it is along what holds
+using namespace tolerances::internal_edges;
 
 /// How far the lowest point along n is above the origin, m; of a triangle infinite.
 double height(const Mover& of, double time, Vec3 n) noexcept {

@@ -3,12 +3,13 @@
 #include <utility>
 
 #include "contacts/pgs_solver.hpp"
+#include "contacts/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr double few_late = 0.1;  // of all items: so many get levels of their own
+using namespace tolerances::pgs_schedule;
 
 }  // namespace
 

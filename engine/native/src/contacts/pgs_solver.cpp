@@ -12,22 +12,13 @@
 
 #define SPOOK_ISA single
 #include "contacts/pgs_contact.inl"
+#include "contacts/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr int late_rounds = 3;            // of iterations for contacts found after the last one
-constexpr double skip_cost = 1.0 / 16.0;  // of what iterating a contact costs: to see that it is cold
-constexpr double residual_cost = 0.5;     // the same: to see how far off it is
-constexpr std::size_t bodies_ahead = 6, contacts_ahead = 12;  // asked for while others are updated
-constexpr std::size_t narrow = 32;  // contacts of a level for each thread: fewer are not worth to wait for
-constexpr std::size_t narrow_scheduled = 96;  // the same where only some of them are scheduled
-constexpr std::size_t worth_threads = 512;    // contacts, where nothing is waited for
-constexpr double few_off = 1.0 / 16.0;  // of the contacts are further off than the next iterations care for
-constexpr double nearly = 0.9;          // of what is allowed: then they care for what is that far off
-constexpr double few_left = 0.75;       // of the contacts in the list: a shorter one is made
-constexpr int plain_iterations = 2;     // the last ones, which are not over-relaxed
+using namespace tolerances::pgs_solver;
 
 Vec3 add_turn(const Vec6& v, Vec3 arm) noexcept { return linear(v) + cross(angular(v), arm); }
 

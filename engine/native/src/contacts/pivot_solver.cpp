@@ -5,18 +5,14 @@
 #include <utility>
 
 #include "contacts/friction_pgs.hpp"
+#include "contacts/tolerances.hpp"
 #include "run/watch.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr int backoff = 5;       // rounds without fewer offenders before Murty's rule
-constexpr int max_restarts = 7;  // then Murty's rule
-constexpr int short_search = 4;  // rounds: too few for more offenders at its start than these
-constexpr int few_offenders = 4, offending_share = 25;  // and one row in so many
-constexpr double tightest = 1e-11;  // tolerance of a velocity, relative to the system's scale
-constexpr double loosest = 1e-7;    // where contradicting rigid contacts leave no exact answer
+using namespace tolerances::pivot_solver;
 
 bool bilateral(const RowBlock& block, int i) noexcept {
     return block.lower[i] == -unbounded && block.upper[i] == unbounded;

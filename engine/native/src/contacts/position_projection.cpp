@@ -3,6 +3,7 @@
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "contacts/tolerances.hpp"
 #include "linear/ahead.hpp"
 #include "linear/regularisation.hpp"
 #include "run/watch.hpp"
@@ -11,19 +12,7 @@ namespace spook {
 
 namespace {
 
-constexpr double contact_compliance_share =
-    1e-3;  // what a contact of jointed bodies yields, of 1/m of all that moves with them
-constexpr double joint_compliance_share = 1e-6;  // and a joint, of its row's own inertia
-constexpr double joint_share = 1e-3;             // and of what the contacts do
-constexpr double min_joint_compliance =
-    1e-12;                                // of its row's own inertia: repeated joints share a load by it
-constexpr double over_relaxation = 1.25;  // of PGS that separates balls, not boxes
-constexpr double search_factor = 4.0;     // of the deepest overlap: gaps that the projection may close
-constexpr double min_separation_to_propagate =
-    1e-9;  // of the smaller body's radius: a body displaced by less pushes no other
-constexpr double min_separation_to_propagate_pgs =
-    5e-4;                           // the same for PGS, where each extra row slows fifty iterations
-constexpr double same_place = 0.1;  // of the larger body's radius: one point, seen again
+using namespace tolerances::position_projection;
 
 }  // namespace
 

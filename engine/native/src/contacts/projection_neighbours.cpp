@@ -3,15 +3,14 @@
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "contacts/tolerances.hpp"
 #include "run/watch.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr std::size_t max_neighbours =
-    32;                      // bodies of a ring: where more part at once, the next step will tell
-constexpr int max_hops = 4;  // of neighbours that the projection sees
+using namespace tolerances::projection_neighbours;
 
 }  // namespace
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contacts/tolerances.hpp"
 #include "linear/elementary.hpp"
 #include "run/watch.hpp"
 
@@ -10,13 +11,7 @@ namespace spook {
 
 namespace {
 
-constexpr double exact = 1e-14;  // a residual, of the speeds in the system: rounding
-constexpr double good = 1e-11;   // one that is an answer
-constexpr int rounds = 3;        // of iterations and Newton's method
-constexpr double held =
-    1e-10;  // of what a row moves without joints: joints hold it, and no impulse there does anything
-constexpr int passes = 3;  // measured anew with the true equations
-constexpr double floor_of_pivots = 1e-12;
+using namespace tolerances::reduced_contacts;
 
 }  // namespace
 

@@ -3,15 +3,14 @@
 #include <cmath>
 
 #include "contacts/reduced_contacts.hpp"
+#include "contacts/tolerances.hpp"
 #include "linear/elementary.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr int polish_steps = 24;
-constexpr int patience = 8;      // steps without half the best residual: those that end do so sooner
-constexpr double relief = 1e-9;  // of a row's own entry of W, in Newton's matrix only: redundant points
+using namespace tolerances::reduced_newton;
 
 }  // namespace
 

@@ -15,13 +15,13 @@
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "contacts/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr double pressed_by = 1e-9;  // of a kick: what presses less does not
-constexpr double level = 1e-6;       // of a kick, or a speed: a part along the forces that is none
+using namespace tolerances::supported_bodies;
 
 bool is_along(Vec3 kick, Vec3 velocity) {
     return std::abs(dot(kick, velocity)) > level * norm(kick) * (norm(kick) + norm(velocity));

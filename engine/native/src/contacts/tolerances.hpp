@@ -1,0 +1,245 @@
+// The numbers that contacts are tuned by: each with its unit, and what it stands for. A part is the file that reads it.
+// `make tolerances` multiplies and divides one at a time by ten, and tells which test goes red and whether any bit changes.
+//
+// Shares are without unit. Speeds "in the system" are the largest of the bodies that are solved for, m/s.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+namespace spook {
+
+// bilateral_rows.cpp
+namespace tolerances::bilateral_rows {
+inline constexpr double relief = 1e-10;  // of a row's own G M⁻¹ Gᵀ, in the factor only
+}
+
+// cone_newton.cpp
+namespace tolerances::cone_newton {
+inline constexpr double tightest = 1e-14, loosest = 1e-9;  // residuals, of the speeds in the system
+inline constexpr double known = 1e-13;                     // of a start that is an answer already
+inline constexpr double refined = 1e-16;   // of the square of what Newton's direction is to answer
+inline constexpr double roughly = 1e-6;    // the same along the path, which only leads to the next point
+inline constexpr double start_blur = 0.2;  // of the largest natural map
+inline constexpr double nearest = 1.0;     // of the blur: how far units may be from the path, in the mean
+inline constexpr double narrow = 0.03;     // a step so short has lost the path
+// Of a unit's own inverse mass: dz/dv is at most its mass over hold. The loosest leaves the matrix well conditioned
+// however redundant the points; with the tightest, what holding leaves is rounding soon after.
+inline constexpr double loosest_hold = 3e-4, tightest_hold = 1e-10;
+inline constexpr double hardest_hold = 0.1, brief = 0.3;  // beside joints, after a step so short
+inline constexpr double behind = 10.0, slow = 0.1;  // of the blur, and of itself: what holding back leaves
+inline constexpr double far = 1e-3;  // a residual, of the speeds, from which the path may crawl
+inline constexpr int backoff = 3,
+                     long_patience = 12;  // iterations without half the residual, or much less blur
+inline constexpr int max_jumps = 3;       // without half the least they met
+inline constexpr double back = 10.0;      // blurs: so far away the path is sought again,
+inline constexpr double nearer = 0.1;     //   and kept so much nearer to
+}  // namespace tolerances::cone_newton
+
+// contact_detect.cpp
+namespace tolerances::contact_detect {
+inline constexpr double vanishing = 1e-8;  // a direction so steep on the surface has no shadow
+}
+
+// Read by several parts
+inline constexpr double closed = 1e-9;  // gaps up to this part of the larger body's radius count as closed
+inline constexpr unsigned pairs_a_look = 256;    // of shapes, between two looks at the clock
+inline constexpr std::size_t many_pairs = 512;   // of them: worth several threads
+inline constexpr std::size_t many_bodies = 512;  // the same
+
+// contact_impact.cpp
+namespace tolerances::contact_impact {
+inline constexpr int simultaneous_rounds = 20;  // of impacts that follow from impacts in one step
+inline constexpr double gain = 1e-14;           // rise of kinetic energy that is rounding, relative
+inline constexpr double impact_compliance =
+    1e-3;  // of a point's own inverse inertia: what it gives way while an impact is shared
+inline constexpr int determined = 3;  // points of a pair whose normal impulses its motion fixes
+inline constexpr int most_again =
+    8;  // solves until the give is gone: each leaves about impact_compliance of it
+inline constexpr double left = 1e-16;      // of the fastest row: a give that is rounding
+inline constexpr double broken = 1e-6;     // of the fastest row: what a row may be short of
+inline constexpr double tolerated = 1e-9;  // of the fastest row: a give that need not be told
+}  // namespace tolerances::contact_impact
+
+// contact_islands.cpp
+namespace tolerances::contact_islands {
+inline constexpr std::size_t few_blocks = 48;  // blocks in all: not worth other threads
+}
+
+// Read by several parts
+inline constexpr std::size_t few_rows = 24;  // blocks: so many are solved directly at little cost
+
+// contact_judge.cpp
+namespace tolerances::contact_judge {
+inline constexpr double sunk = 0.02;  // of the smaller body's radius: an overlap that a solve has left
+}
+
+// contact_order.cpp
+namespace tolerances::contact_order {
+inline constexpr std::size_t event_bodies =
+    8;  // a larger island is not moved to the time of one impact in it
+}
+
+// contact_pgs.cpp
+namespace tolerances::contact_pgs {
+inline constexpr int most_turns =
+    16;  // times the work of `iterations`, where a step would be unsettled otherwise
+inline constexpr int joint_turns =
+    4;  // the same where a joint is furthest off: all of them are updated each time
+inline constexpr double too_much = 1e6;  // times the energy there is
+inline constexpr double focus =
+    0.5;  // of the residual allowed: contacts that change less are unfinished alone then
+inline constexpr int warm_start_iterations = 100;  // at most, before points found late are solved for
+inline constexpr double warm_started = 1e-6;       // of the speeds: what changes less is
+inline constexpr std::size_t few_points =
+    100;                               // points of an island: so many are solved for again at less cost
+inline constexpr int many_rounds = 8;  //   unless that has been done so often
+}  // namespace tolerances::contact_pgs
+
+// contact_stage.cpp
+namespace tolerances::contact_stage {
+inline constexpr std::size_t not_too_large =
+    500;  // row blocks: so many are solved directly where iterations ran away
+inline constexpr double slack_share = 1e-10;  // of the smaller body's radius
+inline constexpr double rounding = 1e-15;     // of a place and of a size: four roundings
+inline constexpr int late_rounds =
+    64;  // of solves that set others in motion towards a third: each finds pairs anew
+}  // namespace tolerances::contact_stage
+
+// contact_turning.cpp
+namespace tolerances::contact_turning {
+inline constexpr double deep = 2e-3;       // of the larger body's radius: what curved paths may overlap
+inline constexpr double same_place = 0.1;  // of it: points of one feature
+inline constexpr double same_direction_cosine = 0.95;  // cosine of their normals
+}  // namespace tolerances::contact_turning
+
+// friction_direct.cpp
+namespace tolerances::friction_direct {
+inline constexpr double settled = 1e-10;  // of the largest normal impulse
+inline constexpr double exact = 1e-12;    // the same: an answer that another round would not better
+inline constexpr double falling = 0.1;    // of the residual before: worth another round
+inline constexpr double loosest = 1e-6;   // the same, after 25 rounds
+inline constexpr double direction_hysteresis =
+    0.01;  // of a stuck point at the disc's edge to leave the direction it was turned to
+inline constexpr std::size_t few_blocks =
+    24;                                 // up to so many pivoting shares redundant loads evenly at little cost
+inline constexpr int plain_rounds = 3;  // most systems settle within these
+inline constexpr double poor = 1e-4;    // a residual, of the speeds: beyond it another way is tried
+inline constexpr double fair = 1e-9;    // one that is an answer
+inline constexpr double near = 1e-6,
+                        redundant_near =
+                            3e-5;  // residuals, of the speeds: answers; the second where points are redundant
+// Beside joints: iterations, four times as many each turn, and paths of the convex part.
+inline constexpr int joint_turns = 3, first_iterations = 8, max_frozen = 8;
+inline constexpr int pgs_turns = 1, iterations_per_turn = 100;  // where Newton's path ends without an answer
+}  // namespace tolerances::friction_direct
+
+// friction_pgs.cpp
+namespace tolerances::friction_pgs {
+inline constexpr int search_rounds = 200;  // of pivoting: searches that end take fewer
+}
+
+// impact_search.cpp
+namespace tolerances::impact_search {
+inline constexpr double same_side = 1.0 - 1e-9;  // cosine of normals
+inline constexpr double other_side = 0.5;        // the same
+inline constexpr double most_met = 0.1;          // of the open pairs: more are not kept in the list
+}  // namespace tolerances::impact_search
+
+// internal_edges.cpp
+namespace tolerances::internal_edges {
+inline constexpr double share = 0.25;            // of the overlap at which pairs count as met: less is none
+inline constexpr double same_face_cosine = 0.9;  // cosine of normals: what both lie on
+inline constexpr std::size_t max_earlier = 8;    // of the meetings of a body, that may occlude later ones
+inline constexpr double simultaneous = 0.05;     // of a step: which of two meetings comes first is not known
+inline constexpr double same_direction_cosine = 1.0 - 1e-12;  // the same of one face met twice
+inline constexpr double free_fall_allowance =
+    3.0;  // of a fall in a step: what sinks before iterations hold it
+inline constexpr double residual_motion =
+    10.0;  // of that overlap: what they leave of motion where all is at rest
+inline constexpr double side_cosine =
+    0.5;  // cosine of the normal of a meeting: no more of it is along what holds
+}  // namespace tolerances::internal_edges
+
+// pgs_schedule.cpp
+namespace tolerances::pgs_schedule {
+inline constexpr double few_late = 0.1;  // of all items: so many get levels of their own
+}
+
+// pgs_solver.cpp
+namespace tolerances::pgs_solver {
+inline constexpr int late_rounds = 3;            // of iterations for contacts found after the last one
+inline constexpr double skip_cost = 1.0 / 16.0;  // of what iterating a contact costs: to see that it is cold
+inline constexpr double residual_cost = 0.5;     // the same: to see how far off it is
+inline constexpr std::size_t bodies_ahead = 6, contacts_ahead = 12;  // asked for while others are updated
+inline constexpr std::size_t narrow =
+    32;  // contacts of a level for each thread: fewer are not worth to wait for
+inline constexpr std::size_t narrow_scheduled = 96;  // the same where only some of them are scheduled
+inline constexpr std::size_t worth_threads = 512;    // contacts, where nothing is waited for
+inline constexpr double few_off =
+    1.0 / 16.0;                           // of the contacts are further off than the next iterations care for
+inline constexpr double nearly = 0.9;     // of what is allowed: then they care for what is that far off
+inline constexpr double few_left = 0.75;  // of the contacts in the list: a shorter one is made
+inline constexpr int plain_iterations = 2;  // the last ones, which are not over-relaxed
+}  // namespace tolerances::pgs_solver
+
+// pivot_solver.cpp
+namespace tolerances::pivot_solver {
+inline constexpr int backoff = 5;       // rounds without fewer offenders before Murty's rule
+inline constexpr int max_restarts = 7;  // then Murty's rule
+inline constexpr int short_search = 4;  // rounds: too few for more offenders at its start than these
+inline constexpr int few_offenders = 4, offending_share = 25;  // and one row in so many
+inline constexpr double tightest = 1e-11;  // tolerance of a velocity, relative to the system's scale
+inline constexpr double loosest = 1e-7;    // where contradicting rigid contacts leave no exact answer
+}  // namespace tolerances::pivot_solver
+
+// position_projection.cpp
+namespace tolerances::position_projection {
+inline constexpr double contact_compliance_share =
+    1e-3;  // what a contact of jointed bodies yields, of 1/m of all that moves with them
+inline constexpr double joint_compliance_share = 1e-6;  // and a joint, of its row's own inertia
+inline constexpr double joint_share = 1e-3;             // and of what the contacts do
+inline constexpr double min_joint_compliance =
+    1e-12;  // of its row's own inertia: repeated joints share a load by it
+inline constexpr double over_relaxation = 1.25;  // of PGS that separates balls, not boxes
+inline constexpr double search_factor = 4.0;     // of the deepest overlap: gaps that the projection may close
+inline constexpr double min_separation_to_propagate =
+    1e-9;  // of the smaller body's radius: a body displaced by less pushes no other
+inline constexpr double min_separation_to_propagate_pgs =
+    5e-4;                                  // the same for PGS, where each extra row slows fifty iterations
+inline constexpr double same_place = 0.1;  // of the larger body's radius: one point, seen again
+}  // namespace tolerances::position_projection
+
+// projection_neighbours.cpp
+namespace tolerances::projection_neighbours {
+inline constexpr std::size_t max_neighbours =
+    32;                             // bodies of a ring: where more part at once, the next step will tell
+inline constexpr int max_hops = 4;  // of neighbours that the projection sees
+}  // namespace tolerances::projection_neighbours
+
+// reduced_contacts.cpp
+namespace tolerances::reduced_contacts {
+inline constexpr double exact = 1e-14;  // a residual, of the speeds in the system: rounding
+inline constexpr double good = 1e-11;   // one that is an answer
+inline constexpr int rounds = 3;        // of iterations and Newton's method
+inline constexpr double held =
+    1e-10;  // of what a row moves without joints: joints hold it, and no impulse there does anything
+inline constexpr int passes = 3;                  // measured anew with the true equations
+inline constexpr double floor_of_pivots = 1e-12;  // of the largest: smaller ones are redundant rows
+}  // namespace tolerances::reduced_contacts
+
+// reduced_newton.cpp
+namespace tolerances::reduced_newton {
+inline constexpr int polish_steps = 24;  // of Newton, at most
+inline constexpr int patience = 8;       // steps without half the best residual: those that end do so sooner
+inline constexpr double relief =
+    1e-9;  // of a row's own entry of W, in Newton's matrix only: redundant points
+}  // namespace tolerances::reduced_newton
+
+// supported_bodies.cpp
+namespace tolerances::supported_bodies {
+inline constexpr double pressed_by = 1e-9;  // of a kick: what presses less does not
+inline constexpr double level = 1e-6;       // of a kick, or a speed: a part along the forces that is none
+}  // namespace tolerances::supported_bodies
+
+}  // namespace spook
