@@ -1,7 +1,8 @@
 """`make tolerances`: each named constant of the core times and by ten: which test goes red, and of how many runs does a bit
 change?
 
-    python bench/tolerances.py [PART …] [--tests FILE …]      parts as contacts/internal_edges; without: all that have tests here
+    python bench/tolerances.py [--bits] [PART …] [--tests FILE …]     parts as contacts/internal_edges; without: all that have
+                                                                      tests here; --bits: no tests
 
 The constants of `ROOM/tolerances.hpp` are read from the environment in a module built for this (build/tolerances), so that a
 change of one is a run and not a build. A constant that no test and no run misses ought to go, with what it guards. Ends
@@ -198,10 +199,11 @@ def slides(count: int) -> None:
 
 
 def main(arguments: list[str]) -> int:
-    parts, tests = arguments, ()
-    if "--tests" in arguments:
-        at = arguments.index("--tests")
-        parts, tests = arguments[:at], tuple(Path(name).stem for name in arguments[at + 1 :])
+    bits = "--bits" in arguments
+    parts, tests = [name for name in arguments if name != "--bits"], ()
+    if "--tests" in parts:
+        at = parts.index("--tests")
+        parts, tests = parts[:at], tuple(Path(name).stem for name in parts[at + 1 :])
     module = build()
     found = [
         constant
@@ -212,15 +214,15 @@ def main(arguments: list[str]) -> int:
     plain = states(module, "")
     missed = []
     for constant in found:
-        near = tests or NEAR[f"{constant.room}/{constant.part}"]
+        near = () if bits else tests or NEAR[f"{constant.room}/{constant.part}"]
         seen = False
         for factor in FACTORS:
             asked = f"{constant}={factor!r}"
-            red = red_test(module, asked, near)
+            red = red_test(module, asked, near) if near else ""
             changed = sum(one != other for one, other in zip(plain, states(module, asked), strict=True))
             seen = seen or bool(red) or changed > 0
             print(
-                f"{constant} {constant.value} × {factor:g}: {red or 'no test'}; {changed} of {len(plain)} runs",
+                f"{constant} {constant.value} × {factor:g}: {red or ('no test' if near else 'tests not asked')}; {changed} of {len(plain)} runs",
                 flush=True,
             )
         if not seen:
