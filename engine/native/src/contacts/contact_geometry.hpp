@@ -6,8 +6,8 @@
 
 #include "collision/shape.hpp"
 #include "contacts/pivot_system.hpp"
-#include "linear/vec.hpp"
 #include "contacts/tolerances.hpp"
+#include "linear/vec.hpp"
 
 namespace spook {
 

@@ -9,8 +9,8 @@
 
 #include "contacts/friction_direct.hpp"
 #include "contacts/islands.hpp"
-#include "run/team.hpp"
 #include "contacts/tolerances.hpp"
+#include "run/team.hpp"
 
 namespace spook {
 
