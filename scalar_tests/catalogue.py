@@ -31,6 +31,7 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
     "billiards": "billiards",
     "cradle": "cradle",
     "near_miss": "near_miss",
+    "solver_options": "solver_options",
     "edge_roll": "edge_roll",
     "overhang": "overhang",
     "leaning_cards": "leaning_cards",

@@ -1,0 +1,349 @@
+"""Do options that shall only save work, or only report, leave the answer alone?"""
+
+from __future__ import annotations
+
+import math
+import random
+
+import numpy as np
+
+from spook_tracker.engine import (
+    Box,
+    ConstraintForce,
+    ContactForce,
+    Energy,
+    Final,
+    Material,
+    Method,
+    Plane,
+    Position,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+    Velocity,
+)
+from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.case import (
+    BreakPoint,
+    Drawing,
+    Example,
+    Figure,
+    Metric,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
+from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.door.scene import least_norm_forces
+from spook_tracker.scalar_tests.door.scene import scene as hung
+from spook_tracker.scalar_tests.pendulum.scene import scene as pendulum
+from spook_tracker.scalar_tests.sweep import line
+
+GRAVITY = 9.81  # m/s²
+TIME_STEP = 1.0 / 60.0  # s
+EDGE = 0.5  # m, of boxes of the heap
+HEAPED, STACKED = 30, 5
+MANY, SIDE = 216, 6  # so many that threads share them: more than 512 contacts
+FALLING = 0.25  # s: while the heap falls together
+LYING = 3.0  # s
+SLEEPY = Method(sleep_speed=0.02)
+AFTER = SLEEPY.sleep_after  # s
+THREADS = (2, 4)
+RADIUS = 0.1  # m, of the ball
+SLOPE = math.radians(30.0)
+PULL = GRAVITY * math.sin(SLOPE)  # m/s², along it
+FINE = TIME_STEP / 4.0  # s, on the slope
+CAPS = (0.03, 0.1, 1.0)  # beside the default; a pendulum of 1 m bends by 0.003 a step at most
+FLOORS = (1e-16, 1e-14, 1e-10, 1e-8)  # from 1e-6 on the hinges share the door as they like
+THRESHOLDS = (
+    0.3,
+    0.1,
+    0.03,
+    0.01,
+    1e-4,
+    1e-6,
+)  # m/s: four that ten sweeps and those they call for reach, two not
+ROUGH = Material(friction=0.5)
+FLOOR = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=ROUGH)
+
+
+def heap(count: int = HEAPED, side: int = 2) -> Scene:
+    """Boxes dropped in square layers, a little aside."""
+    draw = random.Random(5)
+    boxes = tuple(
+        RigidBody(
+            name=f"box {k}",
+            mass=1.0 + k % 3,
+            shape=Box((EDGE, EDGE, EDGE)),
+            position=(
+                0.55 * (k % side) + draw.uniform(-0.02, 0.02),
+                0.55 * (k // side % side) + draw.uniform(-0.02, 0.02),
+                0.26 + 0.51 * (k // side**2),
+            ),
+            material=ROUGH,
+        )
+        for k in range(count)
+    )
+    return Scene(bodies=(FLOOR, *boxes), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def stack() -> Scene:
+    """Boxes of 1 kg one on the other, at rest."""
+    boxes = tuple(
+        RigidBody(
+            name=f"box {k}", mass=1.0, shape=Box((1.0,) * 3), position=(0.0, 0.0, 0.5 + k), material=ROUGH
+        )
+        for k in range(STACKED)
+    )
+    return Scene(bodies=(FLOOR, *boxes), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def thrown(speed: float, slope: float = 0.5 * math.pi) -> Scene:
+    """A ball on its way straight up, or up a smooth slope [rad]; x is up the slope."""
+    ball = RigidBody(
+        name="ball", mass=1.0, shape=Sphere(RADIUS), position=(0.0, 0.0, RADIUS), velocity=(speed, 0.0, 0.0)
+    )
+    ground = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
+    return Scene(bodies=(ground, ball), gravity=(-GRAVITY * math.sin(slope), 0.0, -GRAVITY * math.cos(slope)))
+
+
+def _threads(simulate: Simulate) -> dict[str, float]:
+    def fallen(threads: int) -> np.ndarray:
+        result = simulate(
+            heap(MANY, SIDE),
+            time_step=TIME_STEP,
+            duration=FALLING,
+            method=Method(solver="iterative", iterations=20, threads=threads),
+            observe={"x": Final(quantity=Position()), "v": Final(quantity=Velocity())},
+        )
+        return np.hstack((result.partial["x"], result.partial["v"]))
+
+    alone = fallen(1)
+    return {"bits_of_threads": float(sum((fallen(threads) != alone).sum() for threads in THREADS))}
+
+
+def _asleep(simulate: Simulate) -> dict[str, float]:
+    """What lies keeps its place and its weight, and what flies is left alone."""
+    observe = {"x": Trace(quantity=Position()), "load": Final(quantity=ContactForce("floor"))}
+    result = simulate(stack(), time_step=TIME_STEP, duration=LYING, method=SLEEPY, observe=observe)
+    late = result["x"][result.sample_times["x"] > AFTER + 2.0 * TIME_STEP]
+    flight = {"x": Trace(quantity=Position("ball"))}
+    flown, free = (
+        simulate(thrown(4.0), time_step=TIME_STEP, duration=1.0, method=method, observe=flight)["x"]
+        for method in (Method(sleep_speed=3.0), Method())
+    )
+    return {
+        "awake": STACKED - float(result.counters.get("asleep", 0)),
+        "moved_asleep": float(np.abs(late - late[-1]).max()),
+        "load_asleep": float(abs(result["load"][2]) / (STACKED * GRAVITY) - 1.0),
+        "held_in_flight": float(np.abs(flown - free).max()),
+    }
+
+
+def _reported(simulate: Simulate) -> dict[str, float]:
+    """Thresholds that more sweeps reach and such that they do not: who is wrongly called unsettled, or not."""
+    wrong = 0
+    for threshold in THRESHOLDS:
+        method = Method(solver="iterative", iterations=10, unsettled_residual=threshold)
+        result = simulate(heap(), time_step=TIME_STEP, duration=FALLING, method=method)
+        wrong += (result.status == "unsettled") != (result.residual > threshold)
+    return {"misreported": float(wrong)}
+
+
+def _capped(simulate: Simulate) -> dict[str, float]:
+    def swung(cap: float) -> np.ndarray:
+        method = Method(corrections=2, correction_cap=cap)
+        observe = {"x": Trace(quantity=Position()), "energy": Trace(quantity=Energy())}
+        result = simulate(
+            pendulum(TIME_STEP), time_step=TIME_STEP, duration=5.0, method=method, observe=observe
+        )
+        return np.hstack((result["x"].reshape(len(result["energy"]), -1), result["energy"][:, None]))
+
+    usual = swung(Method().correction_cap)
+    return {"bits_of_the_cap": float(sum((swung(cap) != usual).sum() for cap in CAPS))}
+
+
+def _floored(simulate: Simulate) -> dict[str, float]:
+    """How five hinges of compliance 0, which repeat each other, share a door as the pivots' floor is raised."""
+    door, right = hung(5, damping=2.0 * TIME_STEP, compliance=0.0), least_norm_forces(5)
+    observe = {name: Final(quantity=ConstraintForce(name)) for name in (f"hinge {k + 1}" for k in range(5))}
+    worst = 0.0
+    for floor in FLOORS:
+        result = simulate(
+            door, time_step=TIME_STEP, duration=1.0, method=Method(floor=floor), observe=observe
+        )
+        held = np.stack([result[name] for name in observe])
+        worst = max(worst, float(np.abs(held - right).max() / np.abs(right).max()))
+    return {"split_of_floors": worst}
+
+
+def laziest(simulate: Simulate) -> BreakPoint:
+    """The largest sleep speed [m/s] with which a ball is not put to sleep where it turns back on a smooth slope."""
+
+    def returns(slow: float) -> bool:
+        observe = {"v": Final(quantity=Velocity("ball"))}
+        result = simulate(
+            thrown(2.0 * slow, SLOPE),
+            time_step=FINE,
+            duration=2.0 * slow / PULL + AFTER,
+            method=Method(sleep_speed=slow),
+            observe=observe,
+        )
+        return bool(result["v"][0] < 0.0)
+
+    return break_point(returns, 0.1, 20.0, resolution=1e-3, walk=9)
+
+
+def _draw(simulate: Simulate) -> Drawing:
+    curves = []
+    for name, method in (("asleep", SLEEPY), ("awake", Method())):
+        observe = {"v": Trace(quantity=Velocity())}
+        result = simulate(heap(), time_step=TIME_STEP, duration=2.5, method=method, observe=observe)
+        fastest = np.linalg.norm(result.partial["v"], axis=-1).max(axis=-1)
+        curves.append(line(name, result.sample_times["v"], np.maximum(fastest, 1e-18)))
+    return Drawing(
+        curves=tuple(curves), x_label="time [s]", y_label="fastest box of the heap [m/s]", y_scale="log"
+    )
+
+
+def _none(name: str, description: str, unit: str, source: str) -> Metric:
+    return Metric(
+        name=name,
+        description=description,
+        unit=unit,
+        role="gate",
+        limit=0.0,
+        limit_source=source,
+        reference=0.0,
+    )
+
+
+TEST = ScalarTest(
+    title="Options of the solver",
+    question="Do options that shall only save work, or only report, leave the answer alone?",
+    why="Threads, sleeping and guards are set once and trusted. One that changes an answer a little is never suspected.",
+    model="A heap of boxes, a stack, a thrown ball, a pendulum and a door, with one option turned at a time.",
+    parameters=(
+        ("threads", "1 against 2 and 4: 216 boxes fall together, more than 512 contacts, 20 sweeps"),
+        (
+            "sleep_speed",
+            f"{SLEEPY.sleep_speed} m/s for {AFTER} s: five boxes; 3 m/s: a ball thrown up at 4 m/s; up a smooth slope of 30°",
+        ),
+        ("unsettled_residual", "0.3 to 1e-6 m/s, 30 boxes fall together, 10 sweeps"),
+        ("correction_cap", "0.03 to 1, a pendulum that bends 0.003 a step"),
+        ("floor", "1e-16 to 1e-8, a door of 45 kg on five hinges of compliance 0"),
+        ("time step", "1/60 s"),
+    ),
+    theory=(
+        "Work shared among threads is the same work. A cap that nothing reaches caps nothing.",
+        "A run is unsettled where a solve left more than the threshold, and only there.",
+        "What falls freely is not at rest at the top. On a smooth slope it is slower than s for 2 s/(g sin α): with s below half "
+        "of g sin α times sleep_after it does not sleep.",
+    ),
+    reference="The same scene without the option, to the bit; statics.",
+    conclusion="Green: they may be turned freely. Red: one of them is part of the answer.",
+    source="ours",
+    lacks={"ladder": "exact at every step"},
+    measurements=(
+        ask(
+            _threads,
+            (
+                _none(
+                    "bits_of_threads",
+                    "numbers of places and velocities that differ from one thread's",
+                    "1",
+                    "the same sums in the same order",
+                ),
+            ),
+            "A heap falls together.",
+            TIME_STEP,
+            "threads",
+        ),
+        ask(
+            _asleep,
+            (
+                _none("awake", "boxes of the stack awake after 3 s", "1", "they lie still from the start"),
+                _none(
+                    "moved_asleep",
+                    "largest move of a box of the stack once asleep",
+                    "m",
+                    "who sleeps keeps every bit",
+                ),
+                error(
+                    "load_asleep",
+                    "relative error of the floor's load",
+                    "1",
+                    1e-9,
+                    "the weight, as it was last",
+                ),
+                _none(
+                    "held_in_flight",
+                    "largest change of a ball's path by sleeping",
+                    "m",
+                    "what nothing holds is not at rest, however slow it is at its top",
+                ),
+            ),
+            "A stack lies, a ball flies.",
+            TIME_STEP,
+            "sleeping",
+        ),
+        ask(
+            _reported,
+            (
+                _none(
+                    "misreported",
+                    "runs called unsettled that are not, or not that are, of six thresholds",
+                    "1",
+                    "unsettled is who left more than the threshold",
+                ),
+            ),
+            "A heap with too few sweeps.",
+            TIME_STEP,
+            "thresholds",
+        ),
+        ask(
+            _capped,
+            (
+                _none(
+                    "bits_of_the_cap",
+                    "numbers that differ from the default's",
+                    "1",
+                    "nothing reaches the cap",
+                ),
+            ),
+            "A pendulum, curved twice.",
+            TIME_STEP,
+            "caps",
+        ),
+        ask(
+            _floored,
+            (
+                error(
+                    "split_of_floors",
+                    "largest error of a hinge's force or torque, of the largest, four floors",
+                    "1",
+                    1e-8,
+                    "the split of least norm; a floor is in the factor only, and refinement is against the true equations",
+                ),
+            ),
+            "A door on hinges that repeat each other.",
+            TIME_STEP,
+            "floors",
+        ),
+    ),
+    example=lambda: Example(scene=heap(), time_step=TIME_STEP),
+    figures=(Figure(name="sleep", title="A heap falls asleep", draw=_draw),),
+    stability=(
+        StabilityStudy(
+            name="laziest",
+            title="Largest sleep speed with which a ball is not put to sleep where it turns back on a slope",
+            configuration="sleeping",
+            definition="thrown up a smooth slope of 30° at twice that speed, it comes down again",
+            study=laziest,
+            unit="m/s",
+            expected=(0.5 * PULL * (AFTER - 2.0 * FINE), 0.5 * PULL * (AFTER + 2.0 * FINE)),
+            expected_source="2 s/(g sin α) = sleep_after, counted in steps of 1/240 s, two at most more or less",
+        ),
+    ),
+)
