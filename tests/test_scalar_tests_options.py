@@ -24,11 +24,6 @@ def taking(change: Callable[[Method], Method], longer: float = 0.0) -> Simulate:
     return cast(Simulate, engine)
 
 
-def quiet(scene: Any, **options: Any) -> Any:
-    """Calls every run completed."""
-    return replace(simulate(scene, **options), status="completed")
-
-
 def eager(scene: Any, **options: Any) -> Any:
     """Calls every run unsettled."""
     return replace(simulate(scene, **options), status="unsettled")
@@ -39,7 +34,7 @@ def eager(scene: Any, **options: Any) -> Any:
     [
         ("threads", taking(lambda method: replace(method, threads=1), 1e-15)),
         ("sleeping", taking(lambda method: replace(method, sleep_speed=0.0))),
-        ("thresholds", quiet),
+        ("thresholds", taking(lambda method: replace(method, unsettled_residual=1e9))),
         ("thresholds", eager),
         ("caps", taking(lambda m: replace(m, correction_cap=1e-4) if m.correction_cap < 0.3 else m)),
         ("floors", taking(lambda m: replace(m, floor=1e-5) if m.floor > 1e-9 else m)),
@@ -58,3 +53,17 @@ def test_every_guard_users_rely_on_is_asked() -> None:
 
     assert {"threads", "sleep_speed", "unsettled_residual", "correction_cap", "floor"} <= asked
     assert asked - {"time step"} <= set(Method.__dataclass_fields__)
+
+
+def test_no_run_of_a_measurement_is_unsettled() -> None:
+    """The tracker takes a value from such a run for no value."""
+    seen = []
+
+    def engine(scene: Any, **options: Any) -> Any:
+        seen.append(simulate(scene, **options))
+        return seen[-1]
+
+    for asked in TEST.measurements:
+        asked.measure(cast(Simulate, engine))
+
+    assert {result.status for result in seen} == {"completed"}
