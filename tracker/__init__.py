@@ -5,7 +5,7 @@ Everything the command line does can be done from here; each name is imported wh
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.library import (
@@ -35,12 +35,13 @@ __all__ = [
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from spook_tracker.tracker import library
 
-    return getattr(library, name)
+    found: object = getattr(library, name)
+    return found
 
 
 def __dir__() -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.measure.disappeared import LAST, Listed, with_missing
@@ -16,6 +16,10 @@ from spook_tracker.tracker.measure.short_form import is_short, is_whole, whole
 from spook_tracker.tracker.store.border import MAX_BYTES
 from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.transfer import record_all
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.store.database import Session
+    from spook_tracker.tracker.store.versions import RunInfo
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,12 +63,12 @@ def read(
     )
 
 
-def record(session: Any, found: Read) -> tuple[int, int]:
+def record(session: Session, found: Read) -> tuple[int, int]:
     """Store them; how many are new, and how many were there before."""
     stored = History(session)
 
     def before(run: RunDocument) -> list[RunDocument]:
-        earlier: list[Any] = [
+        earlier: list[RunInfo] = [
             other
             for other in stored.runs(run.engine.name)
             if other.machine.fingerprint == run.machine.fingerprint and other.started < run.started

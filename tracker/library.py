@@ -29,6 +29,8 @@ if TYPE_CHECKING:
     from spook_tracker.tracker.measure.limits import Limits
     from spook_tracker.tracker.measure.run import Progress, Questions, Request, Trigger
     from spook_tracker.tracker.measure.timing import Repeats
+    from spook_tracker.tracker.store.database import Session
+    from spook_tracker.tracker.store.versions import RunInfo
     from spook_tracker.tracker.website.plotly_figures import Figure
     from spook_tracker.tracker.website.publish import Report
 
@@ -142,7 +144,7 @@ def record(document: RunDocument, database: str) -> bool:
 FORK_POINT = "fork-point"
 
 
-def fork_point(history: StoredHistory, after: str) -> Any:
+def fork_point(history: StoredHistory, after: str) -> RunInfo:
     """The run that a version's branch is to be compared with: the nearest measured commit it builds on."""
     from spook_tracker.tracker.document.errors import UnknownName
     from spook_tracker.tracker.judge.lane import forked_from
@@ -155,7 +157,7 @@ def fork_point(history: StoredHistory, after: str) -> Any:
     return found
 
 
-def _earlier(history: StoredHistory, before: str, after: str) -> Any:
+def _earlier(history: StoredHistory, before: str, after: str) -> RunInfo:
     """The run that `before` stands for beside `after`."""
     from spook_tracker.tracker.judge.lane import line_of
 
@@ -311,7 +313,7 @@ def publish(
 
 
 def judged_again(
-    session: Any, document: RunDocument, accepted: Sequence[Accepted] = (), **asked: Unpack[RunOptions]
+    session: Session, document: RunDocument, accepted: Sequence[Accepted] = (), **asked: Unpack[RunOptions]
 ) -> tuple[RunDocument, list[Finding]]:
     """What became of a run just recorded; what seems slower is timed once more at once, stored, and judged again.
 

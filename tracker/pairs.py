@@ -11,7 +11,7 @@ import random
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -43,6 +43,12 @@ from spook_tracker.tracker.judge.pairs import (
 from spook_tracker.tracker.judge.verdict import badness, same_bits
 from spook_tracker.tracker.judge.work import is_read_off, with_work
 from spook_tracker.tracker.measure.commits import CommitError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from spook_tracker.tracker.document.run_document import Run
+    from spook_tracker.tracker.judge.lane import Records
 
 Ask = Callable[[Sequence[str]], RunDocument]  # puts these tests, all if none are named, to a fresh process
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
@@ -187,7 +193,7 @@ def _by_old_questions(
     return told, []
 
 
-def _tests(of_test: Mapping[str, str], keys: Any) -> tuple[str, ...]:
+def _tests(of_test: Mapping[str, str], keys: Iterable[str]) -> tuple[str, ...]:
     return tuple(sorted({of_test[key] for key in keys}))
 
 
@@ -254,7 +260,7 @@ def _repeated(key: str, first: Samples, again: Sequence[Samples]) -> bool:
 
 
 def usual_spreads(
-    history: Any, nights: Sequence[Any], rungs: Mapping[str, Sequence[str]]
+    history: Records, nights: Sequence[Run], rungs: Mapping[str, Sequence[str]]
 ) -> dict[str, float]:
     """What is usual between nights, of run times made of these series; those of too few nights are left out."""
     measured = history.samples_of(

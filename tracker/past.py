@@ -12,7 +12,7 @@ import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import msgspec
 
@@ -27,6 +27,10 @@ from spook_tracker.tracker.judge.tonight import Finding
 from spook_tracker.tracker.judge.verdict import NEW_DEFINITION
 from spook_tracker.tracker.judge.work import FAMILIES, with_work
 from spook_tracker.tracker.measure.commits import CommitError, full_hash
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.run_document import Run
+    from spook_tracker.tracker.judge.lane import Records
 
 FIRST_BAD = re.compile(r"^([0-9a-f]{40,64}) is the first bad commit", re.MULTILINE)
 Measure = Callable[[str], RunDocument]
@@ -98,8 +102,8 @@ class OldAnswers:
 
 
 def by_old_questions(
-    history: Any,
-    run: Any,
+    history: Records,
+    run: Run,
     findings: Sequence[Finding],
     ask: Callable[..., RunDocument],
     choice: Choice | None = None,
@@ -136,8 +140,8 @@ def by_old_questions(
 
 
 def _by_questions_of(
-    old: Any,
-    run: Any,
+    old: Run,
+    run: Run,
     stored: dict[str, tuple[SeriesDefinition, Sample]],
     tests: tuple[str, ...],
     ask: Callable[..., RunDocument],

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.cli.options import complain
 from spook_tracker.tracker.measure.bounds import MEMORY, TIME_LIMIT
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.judge.accepted import Accepted
+    from spook_tracker.tracker.judge.comparison_document import CompareDocument
+    from spook_tracker.tracker.measure.builds import TeamRepository
 
 PROCESS = "process"  # the executor by default
 NIGHTS = 30  # of a machine, from which what is usual is taken
@@ -15,9 +20,14 @@ NEAREST = 10  # ancestors of a base that does not build which are tried instead 
 
 
 def beside_its_base(
-    team: Any, base: str, database: str, accepted: Sequence[Any], options: Sequence[str], folder: Path
-) -> Any:
-    """What changed from the base to the commit that is checked out (a CompareDocument). Raises TrackerError."""
+    team: TeamRepository,
+    base: str,
+    database: str,
+    accepted: Sequence[Accepted],
+    options: Sequence[str],
+    folder: Path,
+) -> CompareDocument:
+    """What changed from the base to the commit that is checked out. Raises TrackerError."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.document.errors import TrackerError
     from spook_tracker.tracker.measure.commits import full_hash
@@ -57,7 +67,7 @@ def _usual(database: str, machine: str, rungs: Mapping[str, Sequence[str]]) -> M
         return {}
 
 
-def _base_of(team: Any, base: str, head: str, database: str) -> str:
+def _base_of(team: TeamRepository, base: str, head: str, database: str) -> str:
     """A revision, or a name that the history knows; fork-point is where git says that it leaves the main line."""
     from spook_tracker.tracker.cli.history import history_of
     from spook_tracker.tracker.library import FORK_POINT
@@ -79,7 +89,9 @@ def _base_of(team: Any, base: str, head: str, database: str) -> str:
             return full_hash(team.repository, history.resolve(base).engine.git_hash)
 
 
-def _built_or_before(team: Any, start: str, folder: Path, say: Callable[[str], None]) -> tuple[str, Path]:
+def _built_or_before(
+    team: TeamRepository, start: str, folder: Path, say: Callable[[str], None]
+) -> tuple[str, Path]:
     """The base, built; where it cannot be, the nearest of its first ancestors that can."""
     from spook_tracker.tracker.document.errors import TrackerError
     from spook_tracker.tracker.measure.commits import CommitError
@@ -104,7 +116,6 @@ def run_options(
     time_limit: float = TIME_LIMIT,
     executor: str = PROCESS,
     named: Mapping[str, str] | None = None,
-    **_: Any,
 ) -> list[str]:
     """Those of `tracker run` that a commit is asked with; older commits need not know what nobody asked for."""
     options = ["--workers", str(workers)]

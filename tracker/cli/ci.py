@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import click
 
@@ -33,6 +33,28 @@ from spook_tracker.tracker.cli.options import (
 )
 from spook_tracker.tracker.cli.past import KEPT
 from spook_tracker.tracker.cli.settings import present
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.judge.comparison_document import CompareDocument
+
+
+class Asked(TypedDict):
+    """Options that both jobs share with `tracker run`, as click hands them over."""
+
+    executor: str
+    workers: int
+    memory: int  # MB
+    time_limit: float  # s
+    engine: str
+    limit: float | None  # s
+    catalogue: str
+
+
+class AskedOfNight(Asked):
+    """Those of a night."""
+
+    quick: bool
+
 
 HISTORY = click.option(
     "--history",
@@ -68,7 +90,7 @@ def ci() -> None:
 @click.pass_context
 def night(
     context: click.Context, /, history: Path, out: Path, site: str, accepted: Path | None, database: str,
-    **asked: Any,
+    **asked: Unpack[AskedOfNight],
 ) -> None:  # fmt: skip
     """`tracker nightly` between the history that was kept and the history to keep."""
     from spook_tracker.tracker.cli.console import say
@@ -142,7 +164,7 @@ def night(
 @click.pass_context
 def change(
     context: click.Context, /, history: Path, base: str, build: str, quick: bool, folder: Path,
-    comment_file: Path | None, accepted: Path | None, database: str, **asked: Any,
+    comment_file: Path | None, accepted: Path | None, database: str, **asked: Unpack[Asked],
 ) -> None:  # fmt: skip
     """Measure a proposed change beside its base, both built here; nothing of it is kept.
 
@@ -161,10 +183,20 @@ def change(
     known = _bring_in(history, database)
     if team := team_repository(present().folder or Path.cwd(), present().build, build):
         said = {name: asked[name] for name in ("engine", "catalogue") if _on_command_line(context, name)}
-        options = [*([] if quick else ["--sweep"]), *run_options(**{**asked, "named": said})]
+        options = [
+            *([] if quick else ["--sweep"]),
+            *run_options(
+                asked["workers"],
+                asked["limit"],
+                asked["memory"],
+                asked["time_limit"],
+                asked["executor"],
+                said,
+            ),
+        ]
         document = beside_its_base(team, base, database, accepted_levels(accepted), options, folder.resolve())
         return _compared(context, document, comment_file)
-    same: dict[str, Any] = {"tests": (), "json_file": None, "junit_file": None}
+    same: dict[str, object] = {"tests": (), "json_file": None, "junit_file": None}
     same |= dict.fromkeys(("sweep", "stability", "figures", "no_record", "everything"), False)
     code = _code_of(context, run_command, database=database, **same, **asked)
     if not known:
@@ -179,7 +211,7 @@ def _on_command_line(context: click.Context, name: str) -> bool:
     return context.get_parameter_source(name) is click.core.ParameterSource.COMMANDLINE
 
 
-def _compared(context: click.Context, document: Any, comment_file: Path | None) -> None:
+def _compared(context: click.Context, document: CompareDocument, comment_file: Path | None) -> None:
     """Say what a comparison came to, wherever it is read, and end with its exit code."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.report_comment import comment, workflow_commands
@@ -222,7 +254,7 @@ def _bring_in(folder: Path, database: str) -> int:
     return stored + present
 
 
-def _code_of(context: click.Context, command: click.Command, **arguments: Any) -> int:
+def _code_of(context: click.Context, command: click.Command, **arguments: object) -> int:
     """Its exit code; what is neither green nor red ends this command, too."""
     try:
         context.invoke(command, **arguments)

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import click
 
-Command = TypeVar("Command", bound=Callable[..., Any])
+Command = TypeVar("Command", bound=Callable[..., None])
 KINDS = ("scalar", "ladder", "order", "time", "break_point", "work", "map", "run_time")
 ROLES = ("gate", "companion", "reported", "explaining")
 

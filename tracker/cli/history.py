@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -32,9 +32,20 @@ from spook_tracker.tracker.cli.options import (
 )
 from spook_tracker.tracker.cli.settings import present
 
+if TYPE_CHECKING:
+    from spook_tracker.scalar_tests.case import ScalarTest
+    from spook_tracker.tracker.document.run_document import RunDocument
+    from spook_tracker.tracker.judge.accepted import Accepted
+    from spook_tracker.tracker.judge.choice import Choice
+    from spook_tracker.tracker.judge.comparison_document import CompareDocument
+    from spook_tracker.tracker.judge.tonight import Finding
+    from spook_tracker.tracker.past import OldAnswers
+    from spook_tracker.tracker.store.history import History
+    from spook_tracker.tracker.store.versions import RunInfo
+
 
 @contextmanager
-def history_of(database: str) -> Iterator[Any]:
+def history_of(database: str) -> Iterator[History]:
     """The history in a database, for reading; what is dated ahead is said."""
     from spook_tracker.tracker.store.history import History
 
@@ -44,7 +55,7 @@ def history_of(database: str) -> Iterator[Any]:
         yield history
 
 
-def accepted_levels(file: Path | None = None) -> Any:
+def accepted_levels(file: Path | None = None) -> Sequence[Accepted]:
     """Entries of accepted.toml in the folder one works in."""
     from spook_tracker.tracker.judge.accepted import read_accepted
 
@@ -145,7 +156,7 @@ def compare(
     _exit_as(document, fail_on)
 
 
-def _are_engines(history: Any, names: tuple[str, str]) -> bool:
+def _are_engines(history: History, names: tuple[str, str]) -> bool:
     """Whether both are engines by name: recorded ones, or known ones that no run is called by."""
     from spook_tracker.tracker.document.errors import UnknownName
 
@@ -164,8 +175,8 @@ def _are_engines(history: Any, names: tuple[str, str]) -> bool:
     return set(others) <= set(known())
 
 
-def _exit_as(document: Any, fail_on: str) -> None:
-    code = document.exit_code
+def _exit_as(document: CompareDocument, fail_on: str) -> None:
+    code: int = document.exit_code
     if fail_on == "never" and code == RED:
         code = 0
     if fail_on == "change" and code == 0 and document.verdict != "identical":
@@ -239,7 +250,9 @@ def judge_command(
         click.get_current_context().exit(UNUSABLE)
 
 
-def _by_old_questions(history: Any, run: Any, findings: Any, choice: Any) -> Any:
+def _by_old_questions(
+    history: History, run: RunInfo, findings: Sequence[Finding], choice: Choice
+) -> list[OldAnswers]:
     """Answers of this engine to the questions of earlier commits, in the repository where one stands."""
     import spook_tracker.tracker.past as past
     from spook_tracker.tracker.cli.past import KEPT
@@ -248,7 +261,7 @@ def _by_old_questions(history: Any, run: Any, findings: Any, choice: Any) -> Any
     repository = repository_at(Path.cwd())
     kept = Path(KEPT).resolve()
 
-    def ask(commit: str, tests: tuple[str, ...], *options: str) -> Any:
+    def ask(commit: str, tests: tuple[str, ...], *options: str) -> RunDocument:
         return ask_today(checked_out(repository, commit, kept), tests, *options)
 
     return past.by_old_questions(history, run, findings, ask, choice)
@@ -374,7 +387,7 @@ def list_tests(
         say(catalogue_table(found))
 
 
-def _kinds_of(test: Any) -> set[str]:
+def _kinds_of(test: ScalarTest) -> set[str]:
     """The kinds of series that a test gives where all of it is asked."""
     has = {"scalar": test.measurements, "ladder": test.ladders, "break_point": test.stability}
     kinds = {kind for kind, parts in has.items() if parts}

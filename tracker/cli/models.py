@@ -3,11 +3,17 @@
 from __future__ import annotations
 
 from collections import Counter
-from typing import Any
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
 from spook_tracker.tracker.cli.options import example
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.measure.model_packages import Looked
+    from spook_tracker.tracker.measure.model_standing import Checkpoint, Standing
 
 WORDS = {"model": "·", "runs": "✓", "part": "-", "refused": "✗", "fails": "✗"}
 
@@ -41,7 +47,7 @@ def models_command(
                 say(line)
         return
     engine = engines[0] if engines else None
-    found: list[Any] = []
+    found: list[Looked] = []
     if agree and engine is None:
         raise click.UsageError("--agree compares an engine with MuJoCo; say which with --engine")
     for looked in loaded(paths, engine, workers, agree) if engine else map(looked_at, paths):
@@ -66,7 +72,7 @@ def models_command(
         )
 
 
-def _swing(looked: Any) -> str:
+def _swing(looked: Looked) -> str:
     """How far it swings from where it does in MuJoCo, of its size, and what both engines' own steps leave."""
     if (found := looked.agreement) is None:
         return ""
@@ -74,7 +80,7 @@ def _swing(looked: Any) -> str:
     return f"{sign} {found.apart:7.1e} (steps {found.own:.0e}, {found.reference:.0e}) "
 
 
-def _standing_lines(name: str, found: Any) -> list[str]:
+def _standing_lines(name: str, found: Standing | str) -> list[str]:
     """One model: a line for each time, with the groups of engines and how far they are apart."""
     if isinstance(found, str):
         return [f"{name}: {found}"]
@@ -86,13 +92,13 @@ def _standing_lines(name: str, found: Any) -> list[str]:
     return lines + [f"  {engine}: {why}" for engine, why in found.refused.items()]
 
 
-def _group(point: Any, group: tuple[str, ...], first: tuple[str, ...]) -> str:
+def _group(point: Checkpoint, group: tuple[str, ...], first: tuple[str, ...]) -> str:
     """mujoco = spook; and of another group how far [m] it is from the first, and that in its step errors."""
     names = " = ".join(f"{engine} ±{point.error[engine]:.1e}" for engine in group)
     if group == first:
         return names
     far, errors = min(
-        (point.distance.get((a, b), point.distance.get((b, a))), point.error[a] + point.error[b])
+        (point.distance[(a, b) if (a, b) in point.distance else (b, a)], point.error[a] + point.error[b])
         for a in group
         for b in first
     )
@@ -103,9 +109,8 @@ def _group(point: Any, group: tuple[str, ...], first: tuple[str, ...]) -> str:
     )
 
 
-def _common(paths: Any) -> Any:
+def _common(paths: Sequence[Path]) -> Path:
     """The folder that holds them all."""
     import os
-    from pathlib import Path
 
     return Path(os.path.commonpath([path.parent for path in paths]))

@@ -25,7 +25,8 @@ from spook_tracker.tracker.measure.bounds import MEMORY, TIME_LIMIT
 if TYPE_CHECKING:
     from spook_tracker.tracker.website.options import SiteOptions
 
-Command = TypeVar("Command", bound=Callable[..., Any])
+Command = TypeVar("Command", bound=Callable[..., None])
+Value = TypeVar("Value")
 
 SQLITE = b"SQLite format 3\0"  # a file that holds a history begins so
 DEFAULT_DATABASE = "sqlite:///tracker.db"
@@ -49,10 +50,12 @@ def database_option(command: Command) -> Command:
 SITE = "what the website is told"
 
 
-def _kept(check: Callable[[Any], None] = lambda value: None) -> Callable[..., None]:
+def _kept(
+    check: Callable[[Value], None] = lambda value: None,
+) -> Callable[[click.Context, click.Parameter, Value], None]:
     """A callback that looks at an option of the website before anything is measured; `site_options` has it then."""
 
-    def keep(context: click.Context, option: click.Parameter, value: Any) -> None:
+    def keep(context: click.Context, option: click.Parameter, value: Value) -> None:
         check(value)
         context.meta.setdefault(SITE, {})[option.name] = value
 
@@ -242,8 +245,8 @@ def documents_option(command: Command) -> Command:
 class Seconds(click.FloatRange):
     """Of a range: what is not a number is in none."""
 
-    def convert(self, value: Any, option: click.Parameter | None, context: click.Context | None) -> Any:
-        found = super().convert(value, option, context)
+    def convert(self, value: float, option: click.Parameter | None, context: click.Context | None) -> float:
+        found: float = super().convert(value, option, context)
         if found != found:
             self.fail(f"{value} is no number of seconds", option, context)
         return found

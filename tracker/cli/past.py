@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from spook_tracker.tracker.cli.filters import kind_options
 from spook_tracker.tracker.cli.options import RED, accepted_option, database_option, example
 from spook_tracker.tracker.cli.settings import present
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.run_document import RunDocument
 
 KEPT = ".tracker-commits"
 
@@ -124,7 +127,7 @@ def backfill_commits(
 
 def _commits(
     folder: Path, tests: Sequence[str], say: Callable[[str], None]
-) -> tuple[Path, Callable[..., Any]]:
+) -> tuple[Path, Callable[..., RunDocument]]:
     """The repository one stands in, and a function that builds and asks a commit and says whose questions it answered.
 
     CommitError where no tracker.toml says how a commit is built.
@@ -138,7 +141,7 @@ def _commits(
             f"nothing in {Path.cwd()} or above says how a commit is built; say it in tracker.toml: [build] with a command"
         )
 
-    def measure(commit: str, *options: str) -> Any:
+    def measure(commit: str, *options: str) -> RunDocument:
         document, whose = team.measure(commit, folder, tests, *options)
         say(f"{commit[:12]} answers {whose}: {subject(team.repository, commit)}")
         return document

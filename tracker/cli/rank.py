@@ -4,12 +4,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from spook_tracker.tracker.cli.filters import test_option
 from spook_tracker.tracker.cli.options import database_option, example
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.run_document import EngineVersion, Sample, SeriesDefinition
+    from spook_tracker.tracker.judge.rank import Lead, Standing
+    from spook_tracker.tracker.judge.work import Samples
+    from spook_tracker.tracker.store.history import History
+    from spook_tracker.tracker.store.versions import RunInfo
 
 
 @click.command(epilog=example("tracker run --engine spook,mujoco --sweep", "tracker rank"))
@@ -34,7 +41,7 @@ def rank(engines: tuple[str, ...], tests: tuple[str, ...], database: str) -> Non
         say("\n".join(table_lines(history, names, tests)))
 
 
-def table_lines(history: Any, names: Sequence[str], tests: Sequence[str] = ()) -> list[str]:
+def table_lines(history: History, names: Sequence[str], tests: Sequence[str] = ()) -> list[str]:
     """The table, of these tests alone if some are named, and between two engines who is ahead where."""
     from fnmatch import fnmatchcase
 
@@ -79,9 +86,9 @@ def table_lines(history: Any, names: Sequence[str], tests: Sequence[str] = ()) -
     return lines
 
 
-def _newest(history: Any, latest: Any) -> dict[str, Any]:
+def _newest(history: History, latest: RunInfo) -> Samples:
     """The ladders of a run, and of tests it was not asked those of the newest run before that was."""
-    found: dict[str, Any] = {}
+    found: dict[str, tuple[SeriesDefinition, Sample]] = {}
     earlier = [
         run
         for run in history.runs(latest.engine.name)
@@ -98,18 +105,17 @@ def _newest(history: Any, latest: Any) -> dict[str, Any]:
     return found
 
 
-def _titles(engines: Sequence[Any]) -> list[str]:
+def _titles(engines: Sequence[EngineVersion]) -> list[str]:
     """Names, with versions where one name stands for two engines."""
     names = [engine.name for engine in engines]
     alone = len(set(names)) == len(names)
     return names if alone else [f"{engine.name} {engine.version}" for engine in engines]
 
 
-def _error(one: Any) -> str:
+def _error(one: Standing) -> str:
     if one.error is not None:
         return f"{one.error:.2g} ({one.configuration})"
-    words: str = one.outcome.replace("_", " ")
-    return words
+    return one.outcome.replace("_", " ")
 
 
 def _time(seconds: float | None) -> str:
@@ -118,7 +124,7 @@ def _time(seconds: float | None) -> str:
     return f"{seconds:.2g} s" if seconds >= 0.1 else f"{1e3 * seconds:.2g} ms"
 
 
-def _ahead(leads: Sequence[Any], errors: Sequence[float]) -> list[str]:
+def _ahead(leads: Sequence[Lead], errors: Sequence[float]) -> list[str]:
     """Scenes down, errors across: who gets there first, and by what factor."""
     from spook_tracker.tracker.cli.console import Column, table, width
 

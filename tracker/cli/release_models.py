@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.judge.release_notes import Step, by_test, told
 
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.run_document import TestCard
 
-def model_page(engine: str, cards: Iterable[Any], steps: Sequence[Step]) -> list[str]:
+
+def model_page(engine: str, cards: Iterable[TestCard], steps: Sequence[Step]) -> list[str]:
     """A table of all models, and below it in words what changed. `cards` are those of the newest run."""
     files = {card.name: dict(card.parameters).get("file", "") for card in cards}
     models = sorted({test for step in steps for test in step.alike})
@@ -69,5 +72,5 @@ def without_models(steps: Sequence[Step]) -> list[Step]:
 
 def only_models(names: Iterable[str], steps: Sequence[Step]) -> bool:
     """Whether nothing but models was asked."""
-    models: Mapping[str, Any] = {test: None for step in steps for test in step.alike}
+    models = {test for step in steps for test in step.alike}
     return all(name in models for name in names)

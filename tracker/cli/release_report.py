@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import textwrap
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.cli.release_models import model_page, only_models, without_models
 from spook_tracker.tracker.judge.comparison_document import Change
@@ -29,8 +29,12 @@ from spook_tracker.tracker.judge.release_order import (
     told_of,
 )
 
+if TYPE_CHECKING:
+    from spook_tracker.tracker.store.history import History
+    from spook_tracker.tracker.store.versions import RunInfo
 
-def steps_between(history: Any, engine: str) -> tuple[list[Any], list[Step]]:
+
+def steps_between(history: History, engine: str) -> tuple[list[RunInfo], list[Step]]:
     """The newest run of each measured release, oldest first, and what changed from each to the next."""
     from spook_tracker.tracker.library import compare
 
@@ -95,7 +99,7 @@ def _unchanged(step: Step) -> list[str]:
 
 
 def page(
-    engine: str, history: Any, runs: Sequence[Any], steps: Sequence[Step], changelog: Changelog | None
+    engine: str, history: History, runs: Sequence[RunInfo], steps: Sequence[Step], changelog: Changelog | None
 ) -> str:
     """The same as a page in Markdown. Every number in it comes from the recorded runs."""
     models = model_page(engine, history.cards(runs[-1].id), steps)
@@ -141,7 +145,7 @@ def page(
     return "\n".join(lines).rstrip() + "\n"
 
 
-def _row(history: Any, run: Any, step: Step | None) -> str:
+def _row(history: History, run: RunInfo, step: Step | None) -> str:
     samples = [sample for _, sample in history.samples(run.id).values()]
     good = sum(sample.outcome in ("value", "unsettled", "out_of_limit") for sample in samples)
     changes = "" if step is None else str(len(step.changes))
@@ -220,8 +224,8 @@ def _words(change: Change) -> tuple[str, str]:
     return before, after
 
 
-def _word(value: Any, outcome: str | None, digits: int) -> str:
-    if outcome in ("value", "unsettled", "out_of_limit"):
+def _word(value: float | None, outcome: str | None, digits: int) -> str:
+    if value is not None and outcome in ("value", "unsettled", "out_of_limit"):
         return f"{float(value):.{digits}g}"
     return (outcome or "not asked").replace("_", " ")
 

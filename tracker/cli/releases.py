@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -18,6 +18,9 @@ from spook_tracker.tracker.cli.options import (
     model_option,
     workers_option,
 )
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.run_document import RunDocument
 
 KEPT = ".tracker-releases"
 MEGABYTE = 1e6
@@ -106,7 +109,7 @@ def backfill(
     folder = folder or Path(KEPT)
     chosen = releases.choose(releases.released(engine), versions, newest)
 
-    def measure(version: str) -> Any:
+    def measure(version: str) -> RunDocument:
         where = releases.install(engine, version, folder.resolve())
         return releases.measure_release(
             engine, where, tests, limit=limit, time_limit=time_limit, memory=memory, catalogue=catalogue,
@@ -135,7 +138,7 @@ def backfill(
 def progress(
     engine: str,
     chosen: Sequence[str],
-    measure: Callable[[str], Any],
+    measure: Callable[[str], RunDocument],
     database: str,
     ends: float | None,
     tests: Sequence[str] = (),

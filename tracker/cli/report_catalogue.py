@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -16,6 +16,10 @@ from spook_tracker.tracker.document.coverage import HEADINGS, Coverage, Rungs, c
 from spook_tracker.tracker.document.coverage import saved as told_saving
 from spook_tracker.tracker.measure.cards import explained
 from spook_tracker.tracker.measure.step_cost import LeavingOut, StepCost
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.measure.questions import Engine
+    from spook_tracker.tracker.store.history import History
 
 
 def catalogue_table(tests: Mapping[str, ScalarTest]) -> str:
@@ -33,12 +37,13 @@ def catalogue_table(tests: Mapping[str, ScalarTest]) -> str:
     return "\n".join([*table(columns, rows), "", footer])
 
 
-def coverage_rows(tests: Mapping[str, ScalarTest], history: Any) -> list[Coverage]:
+def coverage_rows(tests: Mapping[str, ScalarTest], history: History | None) -> list[Coverage]:
     """What each scene has, and by the newest run of `history` (None: there is none) how far it came."""
     runs = history.runs() if history is not None else ()
-    latest = runs[-1].id if runs else None
-    measured = rungs(history.samples(latest).values()) if latest else {}
-    saving = {card.name: card.saving for card in history.cards(latest)} if latest else {}
+    measured, saving = {}, {}
+    if history is not None and runs:
+        measured = rungs(history.samples(runs[-1].id).values())
+        saving = {card.name: card.saving for card in history.cards(runs[-1].id)}
     rows = []
     for name, test in tests.items():
         reached = measured.get(name, {})
@@ -134,7 +139,7 @@ def _taken(stage: str, within: str, costs: Mapping[str, float]) -> str:
 def stage_table(
     name: str,
     test: ScalarTest,
-    engine: Any,
+    engine: Engine,
     costs: StepCost | None = None,
     out: LeavingOut | None = None,
 ) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
@@ -19,6 +19,10 @@ from spook_tracker.tracker.judge.judged import Judged
 from spook_tracker.tracker.judge.tonight import Finding, not_compared
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import OVERALL, QUIET, WORDS, besides, spaced
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.json_form import Writable
+    from spook_tracker.tracker.past import OldAnswers
 
 COLOUR = {"✗": "red", "?": "yellow", "!": "yellow", "✓": "green"}
 MOST_ROWS = 40  # of a Markdown table: a comment on a pull request has its limits
@@ -250,14 +254,14 @@ def finding_lines(findings: Sequence[Finding], site: str = "") -> list[str]:
     ]
 
 
-def old_answer_lines(old: Any) -> list[str]:
+def old_answer_lines(old: OldAnswers) -> list[str]:
     """What became of tests by their old definition (tracker.past.OldAnswers), and what could not be told."""
     tests = ", ".join(map(clean, old.tests))
     asked = f"{tests} as asked at {old.commit[:12] or 'no commit'}"
     if old.why_not:
         return [f"? {asked}: cannot be told; {clean(old.why_not)}"]
     red, told = [change for change in old.changes if change.red], old.told
-    why: dict[str, list[Any]] = {}
+    why: dict[str, list[Change]] = {}
     for change in old.untold:
         why.setdefault(change.sentence, []).append(change)
     left = [
@@ -275,7 +279,7 @@ def old_answer_lines(old: Any) -> list[str]:
     ]
 
 
-def kinds_of(changes: Sequence[Any]) -> str:
+def kinds_of(changes: Sequence[Change]) -> str:
     """How many there are of each kind, in words."""
     return ", ".join(f"{count} {spaced(kind)}" for kind, count in Counter(c.kind for c in changes).items())
 
@@ -326,7 +330,7 @@ def _finding_line(finding: Finding, site: str) -> str:
     return clean("; ".join(parts))
 
 
-def accused(judged: Judged | None) -> dict[str, Any]:
+def accused(judged: Judged | None) -> dict[str, Writable]:
     """The commits that a red run time may have become worse with, and how probable its first bad commit is."""
     if judged is None or judged.accused is None:
         return {}
@@ -334,13 +338,13 @@ def accused(judged: Judged | None) -> dict[str, Any]:
     return {"accused": {"after": good, "up_to": bad, "probability": judged.probability}}
 
 
-def findings_json(findings: Sequence[Finding], then: Sequence[Any] = ()) -> str:
+def findings_json(findings: Sequence[Finding], then: Sequence[OldAnswers] = ()) -> str:
     """What tonight came to, the worst first, as JSON: a list with an object for each series.
 
     After them, of `then` (tracker.past.OldAnswers), one for each series by its old question; `asked_at` is whose.
     """
 
-    told: list[dict[str, Any]] = [
+    told: list[dict[str, Writable]] = [
         {
             "series": finding.series,
             "test": finding.test,

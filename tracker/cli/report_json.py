@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.tracker.cli.report_compare import accused
 from spook_tracker.tracker.document.coverage import HEADINGS, Coverage
-from spook_tracker.tracker.document.json_form import Number, readable
+from spook_tracker.tracker.document.json_form import Number, Writable, readable
 from spook_tracker.tracker.judge.judged import Judged
 from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.series_history import Told
 
 if TYPE_CHECKING:
+    from spook_tracker.tracker.measure.questions import Stage
     from spook_tracker.tracker.measure.step_cost import LeavingOut, StepCost
+    from spook_tracker.tracker.store.storage_counts import Statistics
 
 
 def trend_json(trends: Iterable[Told], maps: Iterable[ToldMap] = ()) -> str:
@@ -22,14 +24,14 @@ def trend_json(trends: Iterable[Told], maps: Iterable[ToldMap] = ()) -> str:
 
     Stability maps stand after them, with what became of them in place of nights.
     """
-    told: list[dict[str, Any]] = [
+    told: list[dict[str, Writable]] = [
         {"series": told.key, "definition": told.definition, "nights": [_night(j) for j in told.nights]}
         for told in trends
     ]
-    return readable(told + [_map(told) for told in maps])
+    return readable(told + list(map(_map, maps)))
 
 
-def _map(told: ToldMap) -> dict[str, Any]:
+def _map(told: ToldMap) -> dict[str, Writable]:
     red = told.verdict.red
     return {
         "series": told.key,
@@ -45,7 +47,7 @@ def _map(told: ToldMap) -> dict[str, Any]:
     }
 
 
-def _night(judged: Judged) -> dict[str, Any]:
+def _night(judged: Judged) -> dict[str, Writable]:
     run = judged.night.run
     return {
         "run": run.id,
@@ -85,7 +87,7 @@ def coverage_json(rows: Sequence[Coverage]) -> str:
     )
 
 
-def _test(name: str, test: ScalarTest) -> dict[str, Any]:
+def _test(name: str, test: ScalarTest) -> dict[str, Writable]:
     return {
         "test": name,
         "title": test.title,
@@ -112,7 +114,7 @@ def _test(name: str, test: ScalarTest) -> dict[str, Any]:
     }
 
 
-def _limit(limit: float | tuple[float, float] | None) -> Any:
+def _limit(limit: float | tuple[float, float] | None) -> Number | tuple[Number, ...] | None:
     if limit is None:
         return None
     return tuple(map(Number, limit)) if isinstance(limit, tuple) else Number(limit)
@@ -126,7 +128,7 @@ def show_json(name: str, test: ScalarTest) -> str:
 
 def explain_json(
     name: str,
-    choices: Iterable[Any],
+    choices: Iterable[Stage],
     costs: StepCost | None = None,
     out: LeavingOut | None = None,
 ) -> str:
@@ -136,7 +138,7 @@ def explain_json(
     `leaving_out`, where it was measured: how many times as long a step takes with all that could be forced in, and the
     least and the largest of its rounds.
     """
-    told = []
+    told: list[Writable] = []
     for choice in choices:
         measured = (costs.stages if costs else {}) if choice.kept else (out.saved if out else {})
         told.append(
@@ -148,12 +150,14 @@ def explain_json(
                 "within": getattr(choice, "within", ""),
             }
         )
-    whole = {"seconds_per_step": costs.whole, "beside_stages": costs.beside} if costs else {}
-    saving = {} if out is None else {"leaving_out": out.told()}
+    whole: dict[str, Writable] = (
+        {"seconds_per_step": costs.whole, "beside_stages": costs.beside} if costs else {}
+    )
+    saving: dict[str, Writable] = {} if out is None else {"leaving_out": out.told()}
     return readable({"test": name, "stages": told} | whole | saving)
 
 
-def stats_json(found: Any) -> str:
+def stats_json(found: Statistics) -> str:
     """How much is stored: bytes, rows by table, runs by engine."""
     told = {name: getattr(found, name) for name in ("database", "revision", "size", "rows", "engines")}
     ends = {

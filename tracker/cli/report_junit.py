@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import spook_tracker.tracker.document.outside as outside
@@ -15,6 +15,9 @@ from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
 from spook_tracker.tracker.judge.standing import FOLLOWED, is_red
 from spook_tracker.tracker.judge.tonight import Finding
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.past import OldAnswers
 
 ILLEGAL = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
@@ -49,7 +52,7 @@ def junit_of_run(run: RunDocument) -> str:
     return _document(cases)
 
 
-def junit_of_night(findings: Sequence[Finding], then: Sequence[Any] = ()) -> str:
+def junit_of_night(findings: Sequence[Finding], then: Sequence[OldAnswers] = ()) -> str:
     """Every series of a night as judged against its history.
 
     After them, of `then` (tracker.past.OldAnswers), those by old questions; what cannot be told is skipped.

@@ -26,13 +26,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from spook_tracker.tracker.document.errors import TrackerError
-from spook_tracker.tracker.document.toml_file import read_toml
+from spook_tracker.tracker.document.toml_file import Toml, read_toml
 from spook_tracker.tracker.measure.build_settings import TABLE, Build, build_of
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.measure.limits import Limit, Limits
 
 FILE = "tracker.toml"
 KINDS: Mapping[str, tuple[type, ...]] = {  # setting, which is the name of an option: what it may be
@@ -51,6 +54,8 @@ KINDS: Mapping[str, tuple[type, ...]] = {  # setting, which is the name of an op
     "limit": (int, float),
     "time_limit": (int, float),
 }
+Setting = str | int | float
+Defaults = dict[str, "Setting | Defaults"]  # by command, of each by option; a group's within
 WORDS = {str: "a text", int: "a whole number", float: "a number"}
 NOT_MEANT = {"backfill": {"engine", "catalogue", "out"}, "export": {"out"}, "rank": {"engine"}} | {
     name: {"engine"} for name in ("compare", "judge", "trend")
@@ -61,8 +66,8 @@ NOT_MEANT = {"backfill": {"engine", "catalogue", "out"}, "export": {"out"}, "ran
 class Settings:
     """What tracker.toml says; empty without one."""
 
-    values: Mapping[str, Any] = field(default_factory=dict)
-    limits: tuple[tuple[str, Any], ...] = ()
+    values: Mapping[str, Setting] = field(default_factory=dict)
+    limits: Limits = ()
     has_models: bool = False
     build: Build | None = None
     folder: Path | None = None  # of tracker.toml
@@ -72,9 +77,9 @@ class Settings:
         """The folder in which engine and catalogue are looked for beside the one where one stands; none if empty."""
         return str(self.folder or "")
 
-    def limits_of(self, engine: str) -> tuple[tuple[str, Any], ...]:
+    def limits_of(self, engine: str) -> Limits:
         """They are the team's own engine's; another one that is asked beside it is not held to them."""
-        return self.limits if engine == self.values.get("engine", "spook").split(",")[0] else ()
+        return self.limits if engine == str(self.values.get("engine", "spook")).split(",")[0] else ()
 
 
 class SettingsError(TrackerError):
@@ -93,17 +98,19 @@ def read(here: Path) -> Settings:
     if file is None:
         return Settings()
     try:
-        said = read_toml(file)
+        told = read_toml(file)
     except (OSError, ValueError) as error:
         raise SettingsError(f"{file} cannot be read: {error!s:.300}") from None
-    limits, models, build = said.pop("limits", {}), said.pop("model", []), said.pop(TABLE, None)
-    for name, value in said.items():
+    limits, models, build = told.pop("limits", {}), told.pop("model", []), told.pop(TABLE, None)
+    said: dict[str, Setting] = {}
+    for name, value in told.items():
         if name not in KINDS:
             raise SettingsError(
                 f"{file}: there is no setting {name!r}; it knows {', '.join(KINDS)}, limits, model, build"
             )
-        if type(value) not in KINDS[name] or value != value:
+        if not isinstance(value, str | int | float) or type(value) not in KINDS[name] or value != value:
             raise SettingsError(f"{file}: {name} must be {WORDS[KINDS[name][-1]]}, not {value!r}")
+        said[name] = value
     if models:
         own = str(file.relative_to(here) if file.is_relative_to(here) else file)
         said["catalogue"] = f"{said.get('catalogue', 'standard')},{own}"
@@ -116,9 +123,9 @@ def read(here: Path) -> Settings:
     )
 
 
-def defaults(group: click.Group, settings: Settings) -> dict[str, Any]:
+def defaults(group: click.Group, settings: Settings) -> Defaults:
     """The same as click wants it: for every command, its options' defaults."""
-    found: dict[str, Any] = {}
+    found: Defaults = {}
     for name, command in group.commands.items():
         if isinstance(command, click.Group):
             found[name] = defaults(command, settings)
@@ -136,15 +143,15 @@ def _file(here: Path) -> Path | None:
     return next((folder / FILE for folder in above[: root + 1] if (folder / FILE).is_file()), None)
 
 
-def _placed(said: dict[str, Any], folder: Path, here: Path) -> dict[str, Any]:
+def _placed(said: dict[str, Setting], folder: Path, here: Path) -> dict[str, Setting]:
     """Files beside tracker.toml, wherever in the repository one stands."""
     if folder == here:
         return said
     placed = dict(said)
     for name in ("accepted", "out"):
         if name in said:
-            placed[name] = str(folder / said[name])
-    url = said.get("database", "")
+            placed[name] = str(folder / str(said[name]))
+    url = str(said.get("database", ""))
     if url.startswith("sqlite:///") and not url.startswith("sqlite:////"):
         placed["database"] = f"sqlite:///{folder / url.removeprefix('sqlite:///')}"
     elif url and "://" not in url:
@@ -152,13 +159,16 @@ def _placed(said: dict[str, Any], folder: Path, here: Path) -> dict[str, Any]:
     return placed
 
 
-def _limits(file: Path, said: Any) -> tuple[tuple[str, Any], ...]:
+def _limits(file: Path, said: Toml) -> Limits:
     if not isinstance(said, dict):
         raise SettingsError(f"{file}: limits must be a table of series and limits")
-    found = []
+    found: list[tuple[str, Limit]] = []
     for series, limit in said.items():
-        numbers = limit if isinstance(limit, list) else [limit]
-        if not all(type(n) in (int, float) and n == n for n in numbers) or len(numbers) not in (1, 2):
+        told = limit if isinstance(limit, list) else [limit]
+        numbers = [
+            float(n) for n in told if isinstance(n, int | float) and not isinstance(n, bool) and n == n
+        ]
+        if len(numbers) != len(told) or len(numbers) not in (1, 2):
             raise SettingsError(f"{file}: the limit of {series!r} must be a number or two, not {limit!r}")
-        found.append((series, tuple(map(float, limit)) if isinstance(limit, list) else float(limit)))
+        found.append((series, numbers[0] if len(numbers) == 1 else (numbers[0], numbers[1])))
     return tuple(found)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import click
 
 from spook_tracker.tracker.cli.filters import json_option
 from spook_tracker.tracker.cli.options import database_option, example
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.store.partition import Kind
 
 
 @click.command(epilog=example("tracker export latest --out runs/"))
@@ -177,7 +180,7 @@ def copy(source: str, target: str) -> None:
 
 @db.command(epilog=example("tracker db partition postgresql | psql postgresql://host/tracker"))
 @click.argument("kind", type=click.Choice(["postgresql", "timescaledb", "citus"]))
-def partition(kind: Any) -> None:
+def partition(kind: Kind) -> None:
     """Print the SQL that splits the large tables of a PostgreSQL database by month, or over several servers."""
     from spook_tracker.tracker.store.partition import statements
 

@@ -7,6 +7,7 @@ the float it stands for.
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any, TypeVar
 
@@ -16,6 +17,11 @@ from spook_tracker.tracker.document.outside import escaped
 
 SPECIAL = ("nan", "inf", "-inf")  # how JSON says what is not finite
 Part = TypeVar("Part")
+# What can be written: parts of documents, and plain values with them inside.
+Writable = None | bool | int | float | str | msgspec.Struct | Sequence["Writable"] | Mapping[str, "Writable"]
+
+
+Json = None | bool | int | float | str | list["Json"] | dict[str, "Json"]  # as json.loads gives it
 
 
 class Number(float):
@@ -44,7 +50,7 @@ def boxed(number: float) -> float | str:
     return "nan" if math.isnan(number) else "inf" if number > 0 else "-inf"
 
 
-def encode(part: Any) -> bytes:
+def encode(part: Writable) -> bytes:
     """A part of a document as compact JSON; floats in the shortest form that reads back to the same bits."""
     return msgspec.json.encode(part, enc_hook=plain)
 
@@ -59,22 +65,23 @@ def _decoder(kind: Any) -> msgspec.json.Decoder[Any]:
     return msgspec.json.Decoder(kind, dec_hook=_read)
 
 
-def readable(document: Any) -> str:
+def readable(document: Writable) -> str:
     """The JSON that files and terminals get: a line for each part, nothing a reader cannot see."""
     return escaped(msgspec.json.format(encode(document), indent=1).decode())
 
 
-def convert(parts: Any, kind: type[Part]) -> Part:
+def convert(parts: Writable, kind: type[Part]) -> Part:
     """The same from dictionaries and lists. msgspec.ValidationError if it is no such part."""
     return msgspec.convert(parts, kind, dec_hook=_read)
 
 
-def builtins(part: Any) -> Any:
+def builtins(part: Writable) -> Writable:
     """A part as dictionaries, tuples, texts and numbers, numbers as JSON carries them."""
-    return msgspec.to_builtins(part, enc_hook=plain)
+    found: Writable = msgspec.to_builtins(part, enc_hook=plain)
+    return found
 
 
-def plain(thing: Any) -> Any:
+def plain(thing: object) -> object:
     """What msgspec does not know itself, for its `enc_hook`. TypeError if it has no place in a document."""
     if isinstance(thing, Number):
         return boxed(thing)
@@ -98,7 +105,7 @@ def _read(kind: type, told: Any) -> Any:
     raise TypeError(f'expected a number, "nan", "inf" or "-inf", got {str(told)[:40]!r}')
 
 
-def schema_hook(kind: type) -> dict[str, Any]:
+def schema_hook(kind: type) -> dict[str, Writable]:
     """What the published schema says of a `Number`."""
     if kind is Number:
         return {"anyOf": [{"type": "number"}, {"enum": sorted(SPECIAL)}]}

@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import msgspec
 
 from spook_tracker.tracker.document.json_form import schema_hook
 from spook_tracker.tracker.document.run_document import SCHEMA_VERSION, RunDocument
 
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.json_form import Writable
+
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 
 
-def document_schema() -> dict[str, Any]:
+def document_schema() -> dict[str, Writable]:
     """JSON Schema (draft 2020-12) of RunDocument. Beyond it, import asks for sense: see tracker/store/border.py."""
-    schema = msgspec.json.schema(RunDocument, schema_hook=schema_hook)
-    about = {
+    schema: dict[str, Writable] = msgspec.json.schema(RunDocument, schema_hook=schema_hook)
+    about: dict[str, Writable] = {
         "$schema": DIALECT,
         "$id": f"urn:spook-tracker:run-document:{SCHEMA_VERSION}",
         "title": "Run document",

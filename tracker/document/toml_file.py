@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import tomllib
+from datetime import date, datetime, time
 from pathlib import Path
-from typing import Any
 
+Toml = str | int | float | datetime | date | time | list["Toml"] | dict[str, "Toml"]  # bool is an int
 DEEPEST = 50  # tables in tables
 
 
-def read_toml(file: Path) -> dict[str, Any]:
+def read_toml(file: Path) -> dict[str, Toml]:
     """What a file holds. OSError, or ValueError of its text, its TOML, its depth and its numbers."""
     try:
-        said = tomllib.loads(file.read_text(encoding="utf-8"))
+        said: dict[str, Toml] = tomllib.loads(file.read_text(encoding="utf-8"))
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
-    waiting: list[tuple[Any, str, int]] = [(said, "", 0)]
+    waiting: list[tuple[Toml, str, int]] = [(said, "", 0)]
     while waiting:
         part, name, depth = waiting.pop()
         if depth > DEEPEST:

@@ -25,10 +25,9 @@ from dataclasses import dataclass
 from datetime import date, datetime
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
 
 from spook_tracker.tracker.document.errors import TrackerError
-from spook_tracker.tracker.document.toml_file import read_toml
+from spook_tracker.tracker.document.toml_file import Toml, read_toml
 
 KINDS = ("accepted", "expected")
 KNOWN = {"series", "range", "removed", "who", "why", "until"}
@@ -80,8 +79,8 @@ def read_accepted(file: Path) -> tuple[Accepted, ...]:
         raise AcceptedError(f"{file} cannot be read: {error.strerror}") from None
     except ValueError as error:
         raise AcceptedError(f"{file} is not valid TOML: {error!s:.300}") from None
-    kinds = [content.get(kind, []) for kind in KINDS]
-    if set(content) - set(KINDS) or not all(isinstance(entries, list) for entries in kinds):
+    kinds = [entries for kind in KINDS if isinstance(entries := content.get(kind, []), list)]
+    if set(content) - set(KINDS) or len(kinds) < len(KINDS):
         raise AcceptedError(f"{file} may hold [[accepted]] tables only, and [[expected]] ones")
     return tuple(
         _entry(f"{file}, {'entry' if kind == 'accepted' else 'expected entry'} {number}", entry, kind)
@@ -90,39 +89,39 @@ def read_accepted(file: Path) -> tuple[Accepted, ...]:
     )
 
 
-def _entry(place: str, entry: Any, kind: str) -> Accepted:
+def _entry(place: str, entry: Toml, kind: str) -> Accepted:
     if not isinstance(entry, dict):
         raise AcceptedError(f"{place}: write it as a [[{kind}]] table")
     known = KNOWN if kind == "accepted" else KNOWN - {"range", "removed"}
     for name in sorted(set(entry) - known):
         raise AcceptedError(f"{place}: {name!r} is not known; the names are {', '.join(sorted(known))}")
+    texts = {}
     for name in ("series", "who", "why"):
-        if not isinstance(entry.get(name), str) or not entry[name].strip():
+        text = entry.get(name)
+        if not isinstance(text, str) or not text.strip():
             raise AcceptedError(f"{place}: {name} must be a text; say {name}")
+        texts[name] = text
     removed = entry.get("removed", False)
     if not isinstance(removed, bool) or (removed and "range" in entry):
         raise AcceptedError(f"{place}: removed must be true, without a range")
     expected = kind == "expected"
-    band = entry.get("range", [math.inf, math.inf] if removed or expected else None)
-    if (
-        not isinstance(band, list)
-        or len(band) != 2
-        or not all(isinstance(end, int | float) and not isinstance(end, bool) for end in band)
-        or not band[0] <= band[1]
-    ):
+    said = entry.get("range", [math.inf, math.inf] if removed or expected else [])
+    parts = said if isinstance(said, list) else []
+    band = [float(end) for end in parts if isinstance(end, int | float) and not isinstance(end, bool)]
+    if len(band) != 2 or len(parts) != 2 or not band[0] <= band[1]:
         raise AcceptedError(f"{place}: range must be [low, high]")
     until = entry.get("until")
     if isinstance(until, datetime):
         until = until.date()
     if until is not None and not isinstance(until, date):
         raise AcceptedError(f"{place}: until must be a date like 2027-01-31, without quotes")
-    low, high = float(band[0]), float(band[1])
+    low, high = band
     return Accepted(
-        series=entry["series"],
+        series=texts["series"],
         low=low,
         high=high,
-        who=entry["who"],
-        why=entry["why"],
+        who=texts["who"],
+        why=texts["why"],
         until=until,
         removed=removed,
         expected=expected,

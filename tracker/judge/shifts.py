@@ -14,7 +14,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
 from spook_tracker.tracker.document.middle import median_of_sorted
 from spook_tracker.tracker.judge.normal_nights import MEMORY, chance, student
@@ -234,7 +234,7 @@ def permutation_probability(base: Values, last: Values) -> float:
     sums = [
         turn[power] for power in powers
     ]  # of the steps' powers, and by Newton's identities of their choices
-    chosen: list[Any] = [1.0]
+    chosen: list[float | npt.NDArray[np.complex128]] = [1.0]
     for count in range(1, span + 1):
         signed = (sums[i] * chosen[count - 1 - i] * (1.0 - 2.0 * (i % 2)) for i in range(count))
         chosen.append(sum(signed) / count)

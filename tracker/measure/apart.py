@@ -19,7 +19,7 @@ import threading
 import traceback
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
-from typing import Any
+from typing import IO, TextIO
 
 import msgspec
 
@@ -69,6 +69,7 @@ class Refused(msgspec.Struct, tag=True):
 
 
 News = Step | Done | Refused
+Order = tuple[str, Questions, Request, tuple[bytes | list[str], ...]]
 
 
 def run(source: Questions, request: Request, watch: Watch = lambda progress: None) -> RunDocument:
@@ -115,7 +116,7 @@ def _passes(definition: SeriesDefinition, sample: Sample) -> bool:
 
 
 def _asked(
-    what: str, source: Questions, request: Request, more: tuple[Any, ...], watch: Watch
+    what: str, source: Questions, request: Request, more: tuple[bytes | list[str], ...], watch: Watch
 ) -> RunDocument:
     """Have another process do it."""
     interrupted = False
@@ -210,7 +211,7 @@ class _Ending(threading.Timer):
 
 
 @contextmanager
-def _started(order: tuple[Any, ...]) -> Iterator[subprocess.Popen[bytes]]:
+def _started(order: Order) -> Iterator[subprocess.Popen[bytes]]:
     """A process that has its order; at the end nothing of it is left, and none of our streams was ever its own."""
     flags = ["-S"] * sys.flags.no_site + ["-P"]
     command = [sys.executable, *flags, "-c", BEGIN, json.dumps(sys.path)]
@@ -219,6 +220,7 @@ def _started(order: tuple[Any, ...]) -> Iterator[subprocess.Popen[bytes]]:
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         start_new_session=os.name == "posix", env={**os.environ, left_behind.MARK: mark},
     )  # fmt: skip
+    assert process.stderr is not None
     relay = threading.Thread(target=_relay, args=(process.stderr, sys.stderr), daemon=True)
     relay.start()
     try:
@@ -232,7 +234,7 @@ def _started(order: tuple[Any, ...]) -> Iterator[subprocess.Popen[bytes]]:
         relay.join(1.0)  # what still holds the other end does not hold us
 
 
-def _relay(told: Any, to: Any) -> None:
+def _relay(told: IO[bytes], to: TextIO | None) -> None:
     """What engines print goes where complaints go, and no process but this one holds that open."""
     with suppress(OSError, ValueError), told:
         for line in iter(lambda: told.readline(1 << 16), b""):

@@ -12,9 +12,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.document.errors import TrackerError
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.toml_file import Toml
 
 FILE = "tracker.toml"
 TABLE = "build"
@@ -36,10 +39,13 @@ class Build:
     questions: tuple[str, ...] = ()  # paths beside tracker.toml
 
 
-def build_of(said: Any, file: Path) -> Build:
+def build_of(said: Toml, file: Path) -> Build:
     """What the table [build] says. TrackerError names the file and what is wrong with it."""
     if not isinstance(said, dict):
         raise TrackerError(f"{file}: {TABLE} must be a table with a command")
+    texts: dict[str, str] = {}
+    environment: dict[str, str] = {}
+    questions: list[str] = []
     for name, value in said.items():
         kind, words = KINDS.get(name, (None, ""))
         if kind is None:
@@ -47,7 +53,13 @@ def build_of(said: Any, file: Path) -> Build:
         parts = [*value.values()] if isinstance(value, dict) else value if isinstance(value, list) else []
         if type(value) is not kind or not all(isinstance(part, str) for part in parts):
             raise TrackerError(f"{file}: {name} of [{TABLE}] must be {words}, not {value!r}")
-    for path in said.get("questions", ()):
+        if isinstance(value, str):
+            texts[name] = value
+        elif isinstance(value, dict):
+            environment |= {key: str(part) for key, part in value.items()}
+        else:
+            questions += map(str, parts)
+    for path in questions:
         if Path(path).is_absolute() or ".." in Path(path).parts:
             raise TrackerError(f"{file}: questions of [{TABLE}] must lie beside it, unlike {path!r}")
-    return Build(**{**said, "questions": tuple(said.get("questions", ()))})
+    return Build(**texts, environment=environment, questions=tuple(questions))

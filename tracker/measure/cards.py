@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from spook_tracker.engine.errors import EngineError
 from spook_tracker.scalar_tests.case import ScalarTest
@@ -15,8 +15,11 @@ from spook_tracker.tracker.measure.question import ask, sentence
 from spook_tracker.tracker.measure.scene_drawing import drawing
 from spook_tracker.tracker.measure.step_cost import LeavingOut
 
+if TYPE_CHECKING:
+    from spook_tracker.tracker.measure.questions import Engine, Stage
 
-def test_card(name: str, test: ScalarTest, engine: Any, out: LeavingOut | None) -> TestCard:
+
+def test_card(name: str, test: ScalarTest, engine: Engine, out: LeavingOut | None) -> TestCard:
     """The test as it is worded now; `out` is what leaving stages out saves, if measured."""
     return TestCard(
         name=name,
@@ -39,7 +42,7 @@ def test_card(name: str, test: ScalarTest, engine: Any, out: LeavingOut | None) 
     )
 
 
-def stages(test: ScalarTest, engine: Any, saved: Mapping[str, float]) -> tuple[StageChoice, ...]:
+def stages(test: ScalarTest, engine: Engine, saved: Mapping[str, float]) -> tuple[StageChoice, ...]:
     """Stages kept and left out of the test's example scene; empty where the engine cannot say."""
     answer = ask(lambda: explained(test, engine))
     return tuple(
@@ -53,7 +56,7 @@ def stages(test: ScalarTest, engine: Any, saved: Mapping[str, float]) -> tuple[S
     )
 
 
-def explained(test: ScalarTest, engine: Any) -> Any:
+def explained(test: ScalarTest, engine: Engine) -> Sequence[Stage]:
     """The engine's choices for the test's example scene, stage by stage."""
     example = test.example()
     return engine.explain(
@@ -77,7 +80,7 @@ def scene_file(test: ScalarTest) -> str:
         raise TrackerError(f"{test.title}: {lack}") from None
 
 
-def engine_version(engine: Any) -> EngineVersion:
+def engine_version(engine: Engine) -> EngineVersion:
     """The engine's own account of what it was built from."""
     info = engine.build_info
     own = [*map(Path, getattr(engine, "__path__", ()))]  # an editable build lies in its repository

@@ -14,7 +14,6 @@ import importlib
 from collections.abc import Iterator, Mapping
 from importlib.metadata import entry_points
 from importlib.util import find_spec
-from typing import Any
 
 from spook_tracker.engine.find import look_beside, thrown
 from spook_tracker.scalar_tests.case import ScalarTest
@@ -78,19 +77,21 @@ def _one(name: str) -> Mapping[str, ScalarTest]:
         raise CatalogueError(f"there is no catalogue {name!r} ({error}); name one as module:NAME") from None
     except Exception as error:
         raise CatalogueError(f"catalogue {name!r} does not load: {thrown(error)}") from None
-    if not fit:
+    if not fit or not isinstance(found, Mapping):
         raise CatalogueError(f"{name!r} is no catalogue: a mapping from name to ScalarTest")
     catalogue: Mapping[str, ScalarTest] = found
     return catalogue
 
 
-def _loaded(name: str) -> Any:
+def _loaded(name: str) -> object:
     for point in () if ":" in name else entry_points(group=GROUP):
         if point.name == name:
-            return point.load()
+            found: object = point.load()
+            return found
     module, _, attribute = name.partition(":")
     if not all(module.split(".")) or "\0" in module:
         raise ImportError(f"{module!r} is no name of a module")
     if not module.startswith("spook_tracker."):
         look_beside()
-    return getattr(importlib.import_module(module), attribute or "CATALOGUE")
+    named: object = getattr(importlib.import_module(module), attribute or "CATALOGUE")
+    return named

@@ -21,7 +21,10 @@ import sys
 import threading
 import types
 from collections.abc import Callable, Mapping, Set
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 OWN_PACKAGES = ("scalar_tests",)
 INSTALLED = "spook_tracker."
@@ -55,7 +58,7 @@ WORDING = {
 }
 
 
-def definition_hash(measure: Callable[..., Any], facts: object) -> str:
+def definition_hash(measure: Callable[..., object], facts: object) -> str:
     """Twelve hexadecimal digits over the function, all it reaches and the facts."""
     described = _describe(facts, _Seen(home=""))
     try:
@@ -66,7 +69,7 @@ def definition_hash(measure: Callable[..., Any], facts: object) -> str:
 
 
 @functools.lru_cache(maxsize=4096)
-def _digest(measure: Callable[..., Any]) -> str:
+def _digest(measure: Callable[..., object]) -> str:
     """Of a function and all it reaches; a measurement's metrics share it."""
     asked = measure.args[0] if isinstance(measure, functools.partial) and measure.args else measure
     seen = _Seen(home=_package(getattr(asked, "__module__", "") or ""))
@@ -92,6 +95,9 @@ class _Seen:
         return _package(module) in (self.home, *OWN_PACKAGES)
 
 
+Described = None | bool | int | str | bytes | complex | tuple["Described", ...]
+
+
 def _package(module: str) -> str:
     return _inside(module).partition(".")[0]
 
@@ -101,7 +107,7 @@ def _inside(module: str) -> str:
     return module.removeprefix(INSTALLED)
 
 
-def _describe(thing: Any, seen: _Seen) -> Any:
+def _describe(thing: object, seen: _Seen) -> Described:
     """Nested tuples that stand for a value; floats by their bits."""
     if isinstance(thing, float):
         return ("f", struct.pack("<d", thing).hex())
@@ -136,14 +142,14 @@ def _describe(thing: Any, seen: _Seen) -> Any:
         ]
         fields = tuple((name, _describe(getattr(thing, name), seen)) for name in named)
         return (type(thing).__qualname__, _describe(type(thing), seen), fields)
-    if hasattr(thing, "tobytes") and hasattr(thing, "shape"):
+    if hasattr(thing, "tobytes") and hasattr(thing, "shape") and hasattr(thing, "dtype"):
         return ("array", str(thing.dtype), tuple(thing.shape), thing.tobytes().hex())
     if hasattr(thing, "__wrapped__"):
         return ("wrapped", _describe(thing.__wrapped__, seen))
     return (type(thing).__qualname__, getattr(thing, "__name__", ""))
 
 
-def _chosen(thing: Any) -> list[dataclasses.Field[Any]]:
+def _chosen(thing: DataclassInstance | type[DataclassInstance]) -> list[dataclasses.Field[object]]:
     """Fields a test set itself: an option the engine gains later, or a default it changes, is the engine's."""
     return [
         f
@@ -157,7 +163,7 @@ def _is_wording(kind: type, field: str) -> bool:
     return _inside(kind.__module__) == "scalar_tests.case" and field in WORDING
 
 
-def _describe_class(kind: type, seen: _Seen) -> Any:
+def _describe_class(kind: type, seen: _Seen) -> Described:
     if not seen.owns(kind.__module__):
         return ("class", _inside(kind.__module__), kind.__qualname__)
     tree = _module_tree(kind.__module__)
@@ -167,12 +173,16 @@ def _describe_class(kind: type, seen: _Seen) -> Any:
     return ("class", kind.__qualname__)
 
 
-def _describe_function(function: types.FunctionType, seen: _Seen) -> Any:
+def _describe_function(function: types.FunctionType, seen: _Seen) -> Described:
     if not seen.owns(function.__module__ or ""):
         return ("function", _inside(function.__module__ or ""), function.__qualname__)
     code = function.__code__
     nodes = _nodes_of(function)
-    body: Any = tuple(_canonical(node) for node in nodes) or ("bytecode", code.co_code.hex(), _plain(code))
+    body: Described = tuple(_canonical(node) for node in nodes) or (
+        "bytecode",
+        code.co_code.hex(),
+        _plain(code),
+    )
     captured = tuple(_describe(_cell(cell), seen) for cell in function.__closure__ or ())
     defaults = _describe((function.__defaults__, function.__kwdefaults__), seen)
     reached = []
@@ -188,7 +198,7 @@ def _describe_function(function: types.FunctionType, seen: _Seen) -> Any:
     return ("function", body, captured, defaults, tuple(reached))
 
 
-def _cell(cell: types.CellType) -> Any:
+def _cell(cell: types.CellType) -> object:
     try:
         return cell.cell_contents
     except ValueError:
@@ -204,7 +214,7 @@ def _names(code: types.CodeType) -> set[str]:
     return names
 
 
-def _plain(code: types.CodeType) -> tuple[Any, ...]:
+def _plain(code: types.CodeType) -> tuple[Described, ...]:
     return tuple(_plain(c) if isinstance(c, types.CodeType) else repr(c) for c in code.co_consts)
 
 
@@ -240,7 +250,7 @@ def _nodes_of(function: types.FunctionType) -> list[ast.AST]:
 SKIPPED_FIELDS = {"type_comment", "type_params", "kind", "ctx", "returns", "annotation"}
 
 
-def _canonical(node: Any) -> Any:
+def _canonical(node: object) -> Described:
     """The tree without positions, docstrings and annotations; the same on every version of Python."""
     if isinstance(node, list):
         return tuple(_canonical(item) for item in node)
@@ -248,7 +258,7 @@ def _canonical(node: Any) -> Any:
         return repr(node)
     if isinstance(node, ast.AnnAssign) and node.value is not None:
         return ("Assign", _canonical(node.target), _canonical(node.value))
-    parts: list[Any] = [type(node).__name__]
+    parts: list[Described] = [type(node).__name__]
     for name, value in ast.iter_fields(node):
         if name in SKIPPED_FIELDS or value is None or value == []:
             continue

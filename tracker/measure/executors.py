@@ -12,13 +12,13 @@ Run times are never taken there: they need a machine of which is known that it i
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import CancelledError, Executor, Future, as_completed
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import CancelledError, Future, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from spook_tracker.engine.find import look_beside
 from spook_tracker.tracker.document.errors import TrackerError
@@ -26,8 +26,13 @@ from spook_tracker.tracker.document.run_document import Machine
 from spook_tracker.tracker.measure.machine import machine
 from spook_tracker.tracker.measure.workers import Lost
 
+if TYPE_CHECKING:
+    from spook_tracker.tracker.measure.questions import Engine
+
 PROCESS = "process"
 DASK = "dask://"
+Piece = TypeVar("Piece")
+Answer = TypeVar("Answer")
 PATIENCE = 20  # s to find a scheduler
 
 
@@ -52,13 +57,21 @@ class Place:
         return self.engine, self.machine.float_environment
 
 
+class Submits(Protocol):
+    """What is asked of an executor while it works."""
+
+    def submit(self, function: Callable[..., Answer], *arguments: object) -> Future[Answer]:
+        """As concurrent.futures has it."""
+        ...
+
+
 def answers(
     name: str,
-    perform: Callable[[Any], Any],
-    pieces: Sequence[Any],
+    perform: Callable[[Piece], Answer],
+    pieces: Sequence[Piece],
     place: Callable[[], Place],
     told: Callable[[Machine], None] = lambda machine: None,
-) -> Iterator[tuple[Any, Any]]:
+) -> Iterator[tuple[Piece, Answer | Lost]]:
     """Every piece with what `perform` made of it, or Lost, as they come; what is left is cancelled at the end.
 
     `place` is called beside every piece, `told` with the machine of every answer. ExecutorError if a worker's place is
@@ -66,12 +79,13 @@ def answers(
     """
     here = place()
     with _executor(name) as executor:
-        waiting: dict[Future[Any], Any] = {
+        waiting: dict[Future[tuple[Answer, Place]], Piece] = {
             executor.submit(_placed, perform, place, piece): piece for piece in pieces
         }
         try:
             for future in _completed(waiting):
-                answer, there = _answer(future)
+                came = _answer(future)
+                answer, there = came
                 if there is not None:
                     if not there.like(here):
                         raise ExecutorError(
@@ -85,12 +99,14 @@ def answers(
                 future.cancel()
 
 
-def _placed(perform: Callable[[Any], Any], place: Callable[[], Place], piece: Any) -> tuple[Any, Place]:
+def _placed(
+    perform: Callable[[Piece], Answer], place: Callable[[], Place], piece: Piece
+) -> tuple[Answer, Place]:
     """A piece's answer and where it was found; runs in the worker."""
     return perform(piece), place()
 
 
-def _answer(future: Future[Any]) -> tuple[Any, Place | None]:
+def _answer(future: Future[tuple[Answer, Place]]) -> tuple[Answer | Lost, Place | None]:
     """What came of a piece. A worker that dies costs its piece; what `perform` raises is raised."""
     try:
         answer, there = future.result()
@@ -103,14 +119,14 @@ def _answer(future: Future[Any]) -> tuple[Any, Place | None]:
         raise
 
 
-def place_of(engine: Any) -> Place:
+def place_of(engine: Engine) -> Place:
     """Where this process computes, with this engine."""
     info = engine.build_info
     return Place(f"{info.name} {info.version} {info.git_hash[:10]}".strip(), machine())
 
 
 @contextmanager
-def _executor(name: str) -> Iterator[Executor]:
+def _executor(name: str) -> Iterator[Submits]:
     if name.startswith(DASK):
         with _dask(name) as executor:
             yield executor
@@ -132,7 +148,7 @@ def _executor(name: str) -> Iterator[Executor]:
 
 
 @contextmanager
-def _dask(address: str) -> Iterator[Any]:
+def _dask(address: str) -> Iterator[Submits]:
     try:
         distributed = import_module("distributed")
     except ImportError:
@@ -149,20 +165,32 @@ def _dask(address: str) -> Iterator[Any]:
         client.close()
 
 
+class DaskClient(Protocol):
+    """What is asked of Dask's client."""
+
+    def submit(self, function: Callable[..., Answer], *arguments: object, pure: bool) -> Future[Answer]:
+        """A task; equal ones are the same unless it is not pure."""
+        ...
+
+
 class _DaskExecutor:
     """`submit` of a Dask client: pure functions of pieces that may be equal, each asked for by itself."""
 
-    def __init__(self, client: Any) -> None:
+    def __init__(self, client: DaskClient) -> None:
         self._client = client
 
-    def submit(self, function: Any, *arguments: Any) -> Any:
+    def submit(self, function: Callable[..., Answer], *arguments: object) -> Future[Answer]:
         return self._client.submit(function, *arguments, pure=False)
 
 
-def _completed(waiting: dict[Any, Any]) -> Iterator[Any]:
+def _completed(
+    waiting: Mapping[Future[tuple[Answer, Place]], Piece],
+) -> Iterator[Future[tuple[Answer, Place]]]:
     """Futures as they are done; Dask has its own."""
     first = next(iter(waiting), None)
     if first is None or isinstance(first, Future):
         return as_completed(waiting)
-    found: Iterator[Any] = iter(import_module("distributed").as_completed(list(waiting)))
+    found: Iterator[Future[tuple[Answer, Place]]] = iter(
+        import_module("distributed").as_completed(list(waiting))
+    )
     return found

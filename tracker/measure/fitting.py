@@ -5,11 +5,9 @@ An engine may answer with a status that does not exist, with a count of four hun
 
 from __future__ import annotations
 
-from typing import Any
-
 import msgspec
 
-from spook_tracker.tracker.document.json_form import NAN, builtins, convert, decode, encode
+from spook_tracker.tracker.document.json_form import NAN, Writable, builtins, convert, decode, encode
 from spook_tracker.tracker.document.outside import clean_text
 from spook_tracker.tracker.document.run_document import FigureData, RunDocument, Sample
 
@@ -38,7 +36,7 @@ def _crashed(series: str, fault: str) -> Sample:
     )  # fmt: skip
 
 
-def unfit(part: Any) -> str:
+def unfit(part: msgspec.Struct) -> str:
     """Why a part of a document cannot be written and read again; empty if it can."""
     try:
         _refuse_long(decode(encode(part), type(part)))
@@ -49,7 +47,7 @@ def unfit(part: Any) -> str:
     return ""
 
 
-def _refuse_long(part: Any) -> None:
+def _refuse_long(part: msgspec.Struct) -> None:
     for count in getattr(part, "counters", {}).values():
         if abs(count) > LARGEST:
             raise ValueError(f"a whole number of {len(str(abs(count)))} digits; 64 bits hold 19")
@@ -63,9 +61,9 @@ def written(document: RunDocument) -> bytes:
         return encode(convert(_readable(builtins(document)), RunDocument))
 
 
-def _readable(part: Any) -> Any:
+def _readable(part: Writable) -> Writable:
     if isinstance(part, str):
         return clean_text(part)
     if isinstance(part, dict):
-        return {_readable(name): _readable(inner) for name, inner in part.items()}
+        return {clean_text(name): _readable(inner) for name, inner in part.items()}
     return [_readable(inner) for inner in part] if isinstance(part, list | tuple) else part

@@ -14,13 +14,12 @@ import subprocess
 import time
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 MARK = "TRACKER_SESSION"  # of the environment: which process it was that all this was started for
 ROUNDS = 20  # in which one that starts others while it is looked for is found, too
 
 
-def end(process: subprocess.Popen[Any], mark: str = "") -> None:
+def end(process: subprocess.Popen[bytes], mark: str = "") -> None:
     """End a process that was started in a session of its own and with this mark, and all of both; its pipes are closed."""
     if os.name != "posix":
         process.kill()
@@ -79,7 +78,7 @@ def _with_mark(mark: str) -> list[int]:
     return found
 
 
-def how_ended(process: subprocess.Popen[Any], seconds: float) -> str:
+def how_ended(process: subprocess.Popen[bytes], seconds: float) -> str:
     """How a process ended that is about to, in words; it is not taken away yet."""
     until = time.monotonic() + seconds
     while os.name == "posix" and time.monotonic() < until:

@@ -8,7 +8,6 @@ what is left between them is how they understand the file.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -61,7 +60,7 @@ def _resolved(model: ModelFile, engine: str, step: float) -> tuple[npt.NDArray[n
         before, last = after, changed
 
 
-def _ran(model: ModelFile, engine: str, step: float) -> tuple[Any, float]:
+def _ran(model: ModelFile, engine: str, step: float) -> tuple[npt.NDArray[np.float64], float]:
     asked = ModelRun(model=model, samples=(LASTS,), swing=SWING, seed=1, accurate=True)
     done = find(engine).simulate(asked, time_step=step, duration=LASTS)
     if not done.completed:
@@ -69,5 +68,5 @@ def _ran(model: ModelFile, engine: str, step: float) -> tuple[Any, float]:
     return np.asarray(done["position"])[-1], float(done["size"])
 
 
-def _apart(one: Any, other: Any) -> float:
+def _apart(one: npt.NDArray[np.float64], other: npt.NDArray[np.float64]) -> float:
     return float(np.linalg.norm(one - other, axis=-1).max())

@@ -28,7 +28,7 @@ import math
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Required, TypedDict, cast
 
 from spook_tracker.engine.model_file import Drive, ModelFile, Watched
 from spook_tracker.engine.model_reading import ModelError, Reading, read, shown
@@ -36,7 +36,7 @@ from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.scalar_tests.catalogue import QUESTIONS
 from spook_tracker.scalar_tests.model_file.question import test_of
 from spook_tracker.tracker.document.errors import TrackerError
-from spook_tracker.tracker.document.toml_file import read_toml
+from spook_tracker.tracker.document.toml_file import Toml, read_toml
 
 SUFFIXES = (".xml", ".mjcf", ".urdf", ".sdf", ".world")
 KINDS: Mapping[str, tuple[type, ...]] = {
@@ -78,13 +78,28 @@ def _of_toml(file: Path) -> dict[str, ScalarTest]:
     except (OSError, ValueError) as error:
         raise ModelFileError(f"{file} cannot be read: {error}") from None
     found: dict[str, ScalarTest] = {}
-    for place, table in enumerate(tables, start=1):
+    for place, table in enumerate(tables if isinstance(tables, list) else [tables], start=1):
         _added(found, table, file.parent, f"{file}, [[model]] {place}")
     return found
 
 
-def _added(found: dict[str, ScalarTest], said: Any, folder: Path, origin: str) -> dict[str, ScalarTest]:
-    _understood(said, origin)
+class ModelTable(TypedDict, total=False):
+    """A table [[model]] of tracker.toml, once it is understood."""
+
+    file: Required[str]
+    name: str
+    folder: str
+    duration: float  # s
+    tolerance: float
+    watch: list[Toml]
+    keyframe: str | int
+    control: str | dict[str, Toml]
+    push: float
+    seed: int
+
+
+def _added(found: dict[str, ScalarTest], table: Toml, folder: Path, origin: str) -> dict[str, ScalarTest]:
+    said = _understood(table, origin)
     name = _test_name(said.get("name") or Path(said["file"]).stem)
     if name in found:
         raise ModelFileError(f'{origin}: a model {name!r} is there already; give this one another name = "…"')
@@ -96,7 +111,7 @@ def _added(found: dict[str, ScalarTest], said: Any, folder: Path, origin: str) -
     return found
 
 
-def _understood(said: Any, origin: str) -> None:
+def _understood(said: Toml, origin: str) -> ModelTable:
     if not isinstance(said, dict) or not said.get("file"):
         raise ModelFileError(f'{origin} names no file; say file = "robot.xml"')
     for key, value in said.items():
@@ -104,13 +119,16 @@ def _understood(said: Any, origin: str) -> None:
             raise ModelFileError(f"{origin}: there is no setting {key!r}; a model knows {', '.join(KINDS)}")
         if not isinstance(value, KINDS[key]) or isinstance(value, bool):
             raise ModelFileError(f"{origin}: {key} cannot be {value!r}")
-    if said.get("seed", 0) < 0:
+    table = cast(ModelTable, said)  # each value is of a kind that its name may have
+    if table.get("seed", 0) < 0:
         raise ModelFileError(f"{origin}: seed must not be negative")
     for key, most in (("duration", LONGEST), ("tolerance", math.inf), ("push", math.inf)):
-        if key in said and not 0.0 < said[key] <= most:
+        given = said.get(key)
+        if isinstance(given, int | float) and not 0.0 < given <= most:
             raise ModelFileError(
                 f"{origin}: {key} must be positive{'' if most == math.inf else f' and {most:g} s at most'}"
             )
+    return table
 
 
 def _test_name(text: str) -> str:
@@ -119,7 +137,7 @@ def _test_name(text: str) -> str:
     return f"{name}_model" if name in QUESTIONS else name
 
 
-def _test(name: str, said: Mapping[str, Any], reading: Reading, folder: Path, origin: str) -> ScalarTest:
+def _test(name: str, said: ModelTable, reading: Reading, folder: Path, origin: str) -> ScalarTest:
     model = ModelFile(
         path=str(reading.path),
         format=reading.format,
@@ -146,12 +164,13 @@ def _test(name: str, said: Mapping[str, Any], reading: Reading, folder: Path, or
     )
 
 
-def _watched(names: Sequence[Any] | None, reading: Reading, origin: str) -> tuple[Watched, ...]:
+def _watched(names: Sequence[Toml] | None, reading: Reading, origin: str) -> tuple[Watched, ...]:
     if names is None:
         return reading.watched
-    if not names or not all(isinstance(name, str) and name for name in names) or len({*names}) < len(names):
+    texts = [name for name in names if isinstance(name, str) and name]
+    if not texts or len({*texts}) < len(names):
         raise ModelFileError(f"{origin}: watch must name bodies, each once")
-    return tuple(Watched(label=name.replace("/", "."), name=name) for name in names)
+    return tuple(Watched(label=name.replace("/", "."), name=name) for name in texts)
 
 
 def _keyframe(wanted: str | int, reading: Reading, origin: str) -> str:
@@ -165,15 +184,14 @@ def _keyframe(wanted: str | int, reading: Reading, origin: str) -> str:
     return str(wanted)
 
 
-def _drive(said: Any, folder: Path, origin: str) -> Drive:
-    if isinstance(said, dict):
-        if set(said) != {"amplitude", "frequency"} or not all(
-            isinstance(v, float | int) and math.isfinite(v) for v in said.values()
-        ):
+def _drive(said: str | Mapping[str, Toml], folder: Path, origin: str) -> Drive:
+    if isinstance(said, Mapping):
+        numbers = {k: float(v) for k, v in said.items() if isinstance(v, float | int) and math.isfinite(v)}
+        if set(said) != {"amplitude", "frequency"} or len(numbers) < 2:
             raise ModelFileError(f"{origin}: a sinusoid is {{ amplitude = 0.1, frequency = 2.0 }}, in Hz")
-        return Drive(kind="sinusoid", amplitude=float(said["amplitude"]), frequency=float(said["frequency"]))
-    if said in ("zero", "hold"):
-        return Drive(kind=said)
+        return Drive(kind="sinusoid", amplitude=numbers["amplitude"], frequency=numbers["frequency"])
+    if said == "zero" or said == "hold":
+        return Drive(kind="zero" if said == "zero" else "hold")
     if said.endswith(".csv"):
         return Drive(kind="table", rows=_table(folder / said, origin))
     module, _, name = said.partition(":")

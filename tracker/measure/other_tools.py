@@ -15,7 +15,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TypedDict
 
 import msgspec
 
@@ -24,6 +24,9 @@ from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import RunDocument, SeriesDefinition
 from spook_tracker.tracker.measure.short_form import ShortResult, ShortRun, document_of
 from spook_tracker.tracker.measure.units import Unit, unit_of
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.json_form import Json
 
 DATA_JS = b"window.BENCHMARK_DATA"
 DIRECTIONS: dict[str, Literal["smaller", "larger"]] = {
@@ -120,8 +123,15 @@ def _reader(said: Mapping[str, Any]) -> Callable[[Mapping[str, Any], Beside], It
     return None
 
 
+class Failure(TypedDict, total=False):
+    """What became of a result without a value."""
+
+    outcome: Literal["crashed", "not_finite"]
+    failure: str
+
+
 def _named(run: ShortRun, beside: Beside) -> ShortRun:
-    given: dict[str, Any] = {"engine": beside.engine} if beside.engine else {}
+    given: dict[str, str] = {"engine": beside.engine} if beside.engine else {}
     if beside.machine:
         given |= {"machine": beside.machine, "processor": beside.machine}
     return msgspec.structs.replace(run, **given)
@@ -309,13 +319,13 @@ def _bench(one: Mapping[str, Any], better: Literal["smaller", "larger"] | None) 
         return msgspec.structs.replace(failed, **_failed(one["value"]))
 
 
-def sampled(test: str, value: Any, unit: Unit) -> ShortResult:
+def sampled(test: str, value: float | str | None, unit: Unit) -> ShortResult:
     """One value in its unit; what is no value, or no time, is this result's outcome alone."""
     metric = "run_time" if unit.name == "s" and unit.better == "smaller" else "value"
     number = math.nan if value is None else float(value) * unit.scale
     if metric == "run_time":
         return _timed(test, [] if value is None else [number])
-    failure: dict[str, Any] = {} if math.isfinite(number) else _failed(value)
+    failure: Failure = {} if math.isfinite(number) else _failed(value)
     return ShortResult(
         test=test,
         metric=metric,
@@ -344,24 +354,24 @@ def _thinned(seconds: Sequence[float]) -> tuple[float, ...]:
     return tuple(ranked[i * (len(ranked) - 1) // (MOST_REPEATS - 1)] for i in range(MOST_REPEATS))
 
 
-def _failed(value: Any) -> dict[str, Any]:
+def _failed(value: Json) -> Failure:
     if value is None:
         return {"outcome": "crashed", "failure": "it failed: the file gives no value"}
     return {"outcome": "not_finite", "failure": f"the file says {value}"}
 
 
-def _lane(processor: Any, cores: Any) -> tuple[str, int]:
+def _lane(processor: Json, cores: Json) -> tuple[str, int]:
     """The machine by what decides run times, and its cores."""
     text = str(cores or "")
     count = int(text) if text.isdecimal() and len(text) < 7 else 1
     return f"{processor or 'processor ' + MIXED}, {count} cores", count
 
 
-def _words(*parts: Any, between: str = " ") -> str:
+def _words(*parts: Json, between: str = " ") -> str:
     return between.join(str(part) for part in parts if part)
 
 
-def _moment(milliseconds: Any) -> str:
+def _moment(milliseconds: float | str) -> str:
     return datetime.fromtimestamp(float(milliseconds) / 1e3, UTC).isoformat()
 
 

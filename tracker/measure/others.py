@@ -8,16 +8,23 @@ own questions are about its own method: there both kinds hold.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, TypeVar
 
 from spook_tracker.engine.method import PLAIN
 from spook_tracker.engine.protocol import Configuration
+from spook_tracker.engine.result import Result
 from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.case import Ladder, Measurement, Metric, ScalarTest
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+
+if TYPE_CHECKING:
+    pass
+
+
+Answer = TypeVar("Answer")
 
 
 def asked_of(
@@ -51,7 +58,9 @@ def asked_of(
     }
 
 
-def in_configuration(measure: Any, configuration: str, simulate: Any, *rest: Any) -> Any:
+def in_configuration(
+    measure: Callable[..., Answer], configuration: str, simulate: Callable[..., Result], *rest: object
+) -> Answer:
     """Call a test's function with `simulate` bound to a configuration of the engine."""
     return measure(partial(simulate, configuration=configuration), *rest)
 

@@ -12,7 +12,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -41,6 +41,9 @@ from spook_tracker.tracker.document.run_document import (
 )
 from spook_tracker.tracker.measure.definition import definition_hash
 
+if TYPE_CHECKING:
+    from spook_tracker.engine.scene import Scene
+
 DEFAULT_TIME_LIMIT = (
     300.0  # s per simulation, for tests that set none: a hanging engine must not stop a night
 )
@@ -58,7 +61,7 @@ class Witness:
     seconds: float = 0.0  # that the simulations took, while others may have been at work
     unsettled: Result | None = None  # the simulation whose solver left the most
 
-    def __call__(self, scene: Any, **options: Any) -> Result:
+    def __call__(self, scene: Scene, **options: Any) -> Result:
         if options.get("time_limit") is None:
             options["time_limit"] = self.time_limit
         result = self.simulate(scene, **options)
@@ -136,7 +139,9 @@ def sentence(text: str) -> str:
     return line if len(line) <= SENTENCE else line[: SENTENCE - 1] + "…"
 
 
-def series_key(test: str, configuration: str, name: str, time_step: float | None, parameters: Any) -> str:
+def series_key(
+    test: str, configuration: str, name: str, time_step: float | None, parameters: Mapping[str, float]
+) -> str:
     """Readable, unique within a run (checked there) and independent of order and wording."""
     parts = [test, configuration, name]
     parts += [f"{key}={value:g}" for key, value in sorted(parameters.items())]
@@ -223,7 +228,7 @@ def _sensitivity(given: Estimate) -> Sensitivity:
     )
 
 
-def _mapping(values: Any) -> Mapping[str, float]:
+def _mapping(values: object) -> Mapping[str, float]:
     if not isinstance(values, Mapping):
         raise TypeError(f"a measurement returns a mapping from metric to value, not {type(values).__name__}")
     return values

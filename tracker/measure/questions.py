@@ -3,20 +3,47 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 import spook_tracker.tracker.measure.catalogues as catalogues
 import spook_tracker.tracker.measure.limits as limits
 import spook_tracker.tracker.measure.others as others
+from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.find import EngineMissing, find, look_beside
 from spook_tracker.scalar_tests.case import ScalarTest, Simulate
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.measure.question import NoAnswer
 
+if TYPE_CHECKING:
+    from spook_tracker.engine.result import Result
+    from spook_tracker.engine.scene import Scene
+
 PEER_TIME_LIMIT = 10.0  # s per simulation of an engine that is only shown
+
+
+class Engine(Protocol):
+    """What is asked of the module or object that an engine is; `explain` is ours alone."""
+
+    @property
+    def build_info(self) -> BuildInfo: ...
+    @property
+    def simulate(self) -> Simulate: ...
+    @property
+    def explain(self) -> Callable[..., Sequence[Stage]]: ...
+
+
+class Stage(Protocol):
+    """A stage, kept or left out."""
+
+    @property
+    def stage(self) -> str: ...
+    @property
+    def kept(self) -> bool: ...
+    @property
+    def reason(self) -> str: ...
 
 
 class RunError(TrackerError):
@@ -50,25 +77,28 @@ class Questions:
         engine = self.module()
         configurations = getattr(engine, "configurations", ())
         if configurations:
-            found = others.asked_of(found, configurations, engine.gating, self.every_setting)
+            found = others.asked_of(
+                found, configurations, bool(getattr(engine, "gating", False)), self.every_setting
+            )
         return limits.held_to(found, self.limits) if self.limits else found
 
-    def __getstate__(self) -> dict[str, Any]:
+    def __getstate__(self) -> dict[str, object]:
         """Without what was found: another process finds it itself."""
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
-    def module(self) -> Any:
+    def module(self) -> Engine:
         """The engine: simulate, build_info, and its configurations if it is not ours."""
         look_beside(self.folder)
         try:
-            return find(self.engine)
+            found: Engine = find(self.engine)
+            return found
         except EngineMissing as error:
             raise EngineUnavailable(str(error)) from None
 
     def simulate(self) -> Simulate:
         module = self.module()
         try:
-            simulate: Simulate = module.simulate
+            simulate = module.simulate
         except AttributeError:
             raise RunError(f"engine {self.engine!r} has no function simulate; it is not an engine") from None
         limit = self.limit
@@ -85,7 +115,7 @@ class _Limited:
     def __init__(self, simulate: Simulate, limit: float | None, patience: float | None) -> None:
         self.simulate, self.limit, self.patience, self.spent = simulate, limit, patience, 0.0
 
-    def __call__(self, scene: Any, **options: Any) -> Any:
+    def __call__(self, scene: Scene, **options: Any) -> Result:
         if self.patience is not None and self.spent >= self.patience:
             raise NoAnswer("timed_out", f"not tried: the {self.patience:g} s for this question are over")
         if self.limit is not None:

@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from msgspec.structs import replace
 
@@ -29,6 +29,9 @@ from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.measure.other_tools import NOTHING, Beside, documents_of, sampled
 from spook_tracker.tracker.measure.short_form import ShortResult, ShortRun
 from spook_tracker.tracker.measure.units import Unit, unit_of
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.json_form import Json
 
 RUN = ("commit", "version", "started", "branch", "engine", "machine")
 NAMES = ("test", "metric", "value", "unit", "configuration", "parameter")
@@ -154,7 +157,7 @@ def _key(one: ShortResult) -> tuple[str, str, str]:
     return one.test, one.configuration, one.metric
 
 
-def _records(file: Path, content: bytes) -> Iterator[tuple[int, dict[str, Any]]]:
+def _records(file: Path, content: bytes) -> Iterator[tuple[int, dict[str, Json]]]:
     """Its records and the line of each."""
     try:
         text = content.decode("utf-8-sig")
@@ -175,7 +178,7 @@ def _records(file: Path, content: bytes) -> Iterator[tuple[int, dict[str, Any]]]
         raise DocumentError(f"{file} cannot be read as records: {error!s:.200}") from None
 
 
-def _json_lines(lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, Any]]:
+def _json_lines(lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, Json]]:
     for place, line in lines:
         if line.strip():
             try:
@@ -184,7 +187,7 @@ def _json_lines(lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, Any]]:
                 raise ValueError(f"line {place}: {error}") from None
 
 
-def _flat(one: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]:
+def _flat(one: Mapping[str, Json], before: str = "") -> Iterator[tuple[str, Json]]:
     for name, value in one.items():
         if isinstance(value, dict):
             yield from _flat(value, f"{before}{name}.")
@@ -192,7 +195,7 @@ def _flat(one: Mapping[str, Any], before: str = "") -> Iterator[tuple[str, Any]]
             yield before + name, value
 
 
-def _started(record: Mapping[str, Any], told: Sequence[tuple[str, Meaning]]) -> str:
+def _started(record: Mapping[str, Json], told: Sequence[tuple[str, Meaning]]) -> str:
     for name, value in record.items():
         if _meant(name, told).role == "started":
             return _moment(value)
@@ -202,7 +205,7 @@ def _started(record: Mapping[str, Any], told: Sequence[tuple[str, Meaning]]) -> 
 def _read(
     file: Path,
     place: int,
-    record: Mapping[str, Any],
+    record: Mapping[str, Json],
     told: Sequence[tuple[str, Meaning]],
     unknown: dict[str, None],
 ) -> tuple[dict[str, str], list[ShortResult]]:
@@ -210,7 +213,7 @@ def _read(
     about: dict[str, str] = {}
     named: dict[str, str] = {}
     parameters: list[str] = []
-    values: list[tuple[str, Any, Meaning]] = []
+    values: list[tuple[str, Json, Meaning]] = []
     for name, value in record.items():
         meaning = _meant(name, told)
         if meaning.role == "value":
@@ -243,6 +246,8 @@ def _read(
             unknown[metric or test] = None
             meaning = Meaning("", meaning.unit, explains=True)
         try:
+            if isinstance(value, list | dict):
+                raise TypeError("no number")
             one = sampled(test, value, meaning.unit)
         except (TypeError, ValueError):
             raise DocumentError(f"{file}:{place}: {name} is {value!r:.60} and no number") from None
@@ -269,7 +274,7 @@ def _meant(name: str, told: Sequence[tuple[str, Meaning]]) -> Meaning:
     return Meaning("", unit_of(f"{counted}/s" if counted else unit))
 
 
-def _is_value(value: Any) -> bool:
+def _is_value(value: Json) -> bool:
     """Numbers, and null for what failed; other texts are remarks."""
     if isinstance(value, str):
         try:
@@ -280,11 +285,13 @@ def _is_value(value: Any) -> bool:
     return value is None or (isinstance(value, int | float) and not isinstance(value, bool))
 
 
-def _moment(value: Any) -> str:
+def _moment(value: Json) -> str:
     """ISO 8601 as it is; seconds or milliseconds since 1970 as that."""
     try:
+        if not isinstance(value, str | int | float):
+            return str(value)
         seconds = float(value)
-    except (TypeError, ValueError):
+    except ValueError:
         return str(value)
     try:
         return datetime.fromtimestamp(seconds / 1e3 if seconds > MILLISECONDS else seconds, UTC).isoformat()

@@ -15,7 +15,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
-from typing import Any, Literal
+from typing import Literal, NoReturn
 
 import msgspec
 
@@ -62,6 +62,7 @@ from spook_tracker.tracker.measure.timing import Repeats
 
 Trigger = Literal["manual", "nightly", "import", "test"]
 Part = Measured | FigureData | MapData | Trajectory
+Parts = tuple[Part | ladders.ErrorPoints, ...]  # of a piece of work
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +146,7 @@ def run(source: Questions, request: Request, watch: Watch = lambda progress: Non
     watch(
         Progress(0, _total(tasks, tests, request), "", False)
     )  # all is imported: whoever waited for that knows
-    parts: dict[int, tuple[Any, ...]] = {}
+    parts: dict[int, Parts] = {}
     workers: Counter[Machine] = Counter()
     timed: Timed = ([], {})
     try:
@@ -164,11 +165,11 @@ def run(source: Questions, request: Request, watch: Watch = lambda progress: Non
     return _document(source, request, started, version, tests, tasks, parts, workers, timed)
 
 
-def _errors(tasks: Iterable[Task], parts: Mapping[int, tuple[Any, ...]]) -> Errors:
+def _errors(tasks: Iterable[Task], parts: Mapping[int, Parts]) -> Errors:
     return {
-        (task.test, task.index[0], task.index[1]): parts[task.position][0]
+        (task.test, task.index[0], task.index[1]): found
         for task in tasks
-        if task.kind == "ladder"
+        if task.kind == "ladder" and isinstance(found := parts[task.position][0], ladders.ErrorPoints)
     }
 
 
@@ -179,7 +180,7 @@ def _document(
     version: EngineVersion,
     tests: Mapping[str, ScalarTest],
     tasks: Iterable[Task],
-    parts: Mapping[int, tuple[Any, ...]],
+    parts: Mapping[int, Parts],
     workers: Mapping[Machine, int],
     timed: Timed,
 ) -> RunDocument:
@@ -260,7 +261,7 @@ def _tasks(tests: Mapping[str, ScalarTest], request: Request) -> Iterator[Task]:
             position += 1
 
 
-def perform(source: Questions, task: Task) -> tuple[Any, ...] | crew.Lost:
+def perform(source: Questions, task: Task) -> Parts | crew.Lost:
     """Do one piece of work in this process; whatever it throws costs this piece alone."""
     try:
         return _performed(source, task)
@@ -270,7 +271,7 @@ def perform(source: Questions, task: Task) -> tuple[Any, ...] | crew.Lost:
         return crew.Lost("crashed", sentence(f"the answer cannot be taken: {type(error).__name__}: {error}"))
 
 
-def _performed(source: Questions, task: Task) -> tuple[Any, ...]:
+def _performed(source: Questions, task: Task) -> Parts:
     test, simulate = source.tests()[task.test], source.simulate()
     first = task.index[0]
     if task.kind == "measure":
@@ -293,13 +294,13 @@ def _perform_all(
     request: Request,
     watch: Watch,
     workers: Counter[Machine],
-) -> Iterator[tuple[Task, tuple[Any, ...]]]:
+) -> Iterator[tuple[Task, Parts]]:
     """Pieces of work and what came of them, as they come; one that hangs or dies loses only its own answer.
 
     `workers` counts the answers of each machine of an executor.
     """
     left = {name: sum(task.test == name for task in tasks) for name in tests}
-    found: Iterator[tuple[Task, Any]] = ((task, perform(source, task)) for task in tasks)
+    found: Iterator[tuple[Task, Parts | crew.Lost]] = ((task, perform(source, task)) for task in tasks)
     if request.executor != executors.PROCESS:
         at_work = (
             partial(perform, source),
@@ -354,16 +355,16 @@ def timings(
     return run_times(source, tests, errors, request.repeats, limits if request.workers else None, timed)
 
 
-def _gone(lost: crew.Lost) -> Any:
+def _gone(lost: crew.Lost) -> Callable[..., NoReturn]:
     """What simulating comes to where the process is lost."""
 
-    def gone(*arguments: Any, **options: Any) -> Any:
+    def gone(*arguments: object, **options: object) -> NoReturn:
         raise NoAnswer(lost.outcome, lost.failure)
 
     return gone
 
 
-def _lost(task: Task, test: ScalarTest, lost: crew.Lost) -> tuple[Any, ...]:
+def _lost(task: Task, test: ScalarTest, lost: crew.Lost) -> Parts:
     """What is recorded for a piece of work without an answer."""
     gone = _gone(lost)
     first = task.index[0]

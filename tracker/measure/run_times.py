@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any, Literal
+from typing import Literal
 
 import spook_tracker.tracker.measure.workers as crew
 from spook_tracker.scalar_tests.case import ScalarTest
@@ -64,7 +64,9 @@ def run_times(
         known = {place: found for place, found in errors.items() if place[0] == name}
         pieces += [TimingPiece(name, "stages", {}, 0)] if stages_can_be_forced else []
         pieces += [TimingPiece(name, "ladders", known, repeats)]
-    answers: Iterator[tuple[TimingPiece, Any]] = ((piece, perform_timing(source, piece)) for piece in pieces)
+    answers: Iterator[tuple[TimingPiece, Timed | crew.Lost]] = (
+        (piece, perform_timing(source, piece)) for piece in pieces
+    )
     if limits is not None:
         most = max([1, *(len(test.ladders) for test in tests.values())])
         answers = crew.answers(

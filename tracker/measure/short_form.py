@@ -11,7 +11,7 @@ from __future__ import annotations
 import hashlib
 import math
 from datetime import UTC, datetime
-from typing import Any, Literal
+from typing import Literal, NoReturn
 
 import msgspec
 
@@ -162,7 +162,7 @@ def _pair(result: ShortResult, origin: str) -> tuple[SeriesDefinition, Sample]:
         better=result.better,
         limit=result.limit,
     )
-    facts: Any = (key, result.unit, result.better, result.limit)
+    facts: tuple[object, ...] = (key, result.unit, result.better, result.limit)
     facts += (result.definition,) if result.definition else ()
     series = SeriesDefinition(
         key=key,
@@ -196,5 +196,5 @@ def _pair(result: ShortResult, origin: str) -> tuple[SeriesDefinition, Sample]:
     return series, sample
 
 
-def _nothing(*arguments: Any, **options: Any) -> Any:
+def _nothing(*arguments: object, **options: object) -> NoReturn:
     raise AssertionError("what is imported is not simulated")

@@ -19,13 +19,14 @@ import numpy as np
 
 from spook_tracker.engine.method import STAGES_THAT_CAN_BE_FORCED
 from spook_tracker.engine.observe import Final, Observable, Position, Velocity
+from spook_tracker.engine.result import Result
 from spook_tracker.engine.run import Run
 from spook_tracker.scalar_tests.case import Better, Example, Measurement, Metric, ScalarTest, Simulate
 from spook_tracker.scalar_tests.step_limits import REAL_TIME, SAVES
 from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import Sample, Saving, SeriesDefinition
 from spook_tracker.tracker.measure.question import Outcome, Witness, ask, judged_sample, metric_series
-from spook_tracker.tracker.measure.timing import Timed, stage_seconds
+from spook_tracker.tracker.measure.timing import stage_seconds
 
 LIMIT = 60.0  # s of a run
 ROUNDS = 5
@@ -58,6 +59,9 @@ class LeavingOut:
             spread=(min(self.times), max(self.times)) if self.times else None,
             difference=Number(self.difference) if self.times else None,
         )
+
+
+OneRun = Callable[[Simulate], Result]
 
 
 def leaving_out(test: ScalarTest, simulate: Simulate) -> LeavingOut | None:
@@ -102,7 +106,7 @@ def _steps(example: Example, simulate: Simulate) -> int:
     return steps
 
 
-def _once(run: Timed, simulate: Simulate) -> float | None:
+def _once(run: OneRun, simulate: Simulate) -> float | None:
     """Seconds of the processor in the loop of one run, of the clock where the engine cannot tell; None if it failed."""
     result = ask(lambda: run(functools.partial(simulate, time_limit=LIMIT))).value
     if result is None or not result.completed:
@@ -165,7 +169,7 @@ def step_cost(test: ScalarTest, simulate: Simulate) -> StepCost | None:
 
 def example_run(
     example: Example, steps: int, stages: tuple[str, ...], observe: Mapping[str, Observable] | None = None
-) -> Timed:
+) -> OneRun:
     """The test's example scene with nothing else observed and some stages forced in."""
     method = replace(example.method, force_stages=stages)
     return lambda simulate: simulate(

@@ -13,7 +13,7 @@ import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from spook_tracker.engine.result import Result
 from spook_tracker.scalar_tests.case import Simulate
@@ -22,13 +22,16 @@ from spook_tracker.tracker.measure.calibration import calibrate
 from spook_tracker.tracker.measure.instructions import InstructionCounter, can_count
 from spook_tracker.tracker.measure.question import Outcome, ask, sentence
 
+if TYPE_CHECKING:
+    from spook_tracker.engine.scene import Scene
+
 RESOLVED = 2e-3  # s that one repeat should last, far above the clock's grain
 MOST_RUNS = 200  # in one repeat
 POINT_BUDGET = 0.2  # s for all repeats of one run: what takes longer is steadier, too
 FEWEST_REPEATS = 2
 STAGES_UP_TO = 0.2  # s: of longer runs the first counts as a repeat, so it has no clock of stages
 
-Timed = Callable[[Simulate], Any]
+Timed = Callable[["Stopwatch"], object]
 Prepare = Callable[..., Any]  # as `engine.prepare`: compiles, and what it gives runs again and again
 Taken = tuple[float, float | None]  # s of one run, and s of the processor where the engine can tell
 
@@ -56,7 +59,7 @@ class Stopwatch:
     prepare: Prepare | None = None  # where programs are to be kept
     programs: list[Callable[[], Result]] = field(default_factory=list)  # one for each simulation, in order
 
-    def __call__(self, scene: Any, **options: Any) -> Result:
+    def __call__(self, scene: Scene, **options: Any) -> Result:
         if self.prepare is not None:
             asked = {**options, **self.options}
             how = {name: asked.pop(name) for name in ("time_limit", "time_stages") if name in asked}
@@ -131,7 +134,7 @@ def _taken(run: Timed, watch: Stopwatch) -> Taken | Outcome:
 def _again(programs: Sequence[Callable[[], Result]]) -> Timed:
     """A run that only runs again what was compiled for it."""
 
-    def run(watch: Any) -> None:
+    def run(watch: Stopwatch) -> None:
         for program in programs:
             watch.take(program())
 

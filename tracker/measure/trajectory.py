@@ -10,7 +10,7 @@ import itertools
 import math
 import zlib
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
@@ -51,6 +51,7 @@ TIME_LIMIT = 20.0  # s of wall time; what is there until then is shown
 FINER = (16, 8, 4, 2)
 MOST_FINE_STEPS = 120_000
 CODES = 65_534  # 65535 is no value
+LinkKind = Literal["distance", "spring", "joint"]
 Array = npt.NDArray[np.float64]
 
 
@@ -171,7 +172,7 @@ def _run(
     )
 
 
-def _exact(example: Example, simulate: Simulate, seen: dict[str, Any], every: int) -> str:
+def _exact(example: Example, simulate: Simulate, seen: dict[str, Array], every: int) -> str:
     """Add the motion to compare with, and say what it is; an empty sentence if there is none."""
     count = len(seen["position"])
     if example.exact is not None:
@@ -193,7 +194,7 @@ def _exact(example: Example, simulate: Simulate, seen: dict[str, Any], every: in
     return f"a time step of h/{finer}"
 
 
-def _channels(seen: Mapping[str, Any], scene: Scene, bodies: int) -> list[Channel]:
+def _channels(seen: Mapping[str, Array], scene: Scene, bodies: int) -> list[Channel]:
     count = len(seen["position"])
 
     def of_bodies(key: str) -> Array:
@@ -292,7 +293,7 @@ def _links(scene: Scene) -> Sequence[TrackedLink]:
     bodies[WORLD] = -1
     found: list[TrackedLink] = []
 
-    def add(kind: Any, ends: Sequence[tuple[int, Vector]], row: int) -> None:
+    def add(kind: LinkKind, ends: Sequence[tuple[int, Vector]], row: int) -> None:
         (one, here), (other, there) = ends
         found.append(TrackedLink(kind=kind, bodies=(one, other), anchors=(here, there), row=row))
 

@@ -22,7 +22,7 @@ from multiprocessing import connection as waiting
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from pathlib import Path
-from typing import Any, Generic, Literal, TypeVar
+from typing import Generic, Literal, Protocol, TypeVar
 
 import spook_tracker.tracker.measure.left_behind as left_behind
 from spook_tracker.tracker.measure.bounds import MEMORY, TIME_LIMIT
@@ -33,6 +33,7 @@ DIED = "the engine's process died while answering"
 NOWHERE = -1  # in a piece of work that has no places, or at none of them
 
 Piece = TypeVar("Piece")
+Answer = TypeVar("Answer")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,15 +54,15 @@ class Lost:
 
 
 def answers(
-    perform: Callable[[Piece], Any], pieces: Sequence[Piece], workers: int, limits: Limits
-) -> Iterator[tuple[Piece, Any]]:
+    perform: Callable[[Piece], Answer], pieces: Sequence[Piece], workers: int, limits: Limits
+) -> Iterator[tuple[Piece, Answer | Lost]]:
     """Every piece with what `perform` made of it, or Lost, as they come. What `perform` raises is raised.
 
     `perform` and the pieces are sent to processes, so both must be picklable; `workers` is at least 1. One begins,
     the others join when the work has lasted a while: a question of milliseconds does not pay for two imports.
     """
     left = deque(pieces)
-    crew: list[_Worker[Piece]] = []
+    crew: list[_Worker[Piece, Answer]] = []
     since = math.inf  # when the first of them had read its program and began
     try:
         while left or crew:
@@ -94,12 +95,12 @@ def answers(
             worker.end()
 
 
-class _Worker(Generic[Piece]):
+class _Worker(Generic[Piece, Answer]):
     """The supervisor's end of one process."""
 
     piece: Piece
 
-    def __init__(self, perform: Callable[[Piece], Any], limits: Limits) -> None:
+    def __init__(self, perform: Callable[[Piece], Answer], limits: Limits) -> None:
         context = get_context("spawn")
         self.limits = limits
         self.pipe, theirs = context.Pipe()
@@ -119,7 +120,7 @@ class _Worker(Generic[Piece]):
         with suppress(OSError):  # it is dead already, which the next look will find
             self.pipe.send(piece)
 
-    def look(self) -> Any:
+    def look(self) -> Answer | Lost | None:
         """The answer, if there is one by now; Lost if there will be none; None while it is at work."""
         try:
             while self.pipe.poll():
@@ -131,7 +132,8 @@ class _Worker(Generic[Piece]):
                     raise content
                 else:
                     self.deadline = time.monotonic() + self.limits.seconds
-                    return content
+                    answer: Answer = content
+                    return answer
         except (EOFError, OSError):
             return Lost("crashed", DIED, self.place.value)
         if time.monotonic() < self.deadline:
@@ -148,7 +150,13 @@ class _Worker(Generic[Piece]):
         self.lifeline.close()
 
 
-_place: Any = None  # of this process, if it is a worker: memory its supervisor sees
+class Place(Protocol):
+    """A number in memory that a worker and its supervisor share."""
+
+    value: int
+
+
+_place: Place | None = None  # of this process, if it is a worker: memory its supervisor sees
 
 
 def at(place: int) -> None:
@@ -158,12 +166,12 @@ def at(place: int) -> None:
 
 
 def _serve(
-    perform: Callable[[Any], Any],
+    perform: Callable[[Piece], Answer],
     pipe: Connection,
     lifeline: Connection,
     memory: int,
     parent: int,
-    place: Any,
+    place: Place,
 ) -> None:
     """The life of a worker: a piece, its answer, the next piece."""
     global _place
@@ -180,7 +188,7 @@ def _serve(
             return
         pipe.send(("begun", None))
         try:
-            answer = ("answer", perform(piece))
+            answer: tuple[str, Answer | Lost | Exception] = ("answer", perform(piece))
         except MemoryError:
             answer = ("answer", Lost("crashed", "the piece of work ran out of memory", place.value))
         except Exception as error:

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Callable
 from functools import cache
 from operator import attrgetter
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 from msgspec import inspect
@@ -21,6 +21,9 @@ from spook_tracker.tracker.document.json_form import boxed, builtins, convert, d
 from spook_tracker.tracker.document.outside import clean_text
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store.rows import moment
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.json_form import Writable
 
 MAX_BYTES = 32 * 1024 * 1024  # of one document
 MAX_SAMPLES = 100_000  # of one document, and as many series
@@ -34,7 +37,7 @@ FITTING = (
 ESCAPE = re.compile(rb"\\(?:u([0-9a-fA-F]{4})|.)", re.DOTALL)  # one escape of a JSON text
 
 
-def _cleaned(part: Any, place: str) -> Any:
+def _cleaned(part: Writable, place: str) -> Writable:
     if isinstance(part, str):
         if len(part) > MAX_TEXT:
             raise DocumentError(f"{place}: a text of {len(part)} characters; at most {MAX_TEXT} are stored")
@@ -48,7 +51,7 @@ def _cleaned(part: Any, place: str) -> Any:
         return part
     if isinstance(part, dict):
         return {
-            _cleaned(name, f"{place}, a key"): _cleaned(inner, f"{place}.{name}")
+            str(_cleaned(name, f"{place}, a key")): _cleaned(inner, f"{place}.{name}")
             for name, inner in part.items()
         }
     if isinstance(part, (list, tuple)):
@@ -155,7 +158,7 @@ def _without_surrogates(data: bytes) -> bytes:
     return b"".join([*pieces, data[end:]])
 
 
-def _typed(parts: Any) -> RunDocument:
+def _typed(parts: Writable) -> RunDocument:
     try:
         return convert(parts, RunDocument)
     except msgspec.ValidationError as error:

@@ -13,7 +13,7 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 from urllib.parse import unquote
 
 from sqlalchemy import URL, Engine, create_engine, event, exc, make_url
@@ -22,6 +22,10 @@ from sqlalchemy.pool import NullPool
 
 from spook_tracker.tracker.document.errors import DatabaseError, DatabaseUnusable
 from spook_tracker.tracker.store.reader import LOCK_TIMEOUT, SAFE, address
+
+if TYPE_CHECKING:
+    from sqlalchemy import Connection
+    from sqlalchemy.engine import ExceptionContext
 
 DEFAULT = "sqlite:///tracker.db"
 ONE_WRITER = 5755  # number of the lock that who writes to PostgreSQL holds
@@ -122,7 +126,7 @@ def _sqlite(url: URL, readonly: bool) -> Engine:
     begin = "BEGIN" if readonly else "BEGIN IMMEDIATE"
 
     @event.listens_for(engine, "connect")
-    def prepare(connection: Any, _record: Any) -> None:
+    def prepare(connection: sqlite3.Connection, _record: object) -> None:
         connection.isolation_level = None  # the driver begins nothing itself: schema changes roll back, too
         pragmas = ["foreign_keys = ON", *SAFE]
         pragmas += ["query_only = ON"] if readonly else ["synchronous = FULL"]
@@ -132,13 +136,13 @@ def _sqlite(url: URL, readonly: bool) -> Engine:
             _patiently(connection, f"PRAGMA journal_mode = {journal}")
 
     @event.listens_for(engine, "begin")
-    def take_lock(connection: Any) -> None:
+    def take_lock(connection: Connection) -> None:
         connection.exec_driver_sql(begin)
 
     return engine
 
 
-def _patiently(connection: Any, statement: str) -> None:
+def _patiently(connection: sqlite3.Connection, statement: str) -> None:
     """What SQLite refuses at once while another process does it, too, however long it may wait for locks.
 
     Two that open a new file at the same moment both want to change its journal.
@@ -179,9 +183,11 @@ def is_file(url: URL) -> bool:
     return url.get_backend_name() == "sqlite" and url.database not in (None, "", ":memory:")
 
 
-def _said(context: Any) -> DatabaseError | None:
+def _said(context: ExceptionContext) -> DatabaseError | None:
     """Whatever the driver raises, anywhere, as one sentence; what concurrent writers cause is for `record`."""
     if isinstance(context.sqlalchemy_exception, exc.IntegrityError):
+        return None
+    if context.engine is None or not isinstance(context.original_exception, Exception):
         return None
     return said_of(shown(context.engine.url), context.original_exception)
 

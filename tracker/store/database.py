@@ -6,10 +6,9 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 from sqlalchemy import URL, Connection, Engine, inspect, text
-from sqlalchemy.orm import Session
+from sqlalchemy.orm import Session as Session  # for those that hold one and know no SQLAlchemy
 
 from spook_tracker.tracker.document.errors import DatabaseError, DatabaseUnusable
 from spook_tracker.tracker.store.connection import (
@@ -123,8 +122,10 @@ def one_writer(on: Connection | Session) -> None:
         connection.execute(text(f"SELECT pg_advisory_xact_lock({ONE_WRITER})"))
 
 
-def _pragma(connection: Any, words: str) -> None:
-    connection.connection.dbapi_connection.execute(f"PRAGMA {words}")
+def _pragma(connection: Connection, words: str) -> None:
+    driver = connection.connection.dbapi_connection
+    assert isinstance(driver, sqlite3.Connection)
+    driver.execute(f"PRAGMA {words}")
 
 
 def _keep_copy(url: URL, revision: str) -> None:
@@ -178,7 +179,7 @@ def _one_moment(engine: Engine) -> Connection:
     return connection
 
 
-def _current(connection: Any) -> str | None:
+def _current(connection: Connection) -> str | None:
     if not inspect(connection).has_table("alembic_version"):
         return None
     found = connection.execute(text("SELECT version_num FROM alembic_version")).scalars().all()

@@ -6,13 +6,16 @@ import hashlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any
+from typing import TYPE_CHECKING
 
 from sqlalchemy import Connection, Engine, Table, func, insert, select
 
 from spook_tracker.tracker.document.errors import DatabaseError
 from spook_tracker.tracker.store import models
 from spook_tracker.tracker.store.database import in_words, open_database, shown
+
+if TYPE_CHECKING:
+    from sqlalchemy import Row
 
 CHUNK = 5000  # rows held in memory
 
@@ -58,7 +61,7 @@ def _copy(source: Engine, target: Engine) -> dict[str, Digest]:
     return digests
 
 
-def _copied(old: Connection, new: Connection, table: Table) -> Iterator[Sequence[Any]]:
+def _copied(old: Connection, new: Connection, table: Table) -> Iterator[Row[tuple[object, ...]]]:
     names = [column.name for column in table.columns]
     for part in _partitions(old, table):
         new.execute(insert(table), [dict(zip(names, row, strict=True)) for row in part])
@@ -78,7 +81,7 @@ def digest(connection: Connection, table: Table) -> Digest:
     return digest_of(row for part in _partitions(connection, table) for row in part)
 
 
-def digest_of(rows: Iterable[Sequence[Any]]) -> Digest:
+def digest_of(rows: Iterable[Sequence[object]]) -> Digest:
     """Sum of the SHA-256 of every row: equal for equal rows in any order, and from any database."""
     count, total = 0, 0
     for row in rows:
@@ -88,12 +91,12 @@ def digest_of(rows: Iterable[Sequence[Any]]) -> Digest:
     return Digest(count, f"{total % 2**256:064x}")
 
 
-def _partitions(connection: Connection, table: Table) -> Iterator[Sequence[Any]]:
+def _partitions(connection: Connection, table: Table) -> Iterator[Sequence[Row[tuple[object, ...]]]]:
     result = connection.execute(select(table), execution_options={"yield_per": CHUNK})
     yield from result.partitions()
 
 
-def _plain(value: Any) -> str:
+def _plain(value: object) -> str:
     """A value as text that tells types, and floats by their bits, apart."""
     if isinstance(value, float):
         return f"float {value.hex()}"

@@ -18,6 +18,8 @@ from spook_tracker.tracker.document import run_document as document
 from spook_tracker.tracker.document.collection import no_collection
 from spook_tracker.tracker.document.errors import DocumentError, UnknownName
 from spook_tracker.tracker.document.run_document import (
+    EngineVersion,
+    Machine,
     Point,
     RunDocument,
     Sample,
@@ -298,7 +300,7 @@ class History:
         ]
         return self._in_commit_order(runs)
 
-    def _table(self, table: str, kind: type[Any]) -> list[dict[str, Any]]:
+    def _table(self, table: str, kind: type[EngineVersion | Machine]) -> list[rows.Row]:
         """The rows of a table that holds such things, by their columns."""
         columns = ("id", *kind.__struct_fields__)
         named = ", ".join(f'"{name}"' for name in columns)
@@ -358,7 +360,7 @@ class History:
         return self._definitions
 
     def _read_samples(
-        self, where: str, parameters: dict[str, Any], evidence: bool = True, by_run: bool = False
+        self, where: str, parameters: dict[str, object], evidence: bool = True, by_run: bool = False
     ) -> list[Found]:
         """Samples in the order of time, then of their document; `by_run` where the conditions name runs."""
         query = f"SELECT {SAMPLE}{EVIDENCE if evidence else ''} FROM "

@@ -10,7 +10,7 @@ that hold the same thing hold it under the same id, and shards merge without ren
 from __future__ import annotations
 
 from datetime import UTC, datetime
-from typing import Any
+from typing import TYPE_CHECKING
 
 from sqlalchemy import (
     BigInteger,
@@ -28,6 +28,9 @@ from sqlalchemy import (
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
 from spook_tracker.tracker.store.rows import SPECIALS
+
+if TYPE_CHECKING:
+    from sqlalchemy.orm import MappedColumn
 
 NAMING = {
     "pk": "pk_%(table_name)s",
@@ -72,21 +75,21 @@ def _one_of(column: str, values: tuple[str, ...]) -> str:
     return f"{column} IN ({', '.join(repr(value) for value in values)})"
 
 
-def _key(comment: str) -> Any:
+def _key(comment: str) -> MappedColumn[int]:
     return mapped_column(BigInteger, primary_key=True, autoincrement=False, comment=comment)
 
 
-def _reference(target: str, comment: str, *, primary_key: bool = False) -> Any:
+def _reference(target: str, comment: str, *, primary_key: bool = False) -> MappedColumn[int]:
     return mapped_column(
         BigInteger, ForeignKey(target), primary_key=primary_key, autoincrement=False, comment=comment
     )
 
 
-def _text(comment: str, **options: Any) -> Any:
-    return mapped_column(Text, comment=comment, **options)
+def _text(comment: str, *, primary_key: bool = False, unique: bool | None = None) -> MappedColumn[str]:
+    return mapped_column(Text, comment=comment, primary_key=primary_key, unique=unique)
 
 
-def _started_at() -> Any:
+def _started_at() -> MappedColumn[datetime]:
     return mapped_column(UTCDateTime, primary_key=True, comment="start of the run, UTC; leads the key")
 
 

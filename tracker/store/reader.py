@@ -28,7 +28,7 @@ CHUNK = 500  # values in one IN (...)
 class Reader(Protocol):
     """Rows of a statement, all from one moment."""
 
-    def rows(self, statement: str, **parameters: Any) -> Sequence[Sequence[Any]]: ...
+    def rows(self, statement: str, **parameters: object) -> Sequence[Sequence[Any]]: ...
 
 
 class SessionReader:
@@ -37,7 +37,7 @@ class SessionReader:
     def __init__(self, session: Session) -> None:
         self.session = session
 
-    def rows(self, statement: str, **parameters: Any) -> Sequence[Sequence[Any]]:
+    def rows(self, statement: str, **parameters: object) -> Sequence[Sequence[Any]]:
         from sqlalchemy import text
 
         return self.session.connection().execute(text(statement), parameters).all()
@@ -49,7 +49,7 @@ class FileReader:
     def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
         self.connection, self.path = connection, path
 
-    def rows(self, statement: str, **parameters: Any) -> Sequence[Sequence[Any]]:
+    def rows(self, statement: str, **parameters: object) -> Sequence[Sequence[Any]]:
         try:
             return self.connection.execute(statement, parameters).fetchall()
         except (sqlite3.Error, UnicodeDecodeError) as error:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING
 
 from sqlalchemy import Table, insert, or_, select, update
 from sqlalchemy.exc import IntegrityError
@@ -16,6 +16,9 @@ from spook_tracker.tracker.store import models, rows
 from spook_tracker.tracker.store.border import checked
 from spook_tracker.tracker.store.database import in_words, one_writer
 from spook_tracker.tracker.store.identity import identity
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.run_document import FigureData, MapData, Trajectory
 
 ATTEMPTS = 5  # at storing, when other processes store the same things at the same time
 CHUNK = 500  # ids in one IN (...), well below every database's limit
@@ -130,7 +133,7 @@ def _store(session: Session, run: RunDocument, there: Present) -> bool:
     return True
 
 
-def _bodies(place: dict[str, Any], parts: Sequence[Any]) -> list[rows.Row]:
+def _bodies(place: rows.Row, parts: Sequence[FigureData | MapData | Trajectory]) -> list[rows.Row]:
     return [
         place | {"position": position, "test": part.test, "name": part.name, "body": rows.packed(part)}
         for position, part in enumerate(parts)
@@ -145,7 +148,7 @@ def _append(session: Session, model: type[models.Base], new: list[rows.Row]) -> 
     assert isinstance(table, Table)
     mark = {"qmark": "?", "format": "%s", "pyformat": "%s"}[connection.dialect.paramstyle]
     columns, marks = ", ".join(f'"{name}"' for name in names), ", ".join([mark] * len(names))
-    values: Iterable[tuple[Any, ...]] = (tuple(row.values()) for row in new)
+    values: Iterable[tuple[object, ...]] = (tuple(row.values()) for row in new)
     if "started_at" in names:  # the one column that a database may write in a way of its own; it comes first
         kind = table.c.started_at.type.dialect_impl(connection.dialect)
         written = lru_cache(kind.bind_processor(connection.dialect) or (lambda moment: moment))

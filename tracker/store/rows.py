@@ -8,7 +8,7 @@ import zlib
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from functools import lru_cache
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import msgspec
 
@@ -17,12 +17,15 @@ from spook_tracker.tracker.document.errors import DatabaseError, DocumentError
 from spook_tracker.tracker.document.json_form import Number, boxed, decode, encode
 from spook_tracker.tracker.store.identity import identity
 
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.json_form import Writable
+
 Row = dict[str, Any]
 SPECIALS = ("nan", "inf", "-inf", "-0.0")  # float64 values that not every database keeps
 Part = TypeVar("Part")
 
 
-def json_of(part: Any) -> str:
+def json_of(part: Writable) -> str:
     """Compact JSON; floats in the shortest form that reads back to the same bits."""
     return encode(part).decode()
 
@@ -51,7 +54,7 @@ class Compressed:
 _compressed = Compressed(32 * 1024 * 1024)
 
 
-def packed(part: Any) -> bytes:
+def packed(part: Writable) -> bytes:
     """Compressed JSON, for the bulky parts nobody queries."""
     return _compressed.of(encode(part))
 
@@ -61,7 +64,7 @@ def unpacked(body: bytes, kind: type[Part]) -> Part:
 
 
 @lru_cache(maxsize=256)  # a map that stands still is the same bytes night after night
-def _unpacked(body: bytes, kind: Any) -> Any:
+def _unpacked(body: bytes, kind: type[Part]) -> Part:
     try:
         return decode(zlib.decompress(body), kind)
     except (zlib.error, msgspec.DecodeError) as error:

@@ -10,7 +10,8 @@ from collections.abc import Iterable
 from importlib import import_module
 from operator import itemgetter
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.store.reader import CHUNK, Reader, listed
@@ -47,7 +48,7 @@ def values_table(reader: Reader, run_keys: Iterable[int]) -> pandas.DataFrame:
     """
     frames = _pandas()
     keys = sorted(run_keys)
-    rows: list[Any] = []
+    rows: list[tuple[object, ...]] = []
     for start in range(0, len(keys), CHUNK):
         chosen = listed(keys[start : start + CHUNK])
         found = reader.rows(QUERY.format(columns=", ".join(COLUMNS.values()), runs=chosen))
@@ -82,7 +83,7 @@ def write_table(table: pandas.DataFrame, file: Path, form: str) -> int:
     return len(table)
 
 
-def _pandas() -> Any:
+def _pandas() -> ModuleType:
     try:
         return import_module("pandas")
     except ImportError:

@@ -6,7 +6,6 @@ import math
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 from spook_tracker.tracker.document.wording import clean, conditions, day, number, pair, quantity, short_hash
 from spook_tracker.tracker.judge.causes import Hit, hits_of
@@ -26,7 +25,7 @@ class Broken:
     hit: Hit | None  # None where history knows no good night before
 
     @property
-    def card(self) -> dict[str, Any]:
+    def card(self) -> dict[str, str]:
         """As the page shows it."""
         d = self.trend.definition
         good, bad = (self.hit.good, self.hit.bad) if self.hit else (None, None)

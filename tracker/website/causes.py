@@ -9,7 +9,7 @@ import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.document.wording import (
     clean,
@@ -27,6 +27,9 @@ from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.motions import SEEN, apart
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory, as_night
 from spook_tracker.tracker.website.page_rows import address
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 SAID = {"detected": "RED", "accepted": "ACCEPTED", "recovered": "RECOVERED"}
 SIGN: dict[str, Class] = {"accepted": "accepted", "recovered": "pass"}
@@ -58,7 +61,7 @@ class ToldCause:
     blame: str
     damage: list[tuple[str, int]]  # what, how often; nothing that is zero
     tests: list[HitTest]
-    worst: dict[str, Any]
+    worst: Mapping[str, object]
     replay: str  # where its first wrong moment can be seen; empty where no motion was recorded
     compare: str
     ended: list[Night]  # runs where it came back or was accepted, first and last
@@ -184,11 +187,11 @@ def _replay(
     return max(found, key=lambda one: one[0], default=(0.0, ""))[1]
 
 
-def hit_row(hit: Hit, book: Book) -> dict[str, Any]:
+def hit_row(hit: Hit, book: Book) -> dict[str, object]:
     """One series, or one map, of a cause as a line of a table."""
     test = next(t for t in book.tests if t.name == hit.test)
     d = hit.definition
-    row = {
+    row: dict[str, object] = {
         "test": test.card.title,
         "address": address(test),
         "name": hit.name,

@@ -34,7 +34,7 @@ class ChartFiles:
         files = {}
         for view in _views(list(context.values())):
             data = _json(view.figure)
-            view.figure = {}  # a page is made from where its numbers are, not from the numbers
+            view.figure = None  # a page is made from where its numbers are, not from the numbers
             if view.nightly:
                 view.key = f"{view.nightly}/{view.name.removeprefix(view.nightly + '-')}"
                 view.file = nightly_file(view.nightly)

@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TypedDict
 
 from spook_tracker.tracker.document.addresses import page_of
 from spook_tracker.tracker.document.json_form import Number
@@ -31,7 +31,7 @@ from spook_tracker.tracker.judge.judged import Judged, is_release
 from spook_tracker.tracker.judge.known import judged_in, known_of
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
 from spook_tracker.tracker.judge.maps import may_be_dropped
-from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, QUIET, WORD_RANK, spaced
+from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, QUIET, WORD_RANK, Overall, spaced
 from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.website.folder import digest
 from spook_tracker.tracker.website.judged_nights import accepted_fields, described, gates_of_engines
@@ -42,18 +42,29 @@ RELEASES = 6  # and the newest releases before them
 FILE = "data/comparisons.json"
 
 
+class ToldPair(TypedDict):
+    """What a reader sees of a comparison, as it is stored beside the website."""
+
+    verdict: Overall
+    code: int
+    counts: dict[str, int]
+    changes: list[list[str]]
+    frontiers: list[list[str]]
+    notes: list[str]
+
+
 @dataclass
 class Comparisons:
     """The versions to choose from, and what became of every ordered pair."""
 
     nights: list[Night]
-    pairs: dict[str, Any]  # by `pair_name` to what the page shows
+    pairs: dict[str, ToldPair]  # by `pair_name` to what the page shows
     made_from: dict[str, str] = field(default_factory=dict)  # the same to what it depends on
     texts: list[str] = field(default_factory=list)
 
-    def kept(self) -> dict[str, Any]:
+    def kept(self) -> dict[str, tuple[str, ToldPair]]:
         """Each with what it was made from, for the next publication."""
-        return {name: [self.made_from[name], pair] for name, pair in self.pairs.items()}
+        return {name: (self.made_from[name], pair) for name, pair in self.pairs.items()}
 
 
 def pair_name(before: Night, after: Night) -> str:
@@ -70,7 +81,7 @@ def chosen(book: Book) -> list[Night]:
 
 
 def comparisons(
-    history: Records, book: Book, accepted: Sequence[Accepted], stored: dict[str, Any]
+    history: Records, book: Book, accepted: Sequence[Accepted], stored: dict[str, tuple[str, ToldPair]]
 ) -> Comparisons:
     """All ordered pairs; `stored` are those of the last publication."""
     nights = chosen(book)
@@ -101,7 +112,7 @@ def comparisons(
     words = json.dumps([titles, descriptions])
     content = {night.id: night.content.encode() for night in nights}
     facts = {run: digest(words.encode(), content[run], *_facts(found)) for run, found in verdicts.items()}
-    pairs: dict[str, Any] = {}
+    pairs: dict[str, ToldPair] = {}
     made_from: dict[str, str] = {}
     for before in nights:
         for after in nights:
@@ -114,9 +125,8 @@ def comparisons(
                 facts[after.id].encode(),
                 repr(history_knows).encode("utf-8", "replace"),
             )
-            then, kept = stored.get(name, ("", None))
-            if then == made_from[name]:
-                pairs[name] = kept
+            if name in stored and stored[name][0] == made_from[name]:
+                pairs[name] = stored[name][1]
             else:
                 document = compare(side(before), side(after), accepted, history_knows)
                 pairs[name] = _told(document, titles, descriptions)
@@ -133,7 +143,7 @@ def _facts(night: Mapping[str, Judged]) -> list[bytes]:
     ]
 
 
-def read_known(old: Path, made_from: str) -> dict[str, Any]:
+def read_known(old: Path, made_from: str) -> dict[str, tuple[str, ToldPair]]:
     """The comparisons of the last publication, each with what it was made from, if they were made by the same code."""
     try:
         stored = json.loads((old / FILE).read_text(encoding="utf-8"))
@@ -197,7 +207,7 @@ def worst_first(changes: Sequence[Change]) -> list[Change]:
     return sorted(changes, key=rank)
 
 
-def _told(document: CompareDocument, titles: dict[str, str], descriptions: dict[str, str]) -> dict[str, Any]:
+def _told(document: CompareDocument, titles: dict[str, str], descriptions: dict[str, str]) -> ToldPair:
     """What a reader sees of a comparison."""
     shown = worst_first([change for change in document.changes if change.word not in QUIET])
     return {

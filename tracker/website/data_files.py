@@ -12,7 +12,7 @@ import json
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from itertools import groupby
-from typing import Any
+from typing import TYPE_CHECKING
 
 from msgspec import structs
 
@@ -21,6 +21,10 @@ from spook_tracker.tracker.document.outside import escaped
 from spook_tracker.tracker.website.events import Event
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory, Trend
 
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.json_form import Writable
+
+Cell = str | float | int | None  # of a table
 FORMULA = ("=", "+", "-", "@", "\t", "\r")
 COLUMNS = (
     "test", "configuration", "metric", "time_step_s", "parameters", "role", "kind", "value", "unit", "outcome",
@@ -29,7 +33,7 @@ COLUMNS = (
 )  # fmt: skip
 
 
-def inert(cell: Any) -> Any:
+def inert(cell: Cell) -> Cell:
     """A cell no spreadsheet takes for a formula; numbers are left alone, None is empty."""
     if cell is None:
         return ""
@@ -41,14 +45,14 @@ def inert(cell: Any) -> Any:
     return cell
 
 
-def table(columns: Sequence[str], lines: Iterable[Sequence[Any]]) -> bytes:
+def table(columns: Sequence[str], lines: Iterable[Sequence[Cell]]) -> bytes:
     """A CSV file in UTF-8, lines ended as RFC 4180 says."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\r\n")
     writer.writerow([inert(name) for name in columns])
-    known: dict[str, str] = {}  # the same texts stand night after night
+    known: dict[str, Cell] = {}  # the same texts stand night after night
 
-    def shown(cell: Any) -> Any:
+    def shown(cell: Cell) -> Cell:
         if type(cell) is not str:
             return inert(cell)
         found = known.get(cell)
@@ -60,7 +64,7 @@ def table(columns: Sequence[str], lines: Iterable[Sequence[Any]]) -> bytes:
     return out.getvalue().encode("utf-8", "replace")
 
 
-def records(columns: Sequence[str], lines: Iterable[Sequence[Any]]) -> bytes:
+def records(columns: Sequence[str], lines: Iterable[Sequence[Cell]]) -> bytes:
     """The same table as JSON: a list of objects, non-finite numbers as strings."""
     found = [
         {
@@ -79,7 +83,7 @@ def columnar(columns: Sequence[str], lines: Iterable[Sequence[object]]) -> bytes
     return json.dumps(whole, ensure_ascii=True, allow_nan=False, separators=(",", ":")).encode()
 
 
-Table = tuple[Sequence[str], list[list[Any]]]  # names of the columns, lines
+Table = tuple[Sequence[str], list[list[Cell]]]  # names of the columns, lines
 
 
 def newest(book: Book, tests: Sequence[TestHistory]) -> Table:
@@ -112,7 +116,7 @@ def _whole(value: float) -> float | int:
     return int(value) if value.is_integer() else value
 
 
-def _line(trend: Trend, nights: Sequence[Night]) -> list[Any]:
+def _line(trend: Trend, nights: Sequence[Night]) -> list[Cell]:
     d, sample, night = trend.definition, trend.latest, nights[trend.nights[-1]]
     low, high = ends(d.limit, d.better)
     timing = sample.timing if sample else None
@@ -168,7 +172,7 @@ def changed(trend: Trend) -> list[int]:
     ]
 
 
-def _changes(trend: Trend, nights: Sequence[Night]) -> Iterable[list[object]]:
+def _changes(trend: Trend, nights: Sequence[Night]) -> Iterable[list[Cell]]:
     d = trend.definition
     low, high = ends(d.limit, d.better)
     for i in changed(trend):
@@ -211,7 +215,7 @@ def regressions(events: Sequence[Event]) -> Table:
     return columns, [_event_line(event) for event in events]
 
 
-def _event_line(event: Event) -> list[Any]:
+def _event_line(event: Event) -> list[Cell]:
     good, end = event.good, event.end
     return [
         event.definition.key, event.name, event.sentence, event.before, event.value,
@@ -231,7 +235,7 @@ def nights(book: Book) -> Table:
     return columns, [_night_line(night) for night in book.nights]
 
 
-def _night_line(night: Night) -> list[Any]:
+def _night_line(night: Night) -> list[Cell]:
     e, m = night.engine, night.machine
     return [
         night.id, night.started, night.finished, night.trigger, e.name, e.version, e.git_hash, e.dirty,
@@ -246,7 +250,7 @@ def test_json(book: Book, test: TestHistory) -> bytes:
     definitions: dict[str, int] = {}
     nights: dict[str, dict[str, str]] = {}
     series = [_series(t, definitions, nights, book.nights) for t in steady(test)]
-    whole = {
+    whole: Writable = {
         "test": structs.replace(
             test.card,
             stages=tuple(structs.replace(s, saved_seconds_per_step=None) for s in test.card.stages),
@@ -267,8 +271,8 @@ WHOLE = ("test", "title")  # what the card says
 
 def _series(
     trend: Trend, definitions: dict[str, int], used: dict[str, dict[str, str]], nights: Sequence[Night]
-) -> dict[str, object]:
-    said = {
+) -> dict[str, Writable]:
+    said: dict[str, Writable] = {
         field.name: value
         for field in structs.fields(trend.definition)
         if (value := getattr(trend.definition, field.name)) != field.default and value not in ({}, (), "")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Literal
 
 from spook_tracker.tracker.document.run_document import FigureData, MapData, Sample
 from spook_tracker.tracker.document.wording import (
@@ -23,7 +23,7 @@ from spook_tracker.tracker.document.wording import (
 from spook_tracker.tracker.website.charts import Band, Chart, Grid, Line, Scale, drawable, thinned, turning
 from spook_tracker.tracker.website.earlier_nights import Earlier
 from spook_tracker.tracker.website.events import Event
-from spook_tracker.tracker.website.figures import figure, grid_figure
+from spook_tracker.tracker.website.figures import FigureParts, figure, grid_figure
 from spook_tracker.tracker.website.nights import Night, TestHistory, Trend, as_night
 from spook_tracker.tracker.website.svg import describe
 
@@ -51,7 +51,7 @@ class View:
     thesis: str
     note: str
     description: str
-    figure: dict[str, Any]
+    figure: FigureParts | None
     tall: bool = False  # many names in the legend
     nightly: str = ""  # slug of the test whose run times it shows: every night has others
     key: str = ""  # of its data, once that is known

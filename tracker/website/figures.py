@@ -11,7 +11,7 @@ import math
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import chain
-from typing import Any
+from typing import TYPE_CHECKING, NotRequired, TypedDict
 
 from spook_tracker.tracker.document.wording import clean, number
 from spook_tracker.tracker.website.charts import (
@@ -26,6 +26,28 @@ from spook_tracker.tracker.website.charts import (
     ticks,
 )
 from spook_tracker.tracker.website.svg import CELL_WORDS
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.json_form import Writable
+
+
+class Layout(TypedDict):
+    """Of a chart, by Plotly's names; shapes and annotations are slots that a page fills in."""
+
+    xaxis: dict[str, Writable]
+    yaxis: dict[str, Writable]
+    showlegend: bool
+    shapes: NotRequired[list[dict[str, Writable]]]
+    annotations: NotRequired[list[dict[str, Writable]]]
+
+
+class FigureParts(TypedDict):
+    """Traces and layout of a chart."""
+
+    data: list[dict[str, Writable]]
+    layout: Layout
+    over: NotRequired[list[int | None]]  # x is nights: the first, and the last
+
 
 Cut = Callable[[float], float | None]
 DASHES = {"reference": "dash", "limit": "dot", "front": "longdash"}
@@ -53,11 +75,11 @@ def _all_plain(texts: Sequence[str]) -> list[str]:
     return found if len(found) == len(texts) else list(map(plain, texts))
 
 
-def figure(chart: Chart, shown: Chart | None = None) -> dict[str, Any]:
+def figure(chart: Chart, shown: Chart | None = None) -> FigureParts:
     """Traces and layout of a chart, colours as slots in `meta`; `shown` is what can be drawn of it, where known."""
     chart = flattened(shown or drawable(chart))
     x_ends, y_ends = chart.ends()
-    layout: dict[str, Any] = {
+    layout: Layout = {
         "xaxis": {"title": {"text": plain(chart.x_label)}}
         if chart.over
         else _axis(chart.x_label, chart.x_scale, x_ends),
@@ -81,15 +103,14 @@ def figure(chart: Chart, shown: Chart | None = None) -> dict[str, Any]:
     for band in chart.bands:
         low = band.low if chart.y_scale == "linear" or band.low > 0.0 else None
         layout["shapes"].append({"meta": "band", "low": low, "high": band.high, "name": plain(band.name)})
-    made: dict[str, Any] = {"layout": layout}
-    for given, ends in (("xaxis", x_ends), ("yaxis", y_ends)):
-        if "range" in layout[given] and not chart.polar:
-            layout[given]["range"] = [_cut(end, ends, "linear") for end in ends]
+    for axis, ends in ((layout["xaxis"], x_ends), (layout["yaxis"], y_ends)):
+        if "range" in axis and not chart.polar:
+            axis["range"] = [_cut(end, ends, "linear") for end in ends]
     x_cut, y_cut = (
         partial(_cut, ends=x_ends, scale=chart.x_scale),
         partial(_cut, ends=y_ends, scale=chart.y_scale),
     )
-    made["data"] = [_trace(line, x_cut, y_cut) for line in chart.lines]
+    made: FigureParts = {"data": [_trace(line, x_cut, y_cut) for line in chart.lines], "layout": layout}
     if chart.over:
         made["over"] = [None if end is None else int(end) for end in chart.over]
     return made
@@ -107,7 +128,7 @@ def _cut(value: float, ends: tuple[float, float], scale: Scale) -> float | None:
     return int(value) if value.is_integer() and abs(value) < 1e15 else value
 
 
-def grid_figure(grid: Grid) -> dict[str, Any]:
+def grid_figure(grid: Grid) -> FigureParts:
     """A map as a heat map over places, with the prediction as a contour line at 1."""
     codes = {word: code for code, word in enumerate(CELL_WORDS)}
     z = [[codes.get(word, len(CELL_WORDS)) for word in row] for row in grid.cells]
@@ -120,7 +141,7 @@ def grid_figure(grid: Grid) -> dict[str, Any]:
         for j, row in enumerate(grid.cells)
     ]
     x, y = list(range(len(grid.x))), list(range(len(grid.y)))
-    data: list[dict[str, Any]] = [
+    data: list[dict[str, Writable]] = [
         {
             "type": "heatmap",
             "x": x,
@@ -164,7 +185,7 @@ def _predicted(grid: Grid, i: int, j: int) -> str:
     return f"\npredicted growth per step: {number(grid.prediction[j][i], 6)}"
 
 
-def _places(label: str, values: tuple[float, ...]) -> dict[str, Any]:
+def _places(label: str, values: tuple[float, ...]) -> dict[str, Writable]:
     shown = thinned(len(values), 9)
     return {
         "title": {"text": plain(label)},
@@ -175,9 +196,9 @@ def _places(label: str, values: tuple[float, ...]) -> dict[str, Any]:
     }
 
 
-def _axis(label: str, scale: Scale, ends: tuple[float, float]) -> dict[str, Any]:
+def _axis(label: str, scale: Scale, ends: tuple[float, float]) -> dict[str, Writable]:
     low, high = ends
-    axis: dict[str, Any] = {"title": {"text": plain(label)}, "type": scale, "range": [low, high]}
+    axis: dict[str, Writable] = {"title": {"text": plain(label)}, "type": scale, "range": [low, high]}
     if scale == "log":
         decades = ticks(low, high, scale)
         shown = decades if len(decades) > 2 else _within(low, high, (1, 2, 5))
@@ -208,7 +229,7 @@ def _legible(ranks: Sequence[Sequence[float]], room: float) -> list[float]:
     return sorted(kept)
 
 
-def _polar(layout: dict[str, Any], chart: Chart) -> None:
+def _polar(layout: Layout, chart: Chart) -> None:
     """Rings and equal axes instead of a frame."""
     reach = chart.reach
     layout["xaxis"] = {"visible": False, "range": [-reach, reach], "scaleanchor": "y"}
@@ -218,21 +239,22 @@ def _polar(layout: dict[str, Any], chart: Chart) -> None:
         layout["annotations"].append({"meta": "ring", "x": 0.0, "y": radius, "text": number(radius, 6)})
 
 
-def _trace(line: Line, x_cut: Cut, y_cut: Cut) -> dict[str, Any]:
+def _trace(line: Line, x_cut: Cut, y_cut: Cut) -> dict[str, Writable]:
     drawn = {"points": "markers", "failed": "markers", "broken": "markers", "both": "lines+markers"}.get(
         line.style, "lines"
     )
-    trace: dict[str, Any] = {
+    meta: dict[str, Writable] = {"colour": line.colour % 8, "style": line.style}
+    trace: dict[str, Writable] = {
         "type": "scatter",
         "mode": drawn,
         "name": plain(line.name),
         "x": list(map(x_cut, line.x)),
         "y": list(map(y_cut, line.y)),
-        "meta": {"colour": line.colour % 8, "style": line.style},
+        "meta": meta,
         "showlegend": not line.quiet,
     }
     if line.night:
-        trace["meta"]["night"] = line.night
+        meta["night"] = line.night
     if line.style in DASHES:
         trace["line"] = {"dash": DASHES[line.style]}
     if line.style == "steps":

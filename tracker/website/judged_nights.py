@@ -11,10 +11,9 @@ from array import array
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from functools import partial
-from typing import Any
 
 from spook_tracker.tracker.document.addresses import page_of
-from spook_tracker.tracker.document.json_form import boxed
+from spook_tracker.tracker.document.json_form import Writable, boxed
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
 from spook_tracker.tracker.document.wording import clean, conditions, limit, named, slug
 from spook_tracker.tracker.judge.accepted import Accepted
@@ -32,10 +31,12 @@ OUTCOMES = (
     "value", "out_of_limit", "not_finite", "diverged", "crashed", "timed_out", "missing", "not_supported",
     "unsettled",
 )  # fmt: skip
-Row = list[Any]  # definition, value, outcome, passed + 2 held, state hash, failure, usual, suspected, blame
+Row = list[
+    Writable
+]  # definition, value, outcome, passed + 2 held, state hash, failure, usual, suspected, blame
 
 
-def definition_fields(definition: SeriesDefinition) -> dict[str, Any]:
+def definition_fields(definition: SeriesDefinition) -> dict[str, Writable]:
     """What the judge asks of a definition."""
     said = {what: str(getattr(definition, what)) for what in ("unit", "better", "reference", "limit")}
     return {
@@ -53,7 +54,7 @@ class Texts:
     def __init__(self) -> None:
         self.texts: dict[str, int] = {"": 0}
         self.definitions: dict[str, int] = {}
-        self.known: dict[tuple[Any, ...], int] = {}  # what a definition says, before it is written out
+        self.known: dict[tuple[Writable, ...], int] = {}  # what a definition says, before it is written out
 
     def place(self, text: str) -> int:
         return self.texts.setdefault(text, len(self.texts))
@@ -79,7 +80,7 @@ class Texts:
         blame: str = "",
     ) -> Row:
         """One sample, without what is empty at its end."""
-        row = [
+        row: Row = [
             self.definition(definition),
             boxed(sample.value),
             OUTCOMES.index(sample.outcome),
@@ -95,7 +96,7 @@ class Texts:
         return row
 
 
-def side_fields(night: Any, samples: Samples) -> dict[str, Any]:
+def side_fields(night: Night, samples: Samples) -> dict[str, Writable]:
     """What the judge asks of a run."""
     asked = asked_for(night, samples)
     return {
@@ -106,7 +107,7 @@ def side_fields(night: Any, samples: Samples) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def accepted_fields(accepted: Sequence[Accepted], keys: Sequence[str]) -> list[dict[str, Any]]:
+def accepted_fields(accepted: Sequence[Accepted], keys: Sequence[str]) -> list[dict[str, Writable]]:
     """The accepted levels with the series they are about."""
     return [
         {
@@ -194,7 +195,7 @@ def _block(history: Records, name: str, nights: Sequence[Night], marks: Mapping[
     rows: dict[str, list[Row]] = {}
     last: dict[str, Row] = {}
     facts: dict[
-        str, tuple[Any, ...]
+        str, tuple[Writable, ...]
     ] = {}  # what each last row was made from: most stand still from night to night
     sides = []
     for place, night in enumerate(nights):
@@ -219,7 +220,7 @@ def _block(history: Records, name: str, nights: Sequence[Night], marks: Mapping[
                 last[key] = row
     definitions = [json.loads(text) for text in texts.definitions]
     fields = list(definitions[0]) if definitions else []
-    whole = {
+    whole: Writable = {
         "texts": list(texts.texts), "fields": fields, "definitions": [list(d.values()) for d in definitions],
         "nights": sides, "rows": rows,
     }  # fmt: skip
@@ -244,7 +245,7 @@ def described(book: Book) -> dict[str, tuple[str, str, dict[str, str]]]:
     return found
 
 
-def gates_of_engines(book: Book) -> list[list[Any]]:
+def gates_of_engines(book: Book) -> list[list[Writable]]:
     """Every gate of ours where there are other engines: title, words, page, limit, and the series that each engine
     answers it with (the configuration that it names first), engine by engine as the nights stand; "" for none."""
     if len(book.engines) < 2:
@@ -265,5 +266,5 @@ def gates_of_engines(book: Book) -> list[list[Any]]:
     ]  # fmt: skip
 
 
-def _json(value: Any) -> str:
+def _json(value: Writable) -> str:
     return json.dumps(value, ensure_ascii=True, separators=(",", ":"), allow_nan=False)

@@ -12,12 +12,15 @@ import zlib
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.document.json_form import encode
 from spook_tracker.tracker.document.run_document import Trajectory
 from spook_tracker.tracker.document.wording import slug
 from spook_tracker.tracker.website.folder import digest
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.json_form import Writable
 
 if TYPE_CHECKING:  # they ask for what is kept
     from spook_tracker.tracker.website.nights import Night, TestHistory
@@ -131,7 +134,7 @@ def _values(motion: Trajectory, name: str) -> list[float]:
 
 def motion_script(key: str, motion: Trajectory) -> bytes:
     """What hands a motion to replay.js under its key."""
-    solids = [
+    solids: list[Writable] = [
         {
             "kind": solid.kind,
             "size": solid.size,
@@ -143,11 +146,11 @@ def motion_script(key: str, motion: Trajectory) -> bytes:
         }
         for solid, body in zip(motion.solids, motion.body_of_solid, strict=True)
     ]
-    links = [
+    links: list[Writable] = [
         {"kind": link.kind, "bodies": link.bodies, "anchors": link.anchors, "row": link.row}
         for link in motion.links
     ]
-    channels = [
+    channels: list[Writable] = [
         {
             "name": channel.name,
             "unit": channel.unit,
@@ -157,7 +160,7 @@ def motion_script(key: str, motion: Trajectory) -> bytes:
         }
         for channel in motion.channels
     ]
-    data: dict[str, Any] = {
+    data: dict[str, Writable] = {
         "step": motion.step,
         "count": motion.count,
         "bodies": motion.bodies,

@@ -10,7 +10,7 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, Protocol
+from typing import Protocol
 
 from spook_tracker.tracker.document.run_document import (
     Asked,
@@ -21,6 +21,7 @@ from spook_tracker.tracker.document.run_document import (
     Run,
     Sample,
     SeriesDefinition,
+    SeriesHistory,
     TestCard,
     Trajectory,
 )
@@ -199,11 +200,24 @@ class Book(Chapter):
         ]
 
 
+class StoredRun(Run, Protocol):
+    """What a page says of a run besides."""
+
+    @property
+    def finished(self) -> str: ...
+    @property
+    def ci_address(self) -> str: ...
+    @property
+    def tracker_version(self) -> str: ...
+
+
 class Records(Protocol):
     """What is read of `tracker.store.history.History`."""
 
-    def runs(self, engine: str | None = None) -> Sequence[Any]: ...
-    def series(self, keys: Iterable[str] | None = None, *, evidence: bool = True) -> Mapping[str, Any]: ...
+    def runs(self, engine: str | None = None) -> Sequence[StoredRun]: ...
+    def series(
+        self, keys: Iterable[str] | None = None, *, evidence: bool = True
+    ) -> Mapping[str, SeriesHistory]: ...
     def samples(self, run_id: str) -> Mapping[str, tuple[SeriesDefinition, Sample]]: ...
     def samples_of(
         self, run_ids: Sequence[str], tests: set[str] | None = None, keys: Iterable[str] | None = None
@@ -234,7 +248,7 @@ def chapters(history: Records) -> list[Chapter]:
 
 
 def _chapter(
-    history: Records, runs: Sequence[Any], accepted: Sequence[Accepted]
+    history: Records, runs: Sequence[StoredRun], accepted: Sequence[Accepted]
 ) -> tuple[list[Night], list[TestHistory], list[Earlier]]:
     """One engine's nights and tests, and the nights to lay beside tonight's ladders."""
     nights = [

@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import groupby, pairwise
-from typing import Any
+from typing import TypedDict
 
 import msgspec
 
@@ -161,13 +161,28 @@ def _occasion(recorded: Recorded) -> dict[str, object]:
     }
 
 
+class VersionRow(TypedDict):
+    """A version of an engine as a line of its page."""
+
+    version: str
+    measured: str
+    first: bool
+    count: int
+    tests: str
+    changes: list[str]
+
+
 def _title(chapter: Chapter) -> str:
     return clean(f"{chapter.name} {version(chapter.tonight.engine)}")
 
 
 def _card(
-    name: str, chapter: Chapter, address: str, told: Sequence[Any], found: Sequence[Standing]
-) -> dict[str, Any]:
+    name: str,
+    chapter: Chapter,
+    address: str,
+    told: Sequence[tuple[SeriesDefinition, Sequence[Answer]]],
+    found: Sequence[Standing],
+) -> dict[str, object]:
     """One engine: what it answers, and how often none is quicker."""
     mine = [answer for _, of_gate in told for answer in of_gate if answer.engine == name]
     supported = [a for a in mine if a.sample is not None and a.sample.outcome != "not_supported"]
@@ -213,7 +228,7 @@ def _told(definition: SeriesDefinition, sample: Sample) -> str:
     return clean(f"{conditions(definition)}{': ' + sample.failure if sample.failure else ''}")[:300]
 
 
-def _ranks(found: Sequence[Standing], book: Book, apart: Mapping[str, str]) -> Iterator[dict[str, Any]]:
+def _ranks(found: Sequence[Standing], book: Book, apart: Mapping[str, str]) -> Iterator[dict[str, object]]:
     """A line for every scene: its errors at h = 1/60, and the run times to each error; `apart` says whose do not compare,
     and why."""
     titles = {test.name: test.card.title for test in book.tests}
@@ -257,29 +272,31 @@ def _cells(
     return cells
 
 
-def _behind(found: Sequence[Standing], ours: str, book: Book) -> list[dict[str, Any]]:
+def _behind(found: Sequence[Standing], ours: str, book: Book) -> list[dict[str, object]]:
     """Where another engine reaches an error before ours does, the largest factor first."""
     titles = {test.name: test.card.title for test in book.tests}
-    places = []
+    places: list[tuple[float, dict[str, object]]] = []
     for race in races(found):
         if (behind := race.behind(ours)) is None:
             continue
         first, theirs, mine = behind
         times = math.inf if mine is None else mine / theirs
         places.append(
-            {
-                "title": titles.get(race.test, race.test),
-                "address": page_of(race.test),
-                "what": race.ladder.replace("_", " "),
-                "error": quantity(race.error, race.unit),
-                "ahead": first,
-                "theirs": seconds(theirs),
-                "mine": "never" if mine is None else seconds(mine),
-                "times": times,
-                "factor": "" if mine is None else f"{number(times, 2)} ×",
-            }
+            (
+                times,
+                {
+                    "title": titles.get(race.test, race.test),
+                    "address": page_of(race.test),
+                    "what": race.ladder.replace("_", " "),
+                    "error": quantity(race.error, race.unit),
+                    "ahead": first,
+                    "theirs": seconds(theirs),
+                    "mine": "never" if mine is None else seconds(mine),
+                    "factor": "" if mine is None else f"{number(times, 2)} ×",
+                },
+            )
         )
-    return sorted(places, key=lambda one: -one["times"])
+    return [place for _, place in sorted(places, key=lambda one: -one[0])]
 
 
 def engine_page(book: Book, chapter: Chapter, recorded: Recorded | None = None) -> Page:
@@ -373,9 +390,9 @@ def _steps(chapter: Chapter) -> Steps:
     return found
 
 
-def _versions(chapter: Chapter, steps: Steps) -> list[dict[str, Any]]:
+def _versions(chapter: Chapter, steps: Steps) -> list[VersionRow]:
     """Every version in order, with what it changed."""
-    told = []
+    told: list[VersionRow] = []
     for night in chapter.nights:
         changes = steps.get(night.index, [])
         tests = Counter(trend.definition.test for trend, _ in changes)
@@ -396,9 +413,9 @@ def _versions(chapter: Chapter, steps: Steps) -> list[dict[str, Any]]:
     return told
 
 
-def _folded(told: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _folded(told: list[VersionRow]) -> list[VersionRow]:
     """Neighbours that changed nothing are one line."""
-    folded: list[dict[str, Any]] = []
+    folded: list[VersionRow] = []
     for quiet, group in groupby(told, key=lambda one: not one["count"] and not one["first"]):
         found = list(group)
         if quiet and len(found) > 1:

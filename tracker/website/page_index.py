@@ -7,7 +7,7 @@ from bisect import bisect_left
 from collections import Counter
 from collections.abc import Sequence
 from itertools import groupby
-from typing import Any
+from typing import TypedDict
 
 from spook_tracker.tracker.document.run_document import Point, SeriesDefinition
 from spook_tracker.tracker.document.wording import clean, day, quantity, short_hash, version
@@ -85,7 +85,7 @@ def index(book: Book, causes: Sequence[Cause]) -> Page:
     return Page("index.html", "index.html", "Tonight", str(context["summary"]), context)
 
 
-def lead(book: Book, causes: Sequence[Cause]) -> dict[str, Any]:
+def lead(book: Book, causes: Sequence[Cause]) -> dict[str, object]:
     """What the first page and the report begin with: the state of the night, and what is red since when."""
     red = [told(cause, book) for cause in lasting(causes)]
     new, old = [c for c in red if c.new], [c for c in red if not c.new]
@@ -235,7 +235,26 @@ RED: tuple[Class, ...] = ("fail", "watch")
 QUIET: tuple[Class, ...] = ("pass", "followed", "none")  # the best first
 
 
-def heat(book: Book, *, folded: bool = False) -> dict[str, Any]:
+class HeatRun(TypedDict):
+    """Nights of equal verdict beside each other."""
+
+    state: Class
+    x: str
+    width: str
+    told: str
+    places: list[float]
+
+
+class HeatRow(TypedDict):
+    """A test over nights, or several alike."""
+
+    title: str
+    address: str
+    y: int
+    runs: list[HeatRun]
+
+
+def heat(book: Book, *, folded: bool = False) -> dict[str, object]:
     """Tests against nights: cells of equal verdict beside each other are one bar.
 
     Folded, only the tests of the thesis and those that were red have a row, the others share one.
@@ -252,9 +271,9 @@ def heat(book: Book, *, folded: bool = False) -> dict[str, Any]:
             night = zip(*alike, strict=True)
             together = [worst(states) if red else min(states, key=QUIET.index) for states in night]
             named.append((f"{len(alike)} {'others' if named else 'tests'}, {words}", "#others", together))
-    rows: list[dict[str, Any]] = []
+    rows: list[HeatRow] = []
     for i, (title, where, states) in enumerate(named):
-        runs: list[dict[str, Any]] = []
+        runs: list[HeatRun] = []
         for state, group in groupby(range(len(states)), key=states.__getitem__):
             places = list(group)
             x, width = left + places[0] * step, step * len(places) - 2.0

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, TypedDict
 
 from spook_tracker.tracker.document.coverage import HEADINGS, coverage, rungs, summary
 from spook_tracker.tracker.document.wording import clean, slug, web_address
@@ -33,6 +33,11 @@ from spook_tracker.tracker.website.page_test import concluded, ladder_views
 from spook_tracker.tracker.website.scenery import scenery
 from spook_tracker.tracker.website.svg import grid_picture, picture
 
+if TYPE_CHECKING:
+    from spook_tracker.tracker.website.causes import ToldCause
+    from spook_tracker.tracker.website.nights import Trend
+    from spook_tracker.tracker.website.page_rows import Row
+
 MOST_CAUSES = 200  # on the page of regressions; the file has all
 MOST_ROWS, FEW_ROWS = 500, 25  # series of all causes; of one that is over
 MOST_CHANGES = 100  # of a comparison read without scripts
@@ -58,7 +63,7 @@ def error_time(book: Book) -> Page:
     return Page("error-time.html", "error-time.html", title, "What accuracy costs.", context, plotly=True)
 
 
-def _row(trend: Any, test: TestHistory) -> Any:
+def _row(trend: Trend, test: TestHistory) -> Row:
     return row(trend, test.card.title, address(test))
 
 
@@ -106,10 +111,17 @@ def covered(book: Book) -> Page:
     return Page("coverage.html", "coverage.html", "Coverage", "What is known of every scene.", context)
 
 
+class Group(TypedDict):
+    """A cause and the lines of what it hit."""
+
+    told: ToldCause
+    rows: list[dict[str, object]]
+
+
 def regressions(book: Book, causes: Sequence[Cause]) -> Page:
     """Every cause with all that it hit, those that last first; the oldest without their rows."""
     left = MOST_ROWS
-    groups: list[dict[str, Any]] = []
+    groups: list[Group] = []
     for cause in causes[:MOST_CAUSES]:
         hits = cause.hits[: min(left, MOST_ROWS if cause.standing == "detected" else FEW_ROWS)]
         left -= len(hits)
@@ -124,7 +136,7 @@ def regressions(book: Book, causes: Sequence[Cause]) -> Page:
 
 
 def compare(told: Comparisons, book: Book) -> Page:
-    """Any two versions chosen in the page; without scripts, the newest two."""
+    """Two versions, chosen in the page; without scripts, the newest two."""
     first = None
     if len(told.nights) > 1:
         before, after = told.nights[-2:]
@@ -218,7 +230,7 @@ def _told_whole(test: TestHistory) -> bool:
     return test.card.seven or test.state in RED
 
 
-def _chapter(test: TestHistory, book: Book) -> dict[str, Any]:
+def _chapter(test: TestHistory, book: Book) -> dict[str, object]:
     """What the report tells of one test."""
     name, whole = slug(test.name), _told_whole(test)
     scalars = test.gates() + test.companions()

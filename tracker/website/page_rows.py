@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.document.addresses import page_of
 from spook_tracker.tracker.document.wording import (
@@ -29,6 +29,9 @@ from spook_tracker.tracker.website.events import Event
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory, Trend
 from spook_tracker.tracker.website.svg import sparkline
 
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
 SPARK_NIGHTS = 40
 
 
@@ -40,7 +43,7 @@ class Page:
     template: str
     title: str
     description: str
-    context: dict[str, Any] = field(default_factory=dict)
+    context: Mapping[str, object] = field(default_factory=dict)
     plotly: bool = False
     nightly: tuple[str, dict[str, object]] | None = (
         None  # the test, and what `times.html` tells of its run times
@@ -133,7 +136,7 @@ def address(test: TestHistory, root: str = "") -> str:
     return f"{root}{page_of(test.name)}"
 
 
-def event_row(event: Event, book: Book) -> dict[str, Any]:
+def event_row(event: Event, book: Book) -> dict[str, object]:
     """An event as a line of a table."""
     d = event.definition
     test = next(t for t in book.tests if t.name == d.test)

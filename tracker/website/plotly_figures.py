@@ -48,8 +48,8 @@ def plotly_figure(chart: Chart) -> Figure:
             "a figure needs Plotly; install it with: pip install 'spook-tracker[standard]'"
         ) from None
     made = figure(chart)
-    nights = [trace["meta"]["night"] for trace in made["data"] if "night" in trace["meta"]]
-    traces = [_trace(trace, nights[0] if nights else "") for trace in made["data"]]
+    night = next((line.night for line in chart.lines if line.night), "")
+    traces = [_trace(trace, night) for trace in made["data"]]
     found: Figure = graph_objects.Figure(data=traces, layout=_layout(made["layout"], chart.title))
     return found
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cache, partial
 from itertools import chain
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import msgspec
 
@@ -49,6 +49,9 @@ from spook_tracker.tracker.website.recorded import told as told_beside
 from spook_tracker.tracker.website.replays import replay_files
 from spook_tracker.tracker.website.templates import environment
 from spook_tracker.tracker.website.tonight import tonight_scripts
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
 
 __all__ = ["FolderError", "Report", "publish"]
 
@@ -254,7 +257,7 @@ def _data(told: Book, events: Sequence[Event], causes: Sequence[Cause], author: 
     yield "badge.json", (state + words).encode(), partial(feed.badge_json, state, words)
 
 
-def _context(page: Page, assets: dict[str, str], any_night: bool) -> dict[str, Any]:
+def _context(page: Page, assets: dict[str, str], any_night: bool) -> dict[str, object]:
     return {
         "title": page.title,
         "description": page.description,
@@ -279,10 +282,10 @@ def _sources() -> list[Path]:
     return sorted(Path(__file__).parent.parent.rglob("*.py"))
 
 
-def _bytes_of(context: dict[str, Any]) -> bytes:
+def _bytes_of(context: Mapping[str, object]) -> bytes:
     """What stands on a page, as bytes to be hashed."""
 
-    def told(thing: Any) -> Any:
+    def told(thing: object) -> object:
         if not isinstance(thing, Number) and dataclasses.is_dataclass(thing) and not isinstance(thing, type):
             return {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing)}
         return plain(thing)

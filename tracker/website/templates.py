@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import jinja2
 from markupsafe import Markup
@@ -18,10 +18,13 @@ from spook_tracker.tracker.judge.vocabulary import CLASSES, Class
 from spook_tracker.tracker.resources import resource
 from spook_tracker.tracker.website.formulas import formula
 
+if TYPE_CHECKING:
+    from spook_tracker.tracker.document.json_form import Writable
+
 ESCAPES = {"<": "\\u003c", ">": "\\u003e", "&": "\\u0026", "\u2028": "\\u2028", "\u2029": "\\u2029"}
 
 
-def embedded(value: Any) -> Markup:
+def embedded(value: Writable) -> Markup:
     """JSON for a non-executing script element. Non-finite numbers must have been replaced before."""
     text = json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
     for sign, escape in ESCAPES.items():
