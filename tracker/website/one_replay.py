@@ -11,7 +11,7 @@ from spook_tracker.tracker.document.wording import number
 from spook_tracker.tracker.resources import resource
 from spook_tracker.tracker.website.motions import motion_script
 from spook_tracker.tracker.website.scenery import scenery
-from spook_tracker.tracker.website.templates import environment
+from spook_tracker.tracker.website.templates import Markup, environment, inside_script
 
 SCRIPTS = ("scene-poses.js", "scene-marks.js", "scene-view.js", "player.js", "replay.js")
 LIBRARY = "three-scene.min.js"
@@ -34,19 +34,14 @@ def replay_document(drawn: SceneDrawing, motion: Trajectory, title: str, still: 
             sources=[{"key": KEY, "address": "", "label": ""}],
             style=_static("site.css"),
             theme=_static("theme.js"),
-            scripts=[*map(_static, SCRIPTS), _inside(motion_script(KEY, motion).decode())],
+            scripts=[*map(_static, SCRIPTS), inside_script(motion_script(KEY, motion).decode())],
             library=_library(),
         )
     )
 
 
-def _static(name: str) -> str:
-    return _inside((resource("site") / "static" / name).read_text(encoding="utf-8"))
-
-
-def _inside(text: str) -> str:
-    """Text that does not end the element it stands in."""
-    return text.replace("</", "<\\/")
+def _static(name: str) -> Markup:
+    return inside_script((resource("site") / "static" / name).read_text(encoding="utf-8"))
 
 
 @cache

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import jinja2
-from markupsafe import Markup
+from markupsafe import Markup as Markup
 
 from spook_tracker.tracker.document import wording
 from spook_tracker.tracker.judge.vocabulary import CLASSES, Class
@@ -30,6 +30,11 @@ def embedded(value: Writable) -> Markup:
     for sign, escape in ESCAPES.items():
         text = text.replace(sign, escape)
     return Markup(text)
+
+
+def inside_script(text: str) -> Markup:
+    """A script or style sheet of ours, or a call with JSON, as it stands in its element: nothing in it ends that."""
+    return Markup(text.replace("</", "<\\/"))
 
 
 def said(name: Class) -> str:
