@@ -172,7 +172,7 @@ def test_the_documentation_is_searched_from_a_folder(tmp_path: Path) -> None:
             "return !!document.getElementById(decodeURIComponent(location.hash.slice(1)))"
         )
         look(driver, width=600)
-        driver.get((site / "reference" / "schema.html").as_uri())
+        driver.get((site / "detectors.html").as_uri())
         wide = driver.execute_script("return document.documentElement.scrollWidth")
 
     assert nothing == "0 sections"
