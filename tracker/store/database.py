@@ -6,6 +6,7 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import cast
 
 from sqlalchemy import URL, Connection, Engine, inspect, text
 from sqlalchemy.orm import Session as Session  # for those that hold one and know no SQLAlchemy
@@ -123,8 +124,7 @@ def one_writer(on: Connection | Session) -> None:
 
 
 def _pragma(connection: Connection, words: str) -> None:
-    driver = connection.connection.dbapi_connection
-    assert isinstance(driver, sqlite3.Connection)
+    driver = cast("sqlite3.Connection", connection.connection.dbapi_connection)
     driver.execute(f"PRAGMA {words}")
 
 
