@@ -1,8 +1,9 @@
 #include "contacts/bilateral_rows.hpp"
-#include "contacts/tolerances.hpp"
 
 #include <algorithm>
 #include <cmath>
+
+#include "contacts/tolerances.hpp"
 
 namespace spook {
 

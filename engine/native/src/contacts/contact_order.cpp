@@ -2,7 +2,6 @@
 // solved, and how fast they close.
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
@@ -14,6 +13,7 @@ namespace {
 
 constexpr char rebounds = 1,
                held = 2;  // of an island: some impact in it has a restitution; not all in it is free
+
 using namespace tolerances::contact_order;
 
 }  // namespace
@@ -23,16 +23,10 @@ using namespace tolerances::contact_order;
 /// that goes with it changes the energy. A supported body that moves along the forces would gain energy by it, unless what
 /// is moved supports it, or the impact is with something that stands still and pushes against the forces.
 void ContactStage::find_events() {
-    root_.resize(solver_index_.size());
-    std::iota(root_.begin(), root_.end(), 0);
-    auto root = [this](int b) {
-        while (root_[b] != b) b = root_[b] = root_[root_[b]];
-        return b;
-    };
-    auto join = [&](int a, int b) {
-        if (solver_index_[a] < 0 || solver_index_[b] < 0) return;
-        a = root(a), b = root(b);
-        root_[std::max(a, b)] = std::min(a, b);
+    connected_.begin(solver_index_.size());
+    const auto root = [this](int b) { return connected_.root(b); };
+    const auto join = [this](int a, int b) {
+        if (solver_index_[a] >= 0 && solver_index_[b] >= 0) connected_.join(a, b);
     };
     for (const Point& point : points_) join(point.contact.first, point.contact.second);
     for (const auto& [a, b] : joints_)

@@ -17,6 +17,7 @@ namespace spook {
 namespace {
 
 constexpr std::uint64_t swung_in = 1u << 15;  // marks a point whose feature has one in the manifold already
+
 using namespace tolerances::contact_turning;
 
 /// Two of these touch at one point, wherever they turn.

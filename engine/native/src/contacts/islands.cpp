@@ -1,7 +1,6 @@
 #include "contacts/islands.hpp"
 
 #include <algorithm>
-#include <numeric>
 
 namespace spook {
 
@@ -34,10 +33,6 @@ bool IslandFinder::only_more() {
 
 /// Whether a tie changes which bodies are connected.
 bool IslandFinder::join(Islands::Tie tie) {
-    const auto root = [this](int b) {
-        while (parent_[b] != b) b = parent_[b] = parent_[parent_[b]];
-        return b;
-    };
     bool changes = false;
     for (const int b : {tie.first, tie.second}) {
         if (b < 0) continue;
@@ -45,9 +40,7 @@ bool IslandFinder::join(Islands::Tie tie) {
         has_rows_[b] = 1;
     }
     if (tie.first < 0 || tie.second < 0) return changes;
-    const int a = root(tie.first), b = root(tie.second);
-    parent_[std::max(a, b)] = std::min(a, b);  // the root is the island's first body
-    return changes || a != b;
+    return sets_.join(tie.first, tie.second) || changes;
 }
 
 void IslandFinder::number() {
@@ -55,8 +48,7 @@ void IslandFinder::number() {
     islands_.count = 0;
     for (int b = 0; b < bodies_; ++b) {
         if (!has_rows_[b]) continue;
-        int r = b;
-        while (parent_[r] != r) r = parent_[r];
+        const int r = sets_.root(b);
         islands_.of_body[b] = r == b ? islands_.count++ : islands_.of_body[r];
     }
 }
@@ -66,8 +58,7 @@ const Islands& IslandFinder::find() {
     if (!kept) {
         ++searches_;
         bodies_ = told_;
-        parent_.resize(bodies_);
-        std::iota(parent_.begin(), parent_.end(), 0);
+        sets_.begin(static_cast<std::size_t>(bodies_));
         has_rows_.assign(bodies_, 0);
     }
     bool changed = !kept;

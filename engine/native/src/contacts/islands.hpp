@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "contacts/pivot_system.hpp"
+#include "linear/disjoint_sets.hpp"
 
 namespace spook {
 
@@ -52,7 +53,7 @@ private:
     std::vector<Islands::Tie> known_, ties_;  //   and of these; those told since begin()
     std::vector<Islands::Tie> more_;          // of those, which were not known
     int told_ = 0;                            // bodies
-    std::vector<int> parent_;
+    DisjointSets sets_;
     std::vector<char> has_rows_;
     long searches_ = 0;
 };

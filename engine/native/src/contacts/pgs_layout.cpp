@@ -1,6 +1,5 @@
 // What iterations read, laid out as they read it: bodies in a line each, contacts one behind the other.
 #include <cmath>
-#include <numeric>
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/pgs_solver.hpp"
@@ -73,8 +72,7 @@ void PgsSolver::begin(MixedSystem& system, FrictionModel model) {
     boxes_.clear();
     place_.clear();
     added_ = 0;
-    parent_.resize(bodies_ + 1);
-    std::iota(parent_.begin(), parent_.end(), 0);
+    sets_.begin(static_cast<std::size_t>(bodies_) + 1);
     active_.assign(bodies_ + 1, 0);
     limit_reached_.assign(bodies_ + 1, 0);
     last_change_.assign(bodies_ + 1, 0.0);

@@ -13,11 +13,6 @@ using namespace tolerances::pgs_schedule;
 
 }  // namespace
 
-int PgsSolver::root(int body) noexcept {
-    while (parent_[body] != body) body = parent_[body] = parent_[parent_[body]];
-    return body;
-}
-
 /// Joins the islands of both bodies.
 void PgsSolver::link(int first, int second) {
     bodies_of_.push_back({first >= 0 ? first : bodies_, second >= 0 ? second : bodies_});
@@ -27,9 +22,8 @@ void PgsSolver::link(int first, int second) {
 
 void PgsSolver::join(int first, int second) {
     int a = root(first), b = root(second);
-    if (a == b) return;
+    if (!sets_.join(a, b)) return;
     if (a > b) std::swap(a, b);
-    parent_[b] = a;
     joined_ = true;
     last_change_[a] = larger(last_change_[a], last_change_[b]);
     limit_reached_[a] = limit_reached_[a] || limit_reached_[b];
@@ -49,7 +43,7 @@ void PgsSolver::schedule() {
     if (joined_) {
         for (Scheduled& scheduled : order_)
             scheduled.island = root(std::min(scheduled.first, scheduled.second));
-        std::erase_if(roots_, [this](int island) { return parent_[island] != island; });
+        std::erase_if(roots_, [this](int island) { return !sets_.is_root(island); });
         joined_ = false;
         sized_ = 0;
     }

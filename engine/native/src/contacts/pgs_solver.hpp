@@ -9,6 +9,7 @@
 #include "contacts/pgs_kernel.hpp"
 #include "contacts/pgs_rows.hpp"
 #include "linear/ahead.hpp"
+#include "linear/disjoint_sets.hpp"
 #include "linear/large_array.hpp"
 #include "linear/vec.hpp"
 #include "run/team.hpp"
@@ -104,7 +105,7 @@ private:
     void add_slip(const PgsContact& given, int place);
     double update(std::size_t contact) noexcept;
     void push(const PackedContact& contact, Vec3 impulse) noexcept;
-    int root(int body) noexcept;
+    int root(int body) noexcept { return sets_.root(body); }
     void link(int first, int second);
     void join(int first, int second);
     void schedule();
@@ -154,7 +155,7 @@ private:
     PackedFriction no_slip_{};
     PackedExtras no_extras_{};
     // Islands: bodies joined by union-find.
-    std::vector<int> parent_;
+    DisjointSets sets_;            // bodies of an island
     std::vector<Both> bodies_of_;  // of every item, joints first
     std::vector<int> roots_;       // of items
     std::vector<char> known_;      // those that are in the list, or were before they joined another

@@ -4,7 +4,8 @@
 #include <cmath>
 #include <limits>
 #include <map>
-#include <numeric>
+
+#include "linear/disjoint_sets.hpp"
 
 namespace spook {
 
@@ -81,18 +82,14 @@ void SaddleBlocks::analyse(const Nodes& nodes, const DistanceRows& rows, const O
 
 void SaddleBlocks::find_islands(const Nodes& nodes, const DistanceRows& rows) {
     const int count = static_cast<int>(nodes.size());  // which stands for all that does not float
-    std::vector<int> root(nodes.size() + 1);
-    std::iota(root.begin(), root.end(), 0);
-    const auto find = [&root](int i) {
-        while (root[i] != i) i = root[i] = root[root[i]];
-        return i;
-    };
+    DisjointSets sets;
+    sets.begin(nodes.size() + 1);
     const auto place = [&](int node) { return block_of_node_[node] < 0 ? count : node; };
-    for (const Row& row : rows.row) root[find(place(row.a))] = find(place(row.b));
-    std::vector<std::vector<int>> members(root.size());
+    for (const Row& row : rows.row) sets.join(place(row.a), place(row.b));
+    std::vector<std::vector<int>> members(nodes.size() + 1);
     for (int node = 0; node < count; ++node)
-        if (block_of_node_[node] >= 0) members[find(node)].push_back(node);
-    const int held = find(count);
+        if (block_of_node_[node] >= 0) members[sets.root(node)].push_back(node);
+    const int held = sets.root(count);
     islands_.clear();
     for (int k = 0; k <= count; ++k)
         if (k != held && members[k].size() > 1) islands_.push_back(std::move(members[k]));
