@@ -5,20 +5,17 @@
 #include <cmath>
 #include <cstddef>
 
+#include "collision/tolerances.hpp"
+
 namespace spook {
 
 namespace {
 
-constexpr std::size_t few = 32;    // below, a grid costs more than comparing all
-constexpr int most_levels = 31;    // what is larger than the cells of the last is compared with all
-constexpr std::size_t many = 512;  // worth several threads
-constexpr double furthest = 1e9;   // cells from the origin; what lies further counts as there
-constexpr double fatness = 0.1;    // of the cells of level 0: by so much bounds are enlarged on every side,
-constexpr double fast = 1.0;       //   but for those that got further out than this part of it in one call
-constexpr double loose = 4.0;      // times that much: bounds as far inside theirs get new ones
-constexpr std::size_t few_of = 2;  // those that escape are searched for alone up to one in so many
-constexpr int most_coarse = 8;     // of them that are to be compared with all,
-constexpr std::int64_t most_rows = 100;  //   since they reach more rows of smaller cells, or longer ones
+using namespace tolerances::broad_phase;
+
+constexpr std::size_t few = 32;  // bodies: below, a grid costs more than comparing all
+constexpr std::int64_t most_rows =
+    100;  // of smaller cells: what reaches more, or longer ones, is compared with all
 static_assert(most_rows < static_cast<std::int64_t>(std::bit_ceil(2 * few + 1)),
               "no row is as long as the table");
 

@@ -4,12 +4,13 @@
 
 #include "collision/narrow_phase.hpp"
 #include "collision/shape_cast.hpp"
+#include "collision/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr std::size_t most_grown = 256;  // bodies looked for one by one: beyond, all anew is cheaper
+using namespace tolerances::detection;
 
 std::uint64_t pair_key(int i, int j) noexcept {
     return (static_cast<std::uint64_t>(std::min(i, j)) << 32) | static_cast<std::uint64_t>(std::max(i, j));

@@ -7,6 +7,7 @@
 #include "collision/cylinder.hpp"
 #include "collision/segment.hpp"
 #include "collision/solid_pairs.hpp"
+#include "collision/tolerances.hpp"
 #include "collision/triangle.hpp"
 #include "linear/elementary.hpp"
 
@@ -16,7 +17,8 @@ namespace {
 
 constexpr Polytope::Edge only_edge{0, 1, 0, 0};
 constexpr Polytope::Edge round_triangle[3] = {{0, 1, 0, 1}, {1, 2, 0, 1}, {2, 0, 0, 1}};
-constexpr double parallel = 1e-9;  // sine of an angle that is none
+
+using namespace tolerances::frustum;
 
 /// Parts of a turn, from −π to π.
 struct Circle {

@@ -2,6 +2,8 @@
 
 #include <algorithm>
 
+#include "collision/tolerances.hpp"
+
 namespace spook {
 
 Patch facing(const Frustum& frustum, Vec3 n, Vec3 other) noexcept {
@@ -51,8 +53,7 @@ Patch facing(const Facets& facets, Vec3 n) noexcept {
 
 namespace {
 
-constexpr double level =
-    1e-12;  // sine of a slope that is rounding: of a line far longer than thick more than the slop
+using namespace tolerances::overlay;
 
 /// Numbers of a corner of the first (0) or second (1) patch, and of the first of two points on a side. Those beyond
 /// eight stand behind all others.

@@ -6,6 +6,7 @@
 #include "collision/frustum.hpp"
 #include "collision/manifold.hpp"
 #include "collision/segment.hpp"
+#include "collision/tolerances.hpp"
 
 namespace spook {
 
@@ -36,9 +37,5 @@ Segment lowest_line(const Facets& facets, Vec3 n, int edge, double slop) noexcep
 /// Where two lines or points meet along `n` (from first to second): one point, or two where they lie along each other.
 Manifold lines(const Segment& first, const Segment& second, Vec3 n, double gap, double radius,
                double margin) noexcept;
-
-/// Flats win near ties, so that what rests on one does not jump to its edge: within this part of the thickness.
-constexpr double prefer_flat = 1e-5;
-constexpr double overlay_slop = 1e-7;  // of the thickness
 
 }  // namespace spook

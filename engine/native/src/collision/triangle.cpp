@@ -3,13 +3,13 @@
 #include <algorithm>
 
 #include "collision/segment.hpp"
+#include "collision/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr double level = 1e-9;  // sine of a slope that is none
-constexpr double bent = 1e-7;   // sine from which two faces are no longer one
+using namespace tolerances::triangle;
 
 }  // namespace
 

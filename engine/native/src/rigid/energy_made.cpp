@@ -7,14 +7,13 @@
 #include <cstdio>
 
 #include "rigid/rigid_system.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr double MOST_GAINED = 0.05;  // of the largest kinetic energy
-constexpr double ROUNDING = 1e-9;     // of the energy, which counts heights from anywhere
-constexpr double OVERSTEPPED = 1e-9;  // m or rad, of rows and overlaps
+using namespace tolerances::energy_made;
 
 }  // namespace
 

@@ -10,13 +10,13 @@
 #include <numeric>
 
 #include "rigid/rigid_system.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr double ASIDE = 1e-6;  // of the energy of its spin: what a body has by going round its joint
-constexpr double TAUT = 0.3;    // of h² F / (m r): a body that is lighter than this for its load is loaded
+using namespace tolerances::geometric_stiffness;
 
 /// x of A x = b for a symmetric A, the last two unknowns first: the first entry may be smaller by any factor.
 Vec3 solved(const Mat3& a, Vec3 b) noexcept {

@@ -7,12 +7,13 @@
 #include <cmath>
 
 #include "rigid/rigid_system.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr double again = 1e-9;  // of a stop's rebound: slower than this it is not hit again in the step
+using namespace tolerances::impact;
 
 }  // namespace
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 
 #include "linear/vec.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
 
@@ -115,8 +116,6 @@ template <int I> inline void soften(double* k, double softness) noexcept {
     k[at(I, 0)] *= keeps, k[at(I, 1)] *= keeps, k[at(I, 2)] *= keeps;
     k[at(I, 3)] *= keeps, k[at(I, 4)] *= keeps, k[at(I, 5)] *= keeps;
 }
-
-inline constexpr double SLIGHT = 1e-17;  // of the square of a tilt: what K need not know of it
 
 /// K from N for the softness along and about all axes, and the rest of it about the tilt.
 inline void soften_all(Inertia6& m, const double* softness, Vec3 tilt, double tilt_softness) noexcept {

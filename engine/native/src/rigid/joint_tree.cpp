@@ -5,14 +5,13 @@
 #include <cmath>
 
 #include "rigid/rotation.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr int MOST_IN_A_TREE = 12;  // coordinates: beyond it blocks of bodies and rows are cheaper
-constexpr int MOST_ROWS = 200;      // that close loops
-constexpr int FARTHEST = 24;        // off the diagonal: wider bands cost more than blocks
+using namespace tolerances::joint_tree;
 
 /// Whether the joint holds both bodies where they are at the start.
 bool at_one_place(const JointConstants& joint) noexcept {

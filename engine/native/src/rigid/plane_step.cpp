@@ -6,14 +6,13 @@
 #include <utility>
 
 #include "linear/elementary.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr double ROUNDING = 4e-16;  // of a unit vector
-constexpr double IN_PLANE = 1e-14;  // of a state, which may come from a run in space
-constexpr double DOUBTFUL = 1e-4;   // of a row's diagonal: a pivot below has lost four digits
+using namespace tolerances::plane_step;
 
 }  // namespace
 

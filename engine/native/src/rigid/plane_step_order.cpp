@@ -4,12 +4,13 @@
 #include <utility>
 
 #include "rigid/plane_step.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr std::size_t WIDEST = 12;  // columns of the envelope, in the mean: beyond, blocks are as fast
+using namespace tolerances::plane_step_order;
 
 }  // namespace
 

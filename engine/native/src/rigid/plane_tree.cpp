@@ -6,12 +6,13 @@
 
 #include "linear/elementary.hpp"
 #include "rigid/joint_rounds.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr double FARTHEST = 0.3;  // cosine of half the turn of a joint in a stage
+using namespace tolerances::plane_tree;
 
 HalfTurn half_turn(double angle) noexcept {
     const SineCosine half = sine_cosine(0.5 * angle);

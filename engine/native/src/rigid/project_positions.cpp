@@ -22,18 +22,13 @@
 #include <cmath>
 
 #include "rigid/rigid_system.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr int most_rounds = 10;         // of Newton's method
-constexpr double held = 1e-13;          // of a joint's size: a violation that is rounding
-constexpr double nearly_held = 1e-11;   // and what may be left where rounding is worse
-constexpr int most_halvings = 4;        // of the displacement
-constexpr double rounding = 4e-16;      // of the energy
-constexpr int max_projections = 4;      // of a step
-constexpr std::size_t few_members = 8;  // bodies of an island: most are no larger
+using namespace tolerances::project_positions;
 
 Vec3 solved(const Mat3& a, Vec3 b) noexcept {
     const Vec3 x{a.m[0], a.m[3], a.m[6]}, y{a.m[1], a.m[4], a.m[7]}, z{a.m[2], a.m[5], a.m[8]};

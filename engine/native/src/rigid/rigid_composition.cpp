@@ -17,17 +17,14 @@
 #include <limits>
 
 #include "rigid/rigid_system.hpp"
+#include "rigid/tolerances.hpp"
 #include "run/composition.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr int DIFFERENCES = 8;        // of a stage's forces from step to step, the zeroth included
-constexpr double MOST_OF_RATE = 2.0;  // of τ² times the tension's rate: a stage τ is unstable above 4
-constexpr int MOST_PARTS = 1024;
-constexpr double NEAR = 1.0 / 64.0;              // of that: nearer than this tension is looked at often
-constexpr std::int64_t OFTEN = 8, SELDOM = 256;  // steps
+using namespace tolerances::rigid_composition;
 
 }  // namespace
 

@@ -7,17 +7,13 @@
 #include <limits>
 
 #include "rigid/rigid_system.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr double SETTLED = 2e-15;  // of the joint's size: rounding level
-constexpr int MOST_ITERATIONS = 30;
-constexpr int MIXED = 6;             // rounds that are remembered
-constexpr double SINGULAR = 1e-4;    // of its scale: pivots below it belong to rows that become redundant
-constexpr double FARTHEST = 0.3;     // of the joint's size, at the prediction: beyond it lie other solutions
-constexpr std::uint64_t DENSE = 24;  // rows up to which one dense matrix is cheaper than blocks
+using namespace tolerances::rigid_hold;
 
 }  // namespace
 

@@ -10,21 +10,13 @@
 #include <numeric>
 
 #include "rigid/rigid_system.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr double NEARLY = 1e-4;  // of a row's diagonal: an angle of 1e-2 between rows
-// Joints of a loop: rows of longer ones move each other by less and less, as 1/n².
-constexpr double FEW = 10.0;
-constexpr std::int64_t SOON = 8,
-                       LATE = 64;  // steps to the next look; and where half of the motion goes in one
-constexpr double LITTLE = 1e-2;    // of what is too much: then the next look has twice the time
-constexpr double TAKEN = 0.25;     // of the largest energy of motion, by rows that should take none
-constexpr double AT_REST = 1e-6;   // of what the loads of a step would set in motion: such motion is none
-constexpr double HELD = 0.1;       // of what the loads would set in motion
-constexpr double TOLD = 1e-3;      // of the largest share: a joint that is named
+using namespace tolerances::rigid_locking;
 
 }  // namespace
 

@@ -14,13 +14,12 @@
 #include <cmath>
 
 #include "linear/elementary.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
 namespace {
 
-constexpr double PART = 0x1p-4;  // rad: up to here series and quadrature are exact to rounding
-constexpr double STRETCH = 4.0;  // rad: what its start's invariants serve for; rounding leaves them slowly
-constexpr double FAR = 1000.0;   // rad
+using namespace tolerances::rotation;
 
 Vec3 times(Vec3 a, Vec3 b) noexcept { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
 

@@ -17,12 +17,13 @@
 #include <cmath>
 
 #include "rigid/rigid_system.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr double far = 1e3;  // m: as far out may a sleeper lie on a plane that begins to turn
+using namespace tolerances::sleep;
 
 }  // namespace
 

@@ -13,13 +13,13 @@
 // Steps of mechanisms that stay in a plane do the same by numbers of that plane (rigid_plane.cpp). Compositions of higher order
 // (rigid_composition.cpp) have stages of their own.
 #include "rigid/rigid_system.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr std::size_t looking_from =
-    16;  // bodies: steps of fewer that cannot touch are too short for a look at the clock in each
+using namespace tolerances::step;
 
 }  // namespace
 

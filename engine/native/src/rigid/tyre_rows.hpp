@@ -10,10 +10,9 @@
 #pragma once
 
 #include "rigid/joint_rows.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
-
-inline constexpr double CREEP = 1e-3;  // m/s
 
 /// How a wheel stands on its road: axes of the footprint, its height over the road (negative: pressed in) and how far it is
 /// from both centres.

@@ -6,13 +6,13 @@
 #include <algorithm>
 
 #include "rigid/rigid_system.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-constexpr double rounding =
-    1e-6;  // of sleep_speed: a path that stands still leaves bodies that follow it such speeds
+using namespace tolerances::wake;
 
 }  // namespace
 
