@@ -274,6 +274,7 @@ $(VENV)/installed: $(VENV)/source-state | $(BIN)/pip
 $(VENV)/developed: $(VENV)/source-state | $(BIN)/pip
 	@version="$$(sh .ci/version)" && { [ -z "$$version" ] || export VCS_VERSIONING_PRETEND_VERSION="$$version"; } && \
 	    echo "installing into $(VENV), with the tools of development" && $(BIN)/pip install -q -e '.[dev]'
+	@ln -sf "$$(cd build && ls -t cp*/compile_commands.json | head -n 1)" build/compile_commands.json  # where clangd looks
 	@touch $(VENV)/installed $@
 
 # What compiles and reads C++ without Python: what needs no more need not wait for the rest.
