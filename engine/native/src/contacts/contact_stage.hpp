@@ -470,7 +470,7 @@ private:
     std::vector<double> predicted_sinking_;  // what unsettled iterations would add to it in the step, m
     std::vector<Contact> scratch_;
     std::vector<int> points_of_, points_begin_;  // points by moving body, and where each one's begin
-    DisjointSets connected_;  // bodies, by contacts and joints
+    DisjointSets connected_;                     // bodies, by contacts and joints
     std::vector<std::uint64_t> known_;
     std::vector<double> toi_fraction_, event_time_;
     std::vector<double> clock_;  // of successive impacts: up to when a body's way in the step is known, s
