@@ -37,7 +37,7 @@ OUTPUTS = [
     (("--out", "theirs"), "theirs"),
     (("--out", "file/public"), "no folder one may write to|not a folder"),
     (("--json", "loop"), "loop is a link that leads back to itself"),
-    (("--junit", "pipe"), "pipe is a pipe that nobody may read; name a file"),
+    (("--junit", "pipe"), "pipe is a pipe that cannot be read; name a file"),
     (("--json", "old.db"), "old.db is a database; name another file"),
 ]
 

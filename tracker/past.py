@@ -151,7 +151,7 @@ def _by_questions_of(
     families = {FAMILIES[definition.kind] for definition, _ in stored.values()}
     try:
         if not commit or old.engine.dirty:
-            raise CommitError(f"run {old.id[:8]} is of no commit: nobody knows any more what it asked")
+            raise CommitError(f"run {old.id[:8]} is of no commit: its questions cannot be read any more")
         document = ask(commit, tests, *(f"--{more}" for more in ("sweep", "stability") if more in families))
         if document.engine.git_hash != run.engine.git_hash:
             raise CommitError(

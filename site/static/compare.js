@@ -90,7 +90,7 @@
     };
   }
 
-  // Two engines: what each says to every gate, and who keeps its limit. Nothing is red, somebody is nearer.
+  // Two engines: each one's value of every gate, and whether it keeps the limit. Nothing is red, one is nearer.
   const APART = 0, NEITHER = 1, UNANSWERED = 2, BOTH = 3;  // worst first
 
   function answer(sample) {
@@ -132,7 +132,7 @@
       make("p", { class: "sub" }, versions[i].label + " → " + versions[j].label),
       make("div", { class: "title-row" }, make("h2", {}, "Two engines on the same questions")),
       make("p", {}, [0, 1].map((side) => `${names[side]} keeps ${kept[side]} of ${answered[side]} limits it has an answer to`).join("; ") + "."),
-      make("p", { class: "small soft" }, "Engines are not held to each other’s values: nothing here is red. Who is ahead at equal error stands on the page ", make("a", { href: "engines.html" }, "Engines"), "."),
+      make("p", { class: "small soft" }, "Engines are not held to each other’s values: nothing here is red. Which is ahead at equal error stands on the page ", make("a", { href: "engines.html" }, "Engines"), "."),
       ...listed("Every gate that one of them was asked; first those that one of them breaks.", [["Gate"], [names[0], "num"], [names[1], "num"], ["Who keeps the limit"]], shown, row));
     folds(told);
   }

@@ -71,7 +71,7 @@ function standing(definition, sample) {
   return told.held || definition.set_point === null ? "pass" : "watch";
 }
 
-// For its limit alone, whoever's value it is.
+// For its limit alone, whichever engine's value it is.
 function againstLimit(definition, sample) {
   if (sample.outcome === "not_supported") { return "none"; }
   if (!honest(sample).passed) { return "fail"; }

@@ -428,7 +428,7 @@ function late() {
   if (!note) { return; }
   const days = Math.floor((Date.now() - Date.parse(note.dataset.started)) / 864e5);
   if (days >= 2) {
-    note.textContent = `The newest night is ${days} days old. Either nobody measured since, or the nightly job has stopped.`;
+    note.textContent = `The newest night is ${days} days old. Nothing was measured since, or the nightly job has stopped.`;
     note.hidden = false;
   }
 }
@@ -455,5 +455,5 @@ switches();
 openDetails();
 late();
 document.querySelectorAll(".scroll > svg.nights").forEach((svg) => { svg.parentElement.scrollLeft = svg.parentElement.scrollWidth; });
-// The page says itself when every script has run: whoever drives it need not guess.
+// The page says itself when every script has run: a test that drives it need not guess.
 document.addEventListener("DOMContentLoaded", () => { document.documentElement.dataset.ready = ""; });

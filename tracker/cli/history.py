@@ -109,7 +109,7 @@ def compare(
     """Say what changed between two versions.
 
     V is an engine version, a git tag, the start of a commit hash, a run id, latest, previous or last-green; or V1 and
-    V2 are two engines by name, which are ranked: at equal error, who is ahead where and by what factor.
+    V2 are two engines by name, which are ranked: at equal error, which is ahead where and by what factor.
     Previous to the latest is the run before it on its own branch.
     V1 may be fork-point: the nearest measured commit of the main line that V2 builds on. The formats comment and
     annotations are for pull requests, and empty when nothing became worse.

@@ -439,7 +439,7 @@ def refuse_unwritable(*files: Path | None) -> None:
         if file.is_symlink() and _leads_back(file):
             raise TrackerError(f"{file} is a link that leads back to itself; name a file")
         if file.is_fifo() and not file.is_relative_to("/dev"):  # there a shell has a reader behind it
-            raise TrackerError(f"{file} is a pipe that nobody may read; name a file")
+            raise TrackerError(f"{file} is a pipe that cannot be read; name a file")
         if folder.exists() and not folder.is_dir():
             raise TrackerError(f"{folder} is not a folder; choose another place")
         if not folder.is_dir():

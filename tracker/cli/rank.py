@@ -42,7 +42,7 @@ def rank(engines: tuple[str, ...], tests: tuple[str, ...], database: str) -> Non
 
 
 def table_lines(history: History, names: Sequence[str], tests: Sequence[str] = ()) -> list[str]:
-    """The table, of these tests alone if some are named, and between two engines who is ahead where."""
+    """The table, of these tests alone if some are named, and between two engines which is ahead where."""
     from fnmatch import fnmatchcase
 
     import spook_tracker.tracker.judge.rank as ranks
@@ -125,7 +125,7 @@ def _time(seconds: float | None) -> str:
 
 
 def _ahead(leads: Sequence[Lead], errors: Sequence[float]) -> list[str]:
-    """Scenes down, errors across: who gets there first, and by what factor."""
+    """Scenes down, errors across: which gets there first, and by what factor."""
     from spook_tracker.tracker.cli.console import Column, table, width
 
     if not leads:
