@@ -53,6 +53,9 @@ FAMILIES = {
     "work": "work",
 }
 
+STEP_COSTS = tuple(  # of an example scene (tracker/measure/step_cost.py): configuration and metric; sweeps alone measure them
+    ("example", name) for name in ("leaving_out", "real_time_factor", "worst_step_time", "memory")
+)
 OF_TIMES = ("values", "sweep")  # of a run that does not say what it was asked for, either may tell
 
 
@@ -60,6 +63,8 @@ def families_of(definition: SeriesDefinition) -> tuple[str, ...]:
     """With which families a series is asked for; none where nobody misses it, as what is read off a ladder's clock."""
     if definition.kind != "time":
         return (FAMILIES[definition.kind],)
+    if (definition.configuration, definition.metric) in STEP_COSTS:
+        return ("sweep",)
     return () if is_read_off(definition) else OF_TIMES
 
 
