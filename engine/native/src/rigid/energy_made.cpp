@@ -1,5 +1,5 @@
 // Energy that comes out of nothing: an outcome, not "completed". Asked of the methods whose rows can add to it and that keep it else:
-// compositions, whose final state tells, and corrections beside contacts and rows with bounds, which may gain and lose on the way.
+// compositions, whose final state tells, and corrections, which may gain and lose on the way.
 //
 // reads: places and velocities of bodies, drives. writes: what the run has known of its energy.
 #include <algorithm>
@@ -21,7 +21,7 @@ void RigidSystem::begin_energy() {
     live_.energy.most_kinetic = kinetic_energy();
     live_.energy.begun = live_.energy.most = live_.energy.most_kinetic + potential_energy();
     live_.energy.is_powered = false;
-    if (!curved_) return;
+    if (!corrected_) return;
     // Of rows that begin violated, and of limits that begin overstepped, nothing says how much they give.
     double off[6];
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k) {
@@ -45,6 +45,8 @@ bool RigidSystem::has_power() const noexcept {
 /// After a step: what it came to, where position and velocity are of one moment.
 void RigidSystem::note_energy() {
     if (half_step_ || live_.energy.is_powered) return;
+    if (!curved_ && live_.moved % LOOKS != 0) return;  // in a plane to look costs a tenth of a step
+    if (at_hand_) write_plane();
     live_.energy.is_powered = has_power() || (live_.moved == 1 && penetration() > OVERSTEPPED);
     const double kinetic = kinetic_energy();
     live_.energy.most_kinetic = std::max(live_.energy.most_kinetic, kinetic);
@@ -53,12 +55,13 @@ void RigidSystem::note_energy() {
 
 /// Asked once the final state was read.
 void RigidSystem::judge_energy(RunReport& report) const {
-    if (!(composed_ || curved_) || report.status != Status::completed || constrained_.empty()) return;
+    if (!(composed_ || corrected_) || report.status != Status::completed || constrained_.empty()) return;
     if (live_.energy.is_powered || has_power()) return;
     const double kinetic = kinetic_energy(), most = std::max(live_.energy.most_kinetic, kinetic);
-    const double reached = composed_ ? kinetic + potential_energy() : live_.energy.most;
+    double reached = composed_ || !half_step_ ? kinetic + potential_energy() : live_.energy.most;
+    if (!composed_) reached = std::max(reached, live_.energy.most);
     double least = ROUNDING * std::abs(live_.energy.begun);
-    if (curved_) {  // what a step's fall is worth: the first order of the step
+    if (corrected_) {  // what a step's fall is worth: the first order of the step
         const double fall = h_ * norm(gravity_);
         for (const int i : constrained_)
             if (constants_[i].moves()) least += constants_[i].mass * fall * fall;

@@ -82,7 +82,7 @@ void RigidSystem::end_step() {
     ++live_.moved;
     if (at_hand_ && joints_.follows()) write_plane();
     joints_.follow(live_.bodies);
-    if (curved_) note_energy();
+    if (corrected_) note_energy();
 }
 
 }  // namespace spook

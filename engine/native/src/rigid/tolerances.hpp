@@ -12,6 +12,8 @@ namespace tolerances::energy_made {
 inline constexpr double MOST_GAINED = 0.05;  // of the largest kinetic energy
 inline constexpr double ROUNDING = 1e-9;     // of the energy, which counts heights from anywhere
 inline constexpr double OVERSTEPPED = 1e-9;  // m or rad, of rows and overlaps
+inline constexpr int LOOKS =
+    16;  // steps of joints alone from one look to the next: one costs a tenth of a plane step
 }  // namespace tolerances::energy_made
 
 // geometric_stiffness.cpp
