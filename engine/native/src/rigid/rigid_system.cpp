@@ -131,8 +131,8 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
         stops_are_apart(joints_, solver_index_, static_cast<int>(constrained_.size())))
         joints_.let_stops_fold();
     corrected_ = method_.corrections > 0 && !composed_ && rows_ > 0;
-    curved_ = corrected_ &&
-              (solver_ != RigidSolver::block || (fresh_contacts_ && fresh_contacts_->possible()));
+    curved_ =
+        corrected_ && (solver_ != RigidSolver::block || (fresh_contacts_ && fresh_contacts_->possible()));
     if (solver_ == RigidSolver::block && !composed_ && !half_step_ && !stiff_ && method_.corrections == 0 &&
         !(method_.sleep_speed > 0.0))
         locked_.analyse(constants_, joints_, constrained_);
