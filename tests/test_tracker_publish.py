@@ -340,7 +340,10 @@ def test_values_without_a_description_have_a_page_too(tmp_path: Path) -> None:
     bare = msgspec.structs.replace(document(0), tests=())
     publish(DocumentHistory([bare]), tmp_path / "public")
 
-    assert "said nothing about the scene" in (tmp_path / "public" / "tests" / "beam.html").read_text()
+    assert (
+        "No description of the scene was recorded."
+        in (tmp_path / "public" / "tests" / "beam.html").read_text()
+    )
     assert Reader((tmp_path / "public" / "index.html").read_text()).open == []
 
 

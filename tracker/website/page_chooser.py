@@ -36,14 +36,14 @@ USES: Mapping[str, tuple[str, ...]] = {  # every test of the catalogue that has 
     ),
     "Robots and chains of joints": (
         "pendulum", "n_pendulum", "simple_pendulum", "double_pendulum", "swinging_door", "door", "motor", "robot_arm", "arm_path",
-        "loaded_rods", "hanging_chain", "spinning_top", "steady_turns",
+        "loaded_rods", "hanging_chain", "spinning_top", "steady_turns", "bar_pendulum", "seconds_pendulum",
     ),
     "Mechanisms with loops": (
         "four_bars", "squeezer", "bricard", "governor", "slider_crank", "loose_bearing", "scissor_lift", "gears", "lock_ring",
     ),
     "Vehicles and rolling": (
         "vehicle", "climb", "suspension", "cornering", "rolling_sphere", "rolling_friction", "rolling_coin", "rolling_log", "bowl",
-        "seams",
+        "seams", "rolling_beats",
     ),
     "Gripping, sliding, conveying": (
         "friction", "slip_angle", "force_ratio", "edge_roll", "grasp", "grain", "conveyor", "turntable", "sorting",
@@ -54,7 +54,7 @@ USES: Mapping[str, tuple[str, ...]] = {  # every test of the catalogue that has 
     ),
     "Flight and impacts": (
         "falling_object", "planetarium", "rotating_box", "thrown_die", "bouncing_ball", "billiards", "floating_box",
-        "sinking_sphere",
+        "sinking_sphere", "last_bounce",
     ),
 }  # fmt: skip
 

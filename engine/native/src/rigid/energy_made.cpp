@@ -21,7 +21,7 @@ void RigidSystem::begin_energy() {
     live_.energy.most_kinetic = kinetic_energy();
     live_.energy.begun = live_.energy.most = live_.energy.most_kinetic + potential_energy();
     live_.energy.is_powered = false;
-    if (!corrected_) return;
+    if (composed_) return;
     // Of rows that begin violated, and of limits that begin overstepped, nothing says how much they give.
     double off[6];
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k) {
@@ -55,13 +55,14 @@ void RigidSystem::note_energy() {
 
 /// Asked once the final state was read.
 void RigidSystem::judge_energy(RunReport& report) const {
-    if (!(composed_ || corrected_) || report.status != Status::completed || constrained_.empty()) return;
+    if (!(composed_ || method_.corrections > 0) || report.status != Status::completed || constrained_.empty())
+        return;
     if (live_.energy.is_powered || has_power()) return;
     const double kinetic = kinetic_energy(), most = std::max(live_.energy.most_kinetic, kinetic);
     double reached = composed_ || !half_step_ ? kinetic + potential_energy() : live_.energy.most;
     if (!composed_) reached = std::max(reached, live_.energy.most);
     double least = ROUNDING * std::abs(live_.energy.begun);
-    if (corrected_) {  // what a step's fall is worth: the first order of the step
+    if (!composed_) {  // what a step's fall is worth: the first order of the step
         const double fall = h_ * norm(gravity_);
         for (const int i : constrained_)
             if (constants_[i].moves()) least += constants_[i].mass * fall * fall;

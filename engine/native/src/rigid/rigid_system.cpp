@@ -130,9 +130,8 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     if ((!fresh_contacts_ || !fresh_contacts_->possible()) &&
         stops_are_apart(joints_, solver_index_, static_cast<int>(constrained_.size())))
         joints_.let_stops_fold();
-    corrected_ = method_.corrections > 0 && !composed_ && rows_ > 0;
-    curved_ =
-        corrected_ && (solver_ != RigidSolver::block || (fresh_contacts_ && fresh_contacts_->possible()));
+    curved_ = method_.corrections > 0 && !composed_ && rows_ > 0 &&
+              (solver_ != RigidSolver::block || (fresh_contacts_ && fresh_contacts_->possible()));
     if (solver_ == RigidSolver::block && !composed_ && !half_step_ && !stiff_ && method_.corrections == 0 &&
         !(method_.sleep_speed > 0.0))
         locked_.analyse(constants_, joints_, constrained_);
@@ -234,7 +233,7 @@ void RigidSystem::reset(StageClock* clock) {
     mixed_ = MixedSystem{};
     mixed_values_ = solver_ != RigidSolver::block;
     if (composed_) start_composition();
-    if (composed_ || corrected_) begin_energy();
+    if (composed_ || method_.corrections > 0) begin_energy();
     if (stiff_) find_tensions();
     const bool may_touch = contacts_ && contacts_->possible();  // or the stage is only forced in
     if (half_step_ || method_.corrections > 0) {

@@ -422,8 +422,7 @@ private:
     // Beyond plain SPOOK; all per row of matrix_ unless said otherwise.
     bool composed_ = false, half_step_ = false, stiff_ = false, velocities_seen_ = false;
     LargeArray<BodyState> trial_;          // per body
-    bool corrected_ = false;               // whether a step corrects its rows
-    bool curved_ = false;                  // whether curve_rows() does it
+    bool curved_ = false;                  // whether curve_rows() does the corrections
     LargeArray<BodyState> from_, behind_;  // per body
     std::vector<double> bent_,
         bend_;  // what curve_rows() takes from the right sides: for the way here, and in all

@@ -82,7 +82,7 @@ void RigidSystem::end_step() {
     ++live_.moved;
     if (at_hand_ && joints_.follows()) write_plane();
     joints_.follow(live_.bodies);
-    if (corrected_) note_energy();
+    if (method_.corrections > 0 && !composed_) note_energy();
 }
 
 }  // namespace spook
