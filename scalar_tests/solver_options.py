@@ -230,7 +230,7 @@ TEST = ScalarTest(
     ),
     theory=(
         "Work shared among threads is the same work. A cap that nothing reaches caps nothing.",
-        "A threshold is kept by more sweeps where that can be; who keeps it is settled.",
+        "A threshold is kept by more sweeps where that can be; a run within it is settled.",
         "What falls freely is not at rest at the top. On a smooth slope it is slower than s for 2 s/(g sin α): with s below half "
         "of g sin α times sleep_after it does not sleep.",
     ),
@@ -261,7 +261,7 @@ TEST = ScalarTest(
                     "moved_asleep",
                     "largest move of a box of the stack once asleep",
                     "m",
-                    "who sleeps keeps every bit",
+                    "a sleeping body keeps every bit",
                 ),
                 error(
                     "load_asleep",
@@ -288,7 +288,7 @@ TEST = ScalarTest(
                     "misreported",
                     "runs that left more than their threshold or are called unsettled, of four",
                     "1",
-                    "who left no more than the threshold is settled; sweeps go on until then",
+                    "a run that left no more than the threshold is settled; sweeps go on until then",
                 ),
             ),
             "A heap with too few sweeps.",

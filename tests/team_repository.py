@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "pebble"
+AUTHOR = ("-c", "user.name=Ada Example", "-c", "user.email=ada@example.org")
 GRAVITY = "velocities[p] += time_step * gravity[p % 3];"
 BUILD = "mkdir -p build && c++ -O1 -shared -fPIC -o build/libpebble.so src/pebble.cpp"
 SETTINGS = f"""engine = "tracking.adapter"
@@ -20,8 +21,8 @@ command = "{BUILD}"
 
 
 def git(folder: Path, *words: str) -> str:
-    who = ("-c", "user.name=Somebody", "-c", "user.email=somebody@example.org")
-    done = subprocess.run(["git", *who, *words], cwd=folder, capture_output=True, text=True, check=False)
+    """What git prints, asked in `folder`; a commit has an author, whatever the machine is set up for."""
+    done = subprocess.run(["git", *AUTHOR, *words], cwd=folder, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()
 

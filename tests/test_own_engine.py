@@ -12,6 +12,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.team_repository import git
+
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "pebble"
 CMAKE = shutil.which("cmake", path=f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}")
 
@@ -25,13 +27,6 @@ def called(folder: Path, *command: str) -> subprocess.CompletedProcess[str]:
 
 def tracker(folder: Path, *words: str) -> subprocess.CompletedProcess[str]:
     return called(folder, sys.executable, "-m", "spook_tracker", *words)
-
-
-def git(folder: Path, *words: str) -> str:
-    who = ("-c", "user.name=Somebody", "-c", "user.email=somebody@example.org")
-    done = called(folder, "git", *who, *words)
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip()
 
 
 @pytest.fixture(scope="module")

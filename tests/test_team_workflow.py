@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 
 yaml = pytest.importorskip("yaml", reason="PyYAML is not installed here")
+from tests.team_repository import git  # noqa: E402
 from tests.workflow_service import Service  # noqa: E402 (needs yaml)
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -38,13 +39,6 @@ case "$*" in
 esac
 """
 AUDITOR = Path(sys.executable).with_name("zizmor")
-
-
-def git(folder: Path, *words: str) -> str:
-    who = ("-c", "user.name=Somebody", "-c", "user.email=somebody@example.org")
-    done = subprocess.run(["git", *who, *words], cwd=folder, capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout.strip()
 
 
 class Team:

@@ -42,7 +42,7 @@ def test_the_first_bad_of_a_dozen_commits_is_found_in_the_range_that_the_history
     assert nights.exit_code == 0, nights.output
     assert nights.output.count("1 of 1 values, recorded as run") == 2
     assert shown.exit_code == 1, shown.output
-    assert f"first bad commit {pebble.commits[6][:12]}: Change number 6 (Somebody)" in shown.output
+    assert f"first bad commit {pebble.commits[6][:12]}: Change number 6 (Ada Example)" in shown.output
     assert f"{pebble.commits[2][:12]} answers its own questions" in shown.output, (
         "the accused range begins there"
     )

@@ -17,6 +17,7 @@ from click.testing import CliRunner, Result  # noqa: E402
 from spook_tracker.engine.build_info import build_info  # noqa: E402
 from spook_tracker.tracker.beginning import Home, first_files, home  # noqa: E402
 from spook_tracker.tracker.cli.main import main  # noqa: E402
+from tests.team_repository import git  # noqa: E402
 from tests.workflow_service import Service  # noqa: E402 (needs yaml)
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -27,12 +28,6 @@ WRITTEN = ["tracking/__init__.py", "tracker.toml", ".github/workflows/physics.ym
 def init(folder: Path, monkeypatch: pytest.MonkeyPatch, *words: str) -> Result:
     monkeypatch.chdir(folder)
     return CliRunner().invoke(main, ["init", *words])
-
-
-def git(folder: Path, *words: str) -> str:
-    author = ("-c", "user.name=Somebody", "-c", "user.email=somebody@example.org")
-    done = subprocess.run(["git", *author, *words], cwd=folder, capture_output=True, text=True, check=True)
-    return done.stdout.strip()
 
 
 def called(folder: Path) -> dict:

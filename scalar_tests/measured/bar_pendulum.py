@@ -146,7 +146,7 @@ def _draw(simulate: Simulate) -> Drawing:
 TEST = ScalarTest(
     title="Bar pendulum, measured",
     question="Do bars of toy bricks swing as slowly as two kinds of clock have it?",
-    why="A period joins gravity, inertia, a hinge and the clock. Nobody fitted anything: a ruler is all that goes in.",
+    why="A period joins gravity, inertia, a hinge and the clock. Nothing was fitted: a ruler is all that goes in.",
     model="Bars of 50 to 70 bricks hang by their end and are let go some ten degrees from the vertical.",
     parameters=(
         ("bars", "0.48 to 0.672 m long, uniform, 8 mm thick"),

@@ -51,7 +51,7 @@ ORDER_4 = Method(composition="order4")
 TIME_STEP = 1.0 / 120.0  # s
 DURATION = 40.0  # s
 SOURCE = (
-    "Kater, Phil. Trans. 108 (1818) 33, with his later correction; gravity: Proc. R. Soc. A 213 (1952) 408"
+    "Kater, Phil. Trans. 108 (1818) 33, with its later correction; gravity: Proc. R. Soc. A 213 (1952) 408"
 )
 BEAT = math.pi * math.sqrt(LENGTH / GRAVITY) * (1.0 + SWING**2 / 16.0)  # s
 READINGS = (
@@ -137,8 +137,8 @@ TEST = ScalarTest(
     ),
     theory=(
         "A beat is π √(l/g) (1 + φ₀²/16).",
-        "σ = ½ √((0.00028/39.139)² + (1e-4/9.81)²) s: what his trials differ by, and gravity between the two places.",
-        "Left out: air and its drag, the knife edges, the height above the sea: Kater reckoned them out of his length.",
+        "σ = ½ √((0.00028/39.139)² + (1e-4/9.81)²) s: what Kater's trials differ by, and gravity between the two places.",
+        "Left out: air and its drag, the knife edges, the height above the sea: Kater reckoned them out of the length.",
     ),
     reference=f"Measured: {SOURCE} (981 196.29 mGal on the Potsdam system, less its 14.0 mGal).",
     conclusion="Green: the engine's second, metre and gravity are those of the world. Red: the pendulum runs fast or slow.",
