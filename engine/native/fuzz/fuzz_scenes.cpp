@@ -18,13 +18,8 @@ constexpr int kSteps = 12;
 // A direct solve of shapes that lie deep in each other may take seconds a step, and thirty times as long where every
 // access is watched. The engine ends it itself, and is held to that; what went further is not asked.
 constexpr double kPatience = 0.5;  // s of a run, so that ten minutes are thousands of scenes
-// s of the processor: a tenth between two questions, and a tenth until one is put; longer where threads are watched,
-// which costs up to thirty times the work.
-#ifdef __SANITIZE_THREAD__
-constexpr double kUnlooked = 6.0;
-#else
-constexpr double kUnlooked = 0.2;
-#endif
+constexpr double kUnlooked =
+    0.2;  // s of the processor: a tenth between two questions, and a tenth until one is put
 
 /// How long a run works without asking whether it is to end. Processor time: a busy machine takes nothing from it.
 class Looks {
