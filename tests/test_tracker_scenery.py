@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
+from spook_tracker.engine.couplings import Relation
 from spook_tracker.engine.forces import CentralGravity, Spring
-from spook_tracker.engine.joints import Distance, Hinge, Motor
+from spook_tracker.engine.joints import Distance, Hinge, Motor, Prismatic
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Box, Capsule, Compound, Part, Plane, Sphere
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
@@ -137,6 +138,59 @@ def test_gears_have_their_teeth_and_pitch_circles_that_touch_and_their_carrier_i
     assert outer == [40, 60], "two corners a tooth"
     assert arm.position[:2] == pytest.approx((0.125, 0.0)) and arm.size[0] > 0.25
     assert [s.kind for s in drawing(replace(scene, constraints=scene.constraints[:3])).solids] == 3 * ["box"]
+
+
+def geared(
+    terms: tuple[float, float],
+    apart: tuple[float, float, float] = (1.0, 0.0, 0.0),
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0),
+    first: tuple[str, str] = (WORLD, "a"),
+    second: type = Hinge,
+) -> Scene:
+    """Two bodies on joints of their own, and a relation between these."""
+    places = {"a": (0.0, 0.0, 0.0), "b": apart}
+    bodies = tuple(
+        RigidBody(name=n, mass=1.0, inertia=(1.0, 1.0, 1.0), position=at) for n, at in places.items()
+    )
+    joints = (
+        Hinge(name="one", between=first, axis=axis),
+        second(name="two", between=(WORLD, "b"), axis=axis),
+    )
+    mesh = Relation(name="mesh", terms=(("one", terms[0]), ("two", terms[1])))
+    return Scene(bodies=bodies, constraints=(*joints, mesh))
+
+
+@pytest.mark.parametrize(
+    ("scene", "kinds"),
+    [
+        (geared((20.0, 30.0)), ["facets", "facets"]),
+        (geared((20.0, 30.0), first=("a", WORLD)), ["facets", "facets"]),
+        (geared((0.2, 0.3), apart=(1.0, 0.0, 2.0), axis=(0.0, 1.0, 0.0)), ["facets", "facets"]),
+        (geared((20.0, -30.0)), ["box", "box"]),  # a belt, or a ring: their size is not said
+        (geared((20.0, 30.0), apart=(0.0, 0.0, 1.0)), ["box", "box"]),  # on one axle
+        (geared((20.0, 30.0), apart=(0.0, 0.0, 0.0)), ["box", "box"]),
+        (geared((1e300, 1.0)), ["box", "box"]),
+        (geared((0.5, 1.0), second=Prismatic), ["facets", "box"]),
+        (geared((1e300, 1.0), second=Prismatic), ["box", "box"]),
+    ],
+)
+def test_only_what_meshes_as_far_as_can_be_seen_is_drawn_as_gears(scene: Scene, kinds: list[str]) -> None:
+    drawn = drawing(scene)
+
+    assert [solid.kind for solid in drawn.solids] == kinds
+    assert scenery(drawn) is not None
+    axis = scene.constraints[0].axis
+    for wheel in (solid for solid in drawn.solids if solid.kind == "facets"):
+        corners = np.array([turned(wheel.orientation, c) for c in batched_corners(wheel.size)])
+        radius = np.linalg.norm(corners, axis=1).max()
+        assert np.abs(corners @ np.array(axis)).max() < 0.2 * radius, "as flat as a wheel about its axis"
+
+
+def test_a_pinion_has_the_radius_of_its_rack() -> None:
+    wheel, _ = drawing(geared((0.5, 1.0), second=Prismatic)).solids
+    reach = [math.hypot(x, y) for x, y, _ in batched_corners(wheel.size)]
+
+    assert 0.5 * (max(reach) + min(r for r in reach if r > 0.0)) == pytest.approx(0.5, rel=1e-3)
 
 
 def batched_corners(size: Sequence[float]) -> Iterator[tuple[float, ...]]:

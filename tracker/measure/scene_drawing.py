@@ -19,7 +19,7 @@ from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Compound, Shape
 from spook_tracker.tracker.document.quaternions import UPRIGHT, Quaternion, Vector, multiplied, turned
 from spook_tracker.tracker.document.run_document import DrawnLink, DrawnSolid, SceneDrawing
-from spook_tracker.tracker.measure.gear_drawing import gears_of
+from spook_tracker.tracker.measure.gear_drawing import acted_on, gears_of
 
 MOST_SOLIDS = 300
 CLOSE = 0.7  # of the way to the nearest body, a box without a surface is long at most
@@ -50,11 +50,6 @@ def drawing(scene: Scene) -> SceneDrawing:
         attractors=tuple(force.centre for force in scene.forces if isinstance(force, CentralGravity)),
         gravity=scene.gravity,
     )
-
-
-def acted_on(joint: Joint) -> str:
-    """The second body of a joint, at whose centre it is unless it says where."""
-    return next(name for name in reversed(joint.between) if name != WORLD)
 
 
 def driven_bodies(scene: Scene) -> frozenset[str]:

@@ -45,7 +45,8 @@ bool RigidSystem::has_power() const noexcept {
 /// After a step: what it came to, where position and velocity are of one moment.
 void RigidSystem::note_energy() {
     if (half_step_ || live_.energy.is_powered) return;
-    if (!curved_ && live_.moved % LOOKS != 0) return;  // in a plane to look costs a tenth of a step
+    if (!curved_ && live_.moved % LOOKS != 0)
+        return;  // in a plane each look costs a tenth of a step, and space is to answer alike
     if (at_hand_) write_plane();
     live_.energy.is_powered = has_power() || (live_.moved == 1 && penetration() > OVERSTEPPED);
     const double kinetic = kinetic_energy();
