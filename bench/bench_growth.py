@@ -249,7 +249,7 @@ def place_of(kind: str, folder: Path) -> Iterator[Place]:
     if (programs := binaries()) is None:
         raise SystemExit(MISSING)
     settings = {"shared_buffers": "512MB", "max_wal_size": "2GB", "work_mem": "64MB"}
-    settings["autovacuum"] = "off"  # its time would be taken for that of whoever asks meanwhile
+    settings["autovacuum"] = "off"  # its time would be taken for that of a query meanwhile
     with running_server(programs, settings, str(folder.parent)) as server, server.new_database() as url:
         number = int((server.folder / "data" / "postmaster.pid").read_text().split()[0])
         yield Place(url, number)

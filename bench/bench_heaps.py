@@ -71,7 +71,7 @@ PLATES = 1e-3  # s a step of fallen plates
 STILL = 1.2e-3  # s a step of a stack of 100 at rest
 ANY = 10e-3  # the same in any step that starts it or follows a knock at .5 m/s
 BOXES = 5e-3  # s a step of 1000 boxes, fallen
-ASLEEP = 0.02  # × a step of 1000 boxes at rest: nobody is looked at
+ASLEEP = 0.02  # × a step of 1000 boxes at rest: no body is looked at
 BESIDE = 0.25  # the same while one ball rolls by: they are looked for, and no more
 PACKED = ((64, Method()), (256, Method(solver="iterative")))  # spheres in a bin: 256 directly take minutes
 
@@ -334,7 +334,7 @@ def direct_at_rest() -> bool:
 
 def asleep(count: int) -> bool:
     """Fallen boxes asleep against the same awake, alone and with a ball that rolls away from them for ever."""
-    print(f"{count} boxes asleep: at most {ASLEEP} × a step awake; {BESIDE} × while somebody else is awake")
+    print(f"{count} boxes asleep: at most {ASLEEP} × a step awake; {BESIDE} × while another body is awake")
     lying = heap(count, Box((0.5, 0.5, 0.5)))
     ball = RigidBody(
         name="ball", mass=1.0, shape=BALL, position=(-50.0, 0.0, 0.25), velocity=(-1.0, 0.0, 0.0)

@@ -43,7 +43,7 @@ FIRST = datetime(2025, 12, 1, 3, 17, tzinfo=UTC)
 
 
 def other(run: RunDocument, chance: random.Random) -> RunDocument:
-    """A night whose run times, and some of whose values, nobody has seen before."""
+    """A night whose run times, and some of whose values, are new."""
 
     def changed(sample: Sample) -> Sample:
         if sample.timing is not None:

@@ -283,7 +283,7 @@ def main(arguments: list[str]) -> int:
     parser.add_argument("--workers", type=int, default=1, help="processes (default %(default)s)")
     asked = parser.parse_args(arguments)
     if asked.heaps < 1 or asked.workers < 1:
-        parser.error("there is no campaign without heaps and somebody to drop them")
+        parser.error("there is no campaign without heaps and workers to drop them")
     first = first_of_week(datetime.date.today(), asked.heaps) if asked.this_week else asked.first
     sort = "wide" if asked.wide else "bouncy" if asked.bouncy else "ordinary"
     print(f"{asked.heaps} {sort} heaps from number {first}", flush=True)

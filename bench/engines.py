@@ -199,7 +199,7 @@ def page(database: str, of_facts: str = "") -> str:
         *_asked_later(runs[OURS]),
         *_not_asked(samples[OURS]),
         *([f"On another machine, and not timed here: {elsewhere}."] if elsewhere else []),
-        f"Whoever is missing was not installed: `.ci/engines all` brings what can be had of `spook-tracker[{','.join(find.EXTRAS)}]`",
+        f"An engine that is missing was not installed: `.ci/engines all` brings what can be had of `spook-tracker[{','.join(find.EXTRAS)}]`",
         f"and, through npm, of {', '.join(find.NODE.values())}, and builds {', '.join(find.BUILT)} from its source.",
         "",
         *READING,

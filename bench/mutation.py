@@ -1,7 +1,7 @@
 """`make mutation`: change the judge's rules one at a time, and see that its tests notice; prints the score.
 
 Each mutant is a copy of the sources with one text replaced. It is killed if the tests of the judge fail, and it
-survives if they pass: then a rule stands in the code that nobody holds to. `python bench/mutation.py NAME …`
+survives if they pass: then a rule stands in the code that no test checks. `python bench/mutation.py NAME …`
 runs only those named. Ends with 1 if one survives, or no longer applies.
 """
 

@@ -4,7 +4,7 @@
 
 Every number is measured. The engine is ours behind a fault in what it is given: rods that correct half of each
 violation (tonight), friction 0.03 % too strong (five nights ago, still red), a restitution 3 % too small (three
-nights, mended). Commits, dates, subjects and authors are made up, as nobody committed these faults.
+nights, mended). Commits, dates, subjects and authors are made up, as these faults were never committed.
 """
 
 from __future__ import annotations

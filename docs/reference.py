@@ -17,7 +17,7 @@ import click
 
 
 def on_files(files: Any, config: Any) -> Any:
-    """MkDocs asks for the files of the site: those that nobody writes by hand come here."""
+    """MkDocs asks for the files of the site: those that are not written by hand come here."""
     from mkdocs.structure.files import File
 
     for name, page in PAGES.items():

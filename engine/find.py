@@ -116,7 +116,7 @@ def known() -> tuple[str, ...]:
 
 
 def _faced(found: Any) -> Any:
-    """Adapters get the face of an engine; whoever brings an engine of their own wants to be told."""
+    """Adapters get the face of an engine; a team that brings one wants to be told, so it gates unless it says not."""
     if isinstance(found, Adapter):
         return Peer(found, gating=getattr(found, "gating", True))
     return found
@@ -138,7 +138,7 @@ def _peer(name: str) -> Any:
 
 
 def thrown(error: Exception) -> str:
-    """What a module of somebody else raised while it was imported, and where, in a line."""
+    """What a module from elsewhere raised while it was imported, and where, in a line."""
     *_, last = traceback.extract_tb(error.__traceback__)
     told = " ".join(str(error).split())
     return f"{type(error).__name__}: {told} ({last.filename}, line {last.lineno})"

@@ -63,7 +63,7 @@ class Method:
     unsettled_residual a solve that leaves more than this [m/s] makes the run "unsettled": the row furthest from its
                        law, its impulse against where a step of projection would put it; so does one that stopped early
                        and left bodies sunk into each other by a fiftieth of the smaller one's radius
-    sleep_speed        bodies slower than this [m/s], |v| + |w| r, for `sleep_after` seconds sleep; 0: nobody does. They do so
+    sleep_speed        bodies slower than this [m/s], |v| + |w| r, for `sleep_after` seconds sleep; 0: none does. They do so
                        by islands, all that are connected by contacts, joints and springs, and wake at once, in the same
                        step, when a body meets one of them, a kinematic one that touches or holds one moves, or a load,
                        motor or spring of one is set. Asleep they have no speed, keep their places to the last bit, cost
@@ -130,7 +130,7 @@ class Method:
         if not self.unsettled_residual > 0.0:
             refuse("unsettled_residual", "above 0")
         if not 0.0 <= self.sleep_speed < math.inf:
-            refuse("sleep_speed", "a speed from 0, which lets nobody sleep")
+            refuse("sleep_speed", "a speed from 0, which lets no body sleep")
         if not 0.0 < self.sleep_after < math.inf:
             refuse("sleep_after", "a time above 0")
         if self.sleep_speed > 0.0:

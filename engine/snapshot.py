@@ -26,7 +26,7 @@ class Snapshot:
     """Where a run is, with what was set; any run of an equal scene, step, method and observation can go there.
 
     It can be pickled, and goes on with the same bits in another process of the same build of the engine. What was
-    damaged since, or written by another build, is refused. Like any pickle it may run code of whoever wrote it: take
+    damaged since, or written by another build, is refused. Like any pickle it may run code of its author: take
     those of strangers as little as you would run their programs.
     """
 

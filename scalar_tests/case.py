@@ -80,7 +80,7 @@ class Estimate(float):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Quantity:
-    """What is measured, whoever is asked: the question's own part of a metric.
+    """What is measured, whichever engine is asked: the question's own part of a metric.
 
     `limit` is the physical one, for every engine; None where only a method's own limit exists.
     """

@@ -245,7 +245,7 @@ TEST = ScalarTest(
     ),
     reference="Virtual work and kinematics in closed form.",
     conclusion="Green: forces through loops of many light bars are right. Red: they get lost in the chain, or a loop is "
-    "held by a compliance that nobody gave it.",
+    "held by a compliance that it was not given.",
     source="ours; the lift is asked for in the thesis, section 5.4",
     measurements=(
         Measurement(

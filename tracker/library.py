@@ -113,7 +113,7 @@ def time_again(
 
 
 def _asked(tests: Iterable[str], asked: RunOptions) -> tuple[Questions, Request]:
-    """What is asked of whom: fields of a Request, and those of Questions, told apart."""
+    """What is asked, and how: fields of Questions, and those of a Request, told apart."""
     import difflib
     from dataclasses import fields
 
@@ -343,7 +343,7 @@ class NightlyReport:
 
     @property
     def red(self) -> bool:
-        """Whether somebody has to look: the judge decides, and nobody else."""
+        """Whether a person has to look: the judge decides, and nothing else."""
         return any(finding.red for finding in self.findings)
 
 

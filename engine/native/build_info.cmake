@@ -13,7 +13,7 @@ endfunction()
 
 set(inside "")
 if(GIT)
-  # The archive may lie inside somebody else's repository: the answer counts only if this file is tracked.
+  # The archive may lie inside another repository: the answer counts only if this file is tracked.
   ask(inside ls-files --error-unmatch CMakeLists.txt)
 endif()
 foreach(fact hash time parents describe shallow count changes)

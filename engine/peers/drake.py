@@ -29,7 +29,7 @@ from spook_tracker.engine.shapes import Box, Capsule, Plane, Sphere
 
 logging.getLogger("drake").setLevel(
     logging.ERROR
-)  # it warns of contact of soft bodies, which nobody asks for
+)  # it warns of contact of soft bodies, which is never asked for
 
 
 class Drake:

@@ -302,7 +302,7 @@ def _answer(module: str) -> None:
 
 
 def _end_with_parent() -> None:
-    """Whoever waits may be ended for taking too long: nothing of it stays behind. Linux alone can say so."""
+    """The parent may be ended for taking too long: this process ends with it. Linux alone can say so."""
     if sys.platform == "linux":
         import ctypes
 

@@ -162,7 +162,7 @@ OUTPUTS = "the angles of crank, triangle and both rockers after 0.03 s"
 TEST = ScalarTest(
     title="Multibody library A03: Andrews' squeezing mechanism",
     question="Is Andrews' squeezing mechanism where it should be after 0.03 s?",
-    why="Millimetres, grams and 1200 rad/s: a mechanism whose compliances and time steps nobody's defaults fit.",
+    why="Millimetres, grams and 1200 rad/s: a mechanism whose compliances and time steps fit no engine's defaults.",
     model="Seven plane bodies on ten hinges, a spring, and a motor's torque of 0.033 N m on the crank; from rest.",
     parameters=(
         ("time step", "1e-5 s and 1e-4 s; ladder 2e-4 to 2.5e-6 s"),

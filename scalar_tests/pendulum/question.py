@@ -12,7 +12,7 @@ from spook_tracker.scalar_tests.pendulum.stability import STUDIES
 TEST = ScalarTest(
     title="Pendulum",
     question="How well does a distance constraint keep a pendulum's length?",
-    why="A constraint that stretches is a spring nobody asked for. Length alone says little, since a length can be "
+    why="A constraint that stretches is a spring that was not asked for. Length alone says little, since a length can be "
     "kept by throwing energy away: energy, tension and period stand beside it.",
     model="A bob of 1 kg on a distance constraint of 1 m to a fixed point starts level with that point, at rest, "
     "and swings for 22 s. The bob is a particle; its radius of 0.25 m plays no part.",

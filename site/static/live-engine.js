@@ -318,7 +318,7 @@ function storedEnergy(movie, compliance) {
 }
 
 // The energy that the motion should keep, J, and the share of it that came or went: of the most that moved or was
-// stored, as a level of potential energy is anybody's choice.
+// stored, as a level of potential energy is a free choice.
 function energyOf(movie) {
   const total = movie.energy.map((e, i) => e + (movie.stored ? movie.stored[i] : 0));
   let scale = 0, change = 0;

@@ -419,7 +419,7 @@ class SceneView {
     const x = eye.x - from.x, y = eye.y - from.y, z = eye.z - from.z, reach = Math.hypot(x, y, z);
     const round = Math.atan2(y, x) + about, high = Math.max(-1.5, Math.min(1.5, Math.asin(z / reach) + above)), r = reach * far;
     eye.set(from.x + r * Math.cos(high) * Math.cos(round), from.y + r * Math.cos(high) * Math.sin(round), from.z + r * Math.sin(high));
-    this.controls.update();  // tells whoever follows, and draws
+    this.controls.update();  // tells the listeners, and draws
     return true;
   }
 

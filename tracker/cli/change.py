@@ -117,7 +117,7 @@ def run_options(
     executor: str = PROCESS,
     named: Mapping[str, str] | None = None,
 ) -> list[str]:
-    """Those of `tracker run` that a commit is asked with; older commits need not know what nobody asked for."""
+    """Those of `tracker run` that a commit is asked with; older commits need not know what was not asked for."""
     options = ["--workers", str(workers)]
     options += [] if limit is None else ["--limit", str(limit)]
     options += [] if time_limit == TIME_LIMIT else ["--time-limit", str(time_limit)]

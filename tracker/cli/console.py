@@ -63,7 +63,7 @@ FEW = 20  # pieces of work; of more a log gets a line each tenth, and for each t
 
 
 def is_terminal(stream: TextIO | None) -> bool:
-    """Whether somebody is looking at the stream; one that was closed from the start is None."""
+    """Whether a person is looking at the stream; one that was closed from the start is None."""
     return stream is not None and stream.isatty() and os.environ.get("TERM") != "dumb"
 
 

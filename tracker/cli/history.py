@@ -124,7 +124,7 @@ def compare(
         if form == "table" and _are_engines(history, (before, after)):
             import spook_tracker.tracker.cli.rank as ranking
 
-            say("\n".join(ranking.table_lines(history, (before, after), tests)))  # nobody regressed
+            say("\n".join(ranking.table_lines(history, (before, after), tests)))  # neither regressed
             return
         old = before if before == FORK_POINT else of_engine(engine, before)
         document = compared(history, old, of_engine(engine, after), levels, against_history)

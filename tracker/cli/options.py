@@ -319,7 +319,7 @@ def accepted_option(command: Command) -> Command:
 
 
 def _there_if_named(context: click.Context, option: click.Parameter, file: Path | None) -> Path | None:
-    """A file that somebody names must be there; one that is there by default need not."""
+    """A file that the command line names must be there; one that is there by default need not."""
     named = context.get_parameter_source(str(option.name)) is click.core.ParameterSource.COMMANDLINE
     if named and file is not None and not file.is_file():
         raise click.BadParameter(f"there is no file {file}")
@@ -355,7 +355,7 @@ class OneLineErrors(click.Group):
             complain(str(ended) if getattr(ended, "recorded", False) else f"interrupted; {kept}")
             code = UNUSABLE
         except BrokenPipeError:
-            sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115 - nobody reads any more
+            sys.stdout = open(os.devnull, "w")  # noqa: PTH123, SIM115 - the reader is gone
             code = GREEN
         except SystemExit as ended:
             if _of_click(ended):  # it answers a shell that completes words

@@ -137,7 +137,7 @@ def defaults(group: click.Group, settings: Settings) -> Defaults:
 
 
 def _file(here: Path) -> Path | None:
-    """Above the folder one stands in only inside a repository: what lies higher is somebody else's."""
+    """Above the working folder only inside a repository: what lies higher belongs to others."""
     above = [here, *here.parents]
     root = next((place for place, folder in enumerate(above) if (folder / ".git").exists()), 0)
     return next((folder / FILE for folder in above[: root + 1] if (folder / FILE).is_file()), None)

@@ -56,7 +56,7 @@ def _own(taken: Taken) -> float:
 
 
 def taken_again(night: Point) -> str:
-    """What came of timing it once more, in words; empty if nobody did."""
+    """What came of timing it once more, in words; empty if it was not."""
     timing = night.sample.timing
     if timing is None or timing.again is None:
         return ""

@@ -51,7 +51,7 @@ class Change(Struct, frozen=True, kw_only=True):
     ulps: int | None = None
     first_bad: Text = ""  # hash or version of the first bad commit, if history knows it
     last_good: Text = ""
-    accepted: Text = ""  # by whom and why, if accepted.toml takes this level
+    accepted: Text = ""  # by which person and why, if accepted.toml takes this level
     rounding: Number | None = None  # where it was measured: a difference up to that is none
 
 

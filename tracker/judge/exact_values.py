@@ -154,7 +154,7 @@ def _holds(state: KnownValue, seen: Seen) -> tuple[KnownValue, Judged]:
 
 
 def _is_red(definition: SeriesDefinition, state: KnownValue, seen: Seen) -> tuple[KnownValue, Judged]:
-    """Worse, and nobody accepted it: red until it is mended, and news where it is worse than it was while red."""
+    """Worse, and not accepted: red until it is mended, and news where it is worse than it was while red."""
     night, before, level = seen.night, state.red, state.level
     good = before.last_good if before is not None else None
     if good is None and level is not None and level is not night:
@@ -177,7 +177,7 @@ def _is_red(definition: SeriesDefinition, state: KnownValue, seen: Seen) -> tupl
 def _fails_as_expected(
     definition: SeriesDefinition, state: KnownValue, seen: Seen, taken: Accepted
 ) -> tuple[KnownValue, Judged]:
-    """Bad, as somebody said it would be: the level from before stays, and worse than expected is told."""
+    """Bad, as accepted.toml said it would be: the level from before stays, and worse than expected is told."""
     words = f"expected to fail; {seen.verdict.sentence}"
     if state.failing is not None and (grown := _against(definition, state.failing, seen.night)).red:
         words += f"; since {commit_of(state.failing.run)}: {grown.sentence}"
@@ -192,7 +192,7 @@ def _fails_as_expected(
 
 
 def _accepts(state: KnownValue, seen: Seen, taken: Accepted) -> tuple[KnownValue, Judged]:
-    """Bad, and accepted: the night is the level from now on, or until the day that somebody named."""
+    """Bad, and accepted: the night is the level from now on, or until the day that was named."""
     night, level = seen.night, state.level
     lent = None
     if taken.until is not None and level is not None and level is not night:

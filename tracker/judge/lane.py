@@ -1,7 +1,7 @@
 """The histories to be judged: of one line of runs, with the series that are made from others.
 
 Run times of a ladder become one series per configuration, exact work one per configuration and counter. Both
-are made here and nowhere else, so that whoever judges a history judges them, too.
+are made here and nowhere else, so that every judge of a history judges them, too.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ class Records(Protocol):
 def line_of(runs: Sequence[OneRun], run: OneRun) -> list[OneRun]:
     """The runs of its engine that come before a run in commit order and on its own branch, and the run itself.
 
-    A build with local changes or without a commit has no place in that order: it stands in nobody's history,
+    A build with local changes or without a commit has no place in that order: it stands in no history,
     unless none of the engine's runs has a place; then time orders them.
     """
     of_engine = [other for other in runs if other.engine.name == run.engine.name]
@@ -78,7 +78,7 @@ def elsewhere(runs: Sequence[Run], run: Run) -> set[str]:
     """Commits among these runs that lie on another branch than a run's commit, as far as parents tell.
 
     From both commits back along measured parents: a commit is elsewhere if both ways meet and it is on one
-    of them only. Where a way breaks off at a commit nobody measured, the order of commits has to do.
+    of them only. Where a way breaks off at a commit that was not measured, the order of commits has to do.
     """
     parents = {other.engine.git_hash: other.engine.parents for other in (*runs, run)}
 

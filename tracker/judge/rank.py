@@ -1,4 +1,4 @@
-"""Engines beside each other on the same questions: nothing is red, somebody is ahead.
+"""Engines beside each other on the same questions: nothing is red, one is ahead.
 
 Read from the ladders: an engine's error at h = 1/60 and the run time it needs for a given error, each in the
 configuration that does it best. Run times are the processor's where the engine tells them: what else a machine does while
@@ -62,7 +62,7 @@ class Race:
     settings: tuple[str, ...] = ()  # the configuration of each in `order`
 
     def behind(self, engine: str) -> tuple[str, float, float | None] | None:
-        """Who is first, in what time, and the time of this engine (None: never); None if nobody is sooner."""
+        """Who is first, in what time, and the time of this engine (None: never); None if none is sooner."""
         best, first = self.order[0]
         mine = {name: time for time, name in self.order}.get(engine)
         return None if mine is not None and mine <= best else (first, best, mine)
@@ -125,7 +125,7 @@ def scenes(found: Sequence[Standing]) -> list[list[Standing]]:
 
 
 def races(found: Sequence[Standing]) -> list[Race]:
-    """Every scene with every error that somebody reaches."""
+    """Every scene with every error that an engine reaches."""
     run = []
     for group in scenes(found):
         for place, error in enumerate(ERRORS):

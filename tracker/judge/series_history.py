@@ -51,7 +51,7 @@ class Told:
         """The nights that were judged against each other, and the night that ended them.
 
         A lane ends where the definition of the test changes for good. There are none where nothing ever became
-        worse, as in most series: nobody has anything to look for in them.
+        worse, as in most series: there is nothing to look for in them.
         """
         nights = self.nights
         if {judged.state for judged in nights}.isdisjoint(("detected", "accepted")):

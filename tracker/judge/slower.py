@@ -88,5 +88,5 @@ def by_outcome(verdict: Verdict, sample: Sample) -> Verdict:
 
 
 def change_in_words(change: float) -> str:
-    """A relative change, and for whom."""
+    """A relative change, and whether for the worse."""
     return f"{100.0 * change:+.1f} % for the {'worse' if change > 0.0 else 'better'}"

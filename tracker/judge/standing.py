@@ -1,6 +1,6 @@
 """What a value is on its own, against its limit and its set point, and how many limits and set points hold.
 
-The one count: a limit is counted once for every series that carries one and decides something, whoever it
+The one count: a limit is counted once for every series that carries one and decides something, whichever engine it
 belongs to; what carries neither limit nor set point is followed and can only become worse than it was.
 """
 
@@ -50,7 +50,7 @@ def standing(definition: SeriesDefinition, sample: Sample) -> Class:
 
 
 def against_limit(definition: SeriesDefinition, sample: Sample) -> Class:
-    """What a value is for its limit alone, whoever's it is: engines that decide nothing are shown for what they are."""
+    """What a value is for its limit alone, of any engine: engines that decide nothing are shown for what they are."""
     if sample.outcome == NOT_SUPPORTED:
         return "none"
     if not honest(sample).passed:

@@ -61,7 +61,7 @@ class Verdict(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def red(self) -> bool:
-        """Whether somebody has to look."""
+        """Whether a person has to look."""
         return self.word in RED
 
 
@@ -329,7 +329,7 @@ def judge_map(before: MapData, after: MapData) -> Verdict:
 
 
 def cell_rank(cell: str) -> int:
-    """How bad a cell is; a word nobody knows is the worst."""
+    """How bad a cell is; an unknown word is the worst."""
     return CELL_RANK.get(cell, len(CELL_RANK))
 
 

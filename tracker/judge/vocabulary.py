@@ -36,7 +36,7 @@ class Said:
     """How a word is shown."""
 
     mark: str
-    red: bool = False  # somebody has to look
+    red: bool = False  # a person has to look
     quiet: bool = False  # not worth a line among changes
 
 
@@ -79,7 +79,7 @@ OVERALL: dict[Overall, SaidOverall] = {  # the worst first
 CLASSES: dict[Class, tuple[str, str, str]] = {  # the worst first: mark, word, what it means
     "fail": ("✗", "FAIL", "a limit broken, a solve left unsettled, or no value"),
     "watch": ("!", "WATCH", "limits kept; a set point left, or worse than before"),
-    "accepted": ("!", "ACCEPTED", "worse, and accepted by somebody who says why"),
+    "accepted": ("!", "ACCEPTED", "worse, and accepted with a name and a reason"),
     "none": ("·", "NO DATA", "not run"),
     "pass": ("✓", "PASS", "every limit kept, every set point held"),
     "followed": ("·", "FOLLOWED", "no expectation: only a change is told"),

@@ -60,7 +60,7 @@ OF_TIMES = ("values", "sweep")  # of a run that does not say what it was asked f
 
 
 def families_of(definition: SeriesDefinition) -> tuple[str, ...]:
-    """With which families a series is asked for; none where nobody misses it, as what is read off a ladder's clock."""
+    """With which families a series is asked for; none where it is not missed, as what is read off a ladder's clock."""
     if definition.kind != "time":
         return (FAMILIES[definition.kind],)
     if (definition.configuration, definition.metric) in STEP_COSTS:

@@ -1,4 +1,4 @@
-"""A run time that seems slower is taken once more at once, before anybody is told.
+"""A run time that seems slower is taken once more at once, before it is reported.
 
 The whole ladders of a test are timed again, alone on the machine and by the rules of every timing; what was taken
 first stays beside it. tracker/judge/calibration.py says which of the two counts.

@@ -1,7 +1,7 @@
 """Measuring in a process of its own: what engines, catalogues and executors do to that process they do to no verdict.
 
 They are imported there and nowhere else. What comes back are lines of JSON: how far it is, and at the end one run
-document. A process that ends without having told one has measured nothing, whatever it ended with; whoever asked says
+document. A process that ends without having told one has measured nothing, whatever it ended with; the caller says
 so, judges what was told and nothing else, and ends whatever the process has left behind.
 """
 
@@ -144,7 +144,7 @@ def _asked(
                 elif isinstance(news, Step):
                     watch(news.progress)
             except KeyboardInterrupt:
-                if interrupted:  # whoever asks twice does not wait
+                if interrupted:  # asked twice: do not wait
                     raise
                 interrupted = True
                 process.send_signal(signal.SIGINT)
@@ -190,7 +190,7 @@ class _Lines:
 
 
 class _Ending(threading.Timer):
-    """Ends a process and its session after so many seconds, unless it is cancelled; whoever waits takes it away."""
+    """Ends a process and its session after so many seconds, unless it is cancelled; the waiting caller reaps it."""
 
     def __init__(self, process: subprocess.Popen[bytes], seconds: float) -> None:
         super().__init__(min(seconds, threading.TIMEOUT_MAX), self._end)
@@ -249,7 +249,7 @@ def serve() -> None:
     nothing = os.open(os.devnull, os.O_RDONLY)
     os.dup2(nothing, 0)
     os.dup2(2, 1)  # whatever an engine prints is no news
-    signal.signal(signal.SIGINT, signal.default_int_handler)  # whoever asked may have been started deaf to it
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # the parent may have been started deaf to it
     what, source, request, more = pickle.loads(base64.b64decode(order.readline()))
 
     def tell(news: News) -> None:

@@ -1,4 +1,4 @@
-"""Ending a process with all it has started, however it ended and whoever is there to see to it.
+"""Ending a process with all it has started, however it ended and whichever process is there to see to it.
 
 The process is the first of a session of its own, in which what it starts stays, whatever process groups it makes. What
 makes a session for itself, as servers do, is known by a word of its environment, which every process hands on. On Linux

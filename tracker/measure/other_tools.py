@@ -39,7 +39,7 @@ MIXED = "not said: may mix processors"
 
 @dataclass(frozen=True, slots=True)
 class Beside:
-    """What the file itself does not say: from the files beside it, or from whoever imports it."""
+    """What the file itself does not say: from the files beside it, or from the caller of the import."""
 
     engine: str = ""  # in place of the file's
     machine: str = ""  # in place of the file's

@@ -99,7 +99,7 @@ class Outcome:
 
 
 class NoAnswer(Exception):
-    """Nobody will answer any more: the process was lost. `outcome` says how."""
+    """No answer will come any more: the process was lost. `outcome` says how."""
 
     def __init__(self, outcome: OutcomeClass, failure: str) -> None:
         super().__init__(failure)
@@ -285,7 +285,7 @@ def study(
 ) -> Measured | MapData:
     """A break point as a series of its own, or a map; a failed study is a break point that failed.
 
-    `lost` is what came of asking elsewhere, where the process was lost: then nobody is asked here.
+    `lost` is what came of asking elsewhere, where the process was lost: then no engine is asked here.
     """
     witness = Witness(simulate)
     answer = lost or ask(lambda: question.study(witness))

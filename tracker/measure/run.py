@@ -99,7 +99,7 @@ class Task:
 
 @dataclass(frozen=True)
 class Progress:
-    """What to tell whoever is watching after each piece of work."""
+    """What a watcher is told after each piece of work."""
 
     done: int
     total: int
@@ -130,7 +130,7 @@ class Interrupted(KeyboardInterrupt):
         super().__init__(f"interrupted; {done} and are recorded as partial run {document.id}")
         self.document = document
         self.asked = asked  # number of tests
-        self.recorded = False  # until somebody does
+        self.recorded = False  # until a caller does
 
 
 def run(source: Questions, request: Request, watch: Watch = lambda progress: None) -> RunDocument:
@@ -145,7 +145,7 @@ def run(source: Questions, request: Request, watch: Watch = lambda progress: Non
     tasks = list(_tasks(tests, request))
     watch(
         Progress(0, _total(tasks, tests, request), "", False)
-    )  # all is imported: whoever waited for that knows
+    )  # all is imported: a caller that waited for that knows
     parts: dict[int, Parts] = {}
     workers: Counter[Machine] = Counter()
     timed: Timed = ([], {})

@@ -1,4 +1,4 @@
-"""Processes that do pieces of work, each watched: whoever hangs, dies or takes too much memory costs its piece.
+"""Processes that do pieces of work, each watched: one that hangs, dies or takes too much memory costs its piece.
 
 A worker has one piece at a time and a pipe of its own, so it is always known whose piece is lost. Nothing
 outlives the supervisor: leaving `answers` by whatever way kills every worker at once, and a worker whose
@@ -160,7 +160,7 @@ _place: Place | None = None  # of this process, if it is a worker: memory its su
 
 
 def at(place: int) -> None:
-    """Say where in its piece of work a worker is; costs a store to memory and wakes nobody, while time is taken."""
+    """Say where in its piece of work a worker is; costs a store to memory and wakes no process, while time is taken."""
     if _place is not None:
         _place.value = place
 

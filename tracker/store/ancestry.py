@@ -35,7 +35,7 @@ def commit_order(
     """`commits` with ancestors first.
 
     `parents` holds the hashes of the parents of each commit; parents may be commits that were never run.
-    `known` is an order somebody trustworthy gives for some of them (git itself). Where neither says anything,
+    `known` is an order that a trusted source gives for some of them (git itself). Where neither says anything,
     the smaller `age` comes first. A cycle, which only a forged document can hold, is cut at the smallest age.
     """
     wanted = set(commits)

@@ -69,7 +69,7 @@ Found = tuple[RunInfo, int, SeriesDefinition, Sample]  # run, series id, definit
 class History:
     """What is stored, as of the moment the history is made. `repository`: where git may know tags.
 
-    A run that says it began later than that, by more than `ahead`, is among `ahead` and in nobody's history: some
+    A run that says it began later than that, by more than `ahead`, is among `ahead` and in no history: some
     clock was wrong, and until its day came it would be the newest. By its id it can be read and removed.
     """
 

@@ -2,7 +2,7 @@
 
 Small tables (engine_version, machine, test_cards, series, definition, series_list, run) are referred to; the
 large ones (sample, evidence, timing, figure, stability_map, trajectory) refer to `run` and are referred to by
-nobody. The time column leads the key of every large table, so that it can become a hypertable, a partitioned or a
+none. The time column leads the key of every large table, so that it can become a hypertable, a partitioned or a
 distributed table as it stands. Ids are made by the application from the content (`identity`): two databases
 that hold the same thing hold it under the same id, and shards merge without renumbering.
 """

@@ -1,8 +1,8 @@
 """SQL that lays the large tables out by time (PostgreSQL itself, TimescaleDB) or over several servers (Citus), from the
 models.
 
-It is printed, not run: whoever looks after a server of that size wants to read it first. The keys need no change,
-because the time leads the key of every large table and nobody refers to them.
+It is printed, not run: the administrator of a server of that size wants to read it first. The keys need no change,
+because the time leads the key of every large table and no table refers to them.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ DECLARE
     past timestamptz;
     stray boolean;
 BEGIN
-    PERFORM pg_advisory_xact_lock({lock});  -- as whoever records a run
+    PERFORM pg_advisory_xact_lock({lock});  -- as a run is recorded
     FOREACH large IN ARRAY ARRAY[{large}] LOOP
         EXECUTE format('CREATE TABLE IF NOT EXISTS months.%I PARTITION OF %I DEFAULT', large || '_other', large);
         FOR month IN
@@ -83,7 +83,7 @@ def _by_month() -> Iterator[str]:
     large = [table for table in tables if is_large(table)]
     dialect = make_url("postgresql+psycopg://").get_dialect()()
     yield "BEGIN;"
-    yield f"SELECT pg_advisory_xact_lock({ONE_WRITER});"  # as whoever records a run
+    yield f"SELECT pg_advisory_xact_lock({ONE_WRITER});"  # as a run is recorded
     yield from (f"DROP VIEW IF EXISTS {name};" for name in reversed([*views.VIEWS, "column_comments"]))
     yield "CREATE SCHEMA months;"
     yield "CREATE SCHEMA before;"

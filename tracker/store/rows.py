@@ -55,7 +55,7 @@ _compressed = Compressed(32 * 1024 * 1024)
 
 
 def packed(part: Writable) -> bytes:
-    """Compressed JSON, for the bulky parts nobody queries."""
+    """Compressed JSON, for the bulky parts that no query reads."""
     return _compressed.of(encode(part))
 
 

@@ -1,4 +1,4 @@
-"""What a chart is, before anybody draws it: lines, bands and axes.
+"""What a chart is, before it is drawn: lines, bands and axes.
 
 `figures` turns a Chart into data for Plotly, `svg` into a picture for readers without JavaScript, for print and
 for feeds. Both draw the same numbers.

@@ -356,14 +356,14 @@ def ladder_charts(
                 if axis == "seconds":
                     trends = configurations[configuration]
                     lines += _earlier_lines(trends, configuration, earlier, colour, definition.unit)
-            everybody = [r for found in points.values() for r in found]
+            every_rung = [r for found in points.values() for r in found]
             if axis == "seconds":  # what one engine counts, another does not
                 beside = _peer_rungs(peers, name)
                 lines += _peer_lines(beside, definition.unit, len(points))
-                everybody += [r for _, found in beside for _, r in found]
+                every_rung += [r for _, found in beside for _, r in found]
             if not any(line.x for line in lines):
                 continue
-            lines.append(_front(everybody, of))
+            lines.append(_front(every_rung, of))
             charts.append(
                 Chart(
                     name=f"{prefix}l-{slug(name)}-{axis}",

@@ -52,7 +52,7 @@ SMALL_FRACTION = re.compile(r"([⁰-⁹¹²³]+)⁄([₀-₉]+)")
 APPLIED = re.compile(rf"^(?:<msup>)?<mi>(?:{'|'.join(FUNCTIONS)})</mi>(?:<mrow>.*</mrow></msup>)?$")
 LOW_NAME = re.compile(r"[A-Za-zα-ω0-9]+")
 BRACKETED = re.compile(r"<mrow><mo[^>]*>\(</mo>(.*)<mo[^>]*>\)</mo></mrow>")
-DEEPEST = 20  # brackets in each other; more is no formula that anybody reads
+DEEPEST = 20  # brackets in each other; more is no formula to read
 THIN = '<mspace width=".17em"/>'
 
 

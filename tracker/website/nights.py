@@ -138,7 +138,7 @@ class TestHistory:
 
     @property
     def lost_maps(self) -> tuple[ToldMap, ...]:
-        """Those that are gone, and nobody gave them up."""
+        """Those that are gone, and were not given up."""
         return tuple(told for told in self.told_maps if told.stands == "fail")
 
     @property

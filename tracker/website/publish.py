@@ -105,7 +105,7 @@ def publish(
     database: bytes | None = None,
     options: SiteOptions = DEFAULTS,
 ) -> Report:
-    """Write the website of a history to the folder `out`. FolderError if the folder is somebody else's.
+    """Write the website of a history to the folder `out`. FolderError if the folder is not one of ours.
 
     `accepted` are the levels of accepted.toml: what they take is told as accepted, not as red. `database` is
     the file of the database, where readers shall be able to load it. ColourError if the colour of the options cannot

@@ -23,7 +23,7 @@ def measure(simulate):
 THROW = ScalarTest(
     title="Thrown stone",
     question="How high does a stone come that is thrown straight up?",
-    why="the smallest question with an answer everybody knows",
+    why="the smallest question with a well-known answer",
     model="one particle, gravity, no ground",
     parameters=(("speed", "9.81 m/s"), ("time step", "0.01 s")),
     theory=("v²/(2 g)",),
