@@ -95,6 +95,14 @@ def test_of_several_engines_it_is_told_which_stand_together(tmp_path: Path) -> N
     assert "no_such_engine" in swing.refused
 
 
+@pytest.mark.timeout(120)  # s: fewer than the 300 that a worker is waited for
+def test_what_is_no_model_by_itself_is_left_out_at_once(folder: Path) -> None:
+    """A worker that came to nothing is not waited for as if it were still at work."""
+    paths = [folder / name for name in ("a/part.xml", "b/broken.xml")]
+
+    assert [path.name for path, _ in stood(paths, ("spook", "no_such_engine"))] == ["broken.xml"]
+
+
 def test_the_command_says_it_at_each_time(tmp_path: Path) -> None:
     pytest.importorskip(
         "mujoco", reason="the extra mujoco is not installed: pip install 'spook-tracker[mujoco]'"

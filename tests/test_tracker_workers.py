@@ -18,7 +18,7 @@ ROOT = Path(__file__).resolve().parents[1]
 SOON = 240.0  # s: what takes longer hangs, on a machine however busy
 
 
-def work(piece: str) -> str:
+def work(piece: str) -> str | None:
     """What a worker does with a piece: its name says what happens."""
     if piece.startswith("hang"):
         while True:  # in Python, where no watchdog of the engine sees it
@@ -31,7 +31,7 @@ def work(piece: str) -> str:
         raise ValueError(piece)
     if piece.startswith("print"):
         os.write(1, b"LOUD\n")
-    return piece.upper()
+    return None if piece.startswith("none") else piece.upper()
 
 
 def told(pieces: list[str], workers: int = 2, **limits: float) -> dict[str, object]:
@@ -43,6 +43,13 @@ def test_every_piece_is_answered_once():
 
     assert told(pieces) == {piece: piece.upper() for piece in pieces}
     assert told([]) == {}
+
+
+def test_a_piece_that_comes_to_nothing_is_answered_by_none():
+    """And not taken for one that is still worked at, which would be ended as hanging."""
+    found = told(["none", "a", "none too", "b"], workers=1, seconds=30.0)
+
+    assert found == {"none": None, "a": "A", "none too": None, "b": "B"}
 
 
 def test_who_hangs_dies_or_is_greedy_costs_its_own_piece():

@@ -77,10 +77,10 @@ def answers(
             )
             waiting.wait([worker.pipe for worker in crew], timeout=max(0.0, soonest))
             for worker in list(crew):
-                answer = worker.look()
-                if answer is None:
+                found = worker.look()
+                if found is None:
                     continue
-                piece = worker.piece
+                piece, (answer,) = worker.piece, found
                 if left and not isinstance(answer, Lost):
                     worker.give(left.popleft())
                 else:
@@ -120,8 +120,8 @@ class _Worker(Generic[Piece, Answer]):
         with suppress(OSError):  # it is dead already, which the next look will find
             self.pipe.send(piece)
 
-    def look(self) -> Answer | Lost | None:
-        """The answer, if there is one by now; Lost if there will be none; None while it is at work."""
+    def look(self) -> tuple[Answer | Lost] | None:
+        """The answer, which may be None, alone in a tuple; Lost if there will be none; None while it is at work."""
         try:
             while self.pipe.poll():
                 kind, content = self.pipe.recv()
@@ -133,13 +133,13 @@ class _Worker(Generic[Piece, Answer]):
                 else:
                     self.deadline = time.monotonic() + self.limits.seconds
                     answer: Answer = content
-                    return answer
+                    return (answer,)
         except (EOFError, OSError):
-            return Lost("crashed", DIED, self.place.value)
+            return (Lost("crashed", DIED, self.place.value),)
         if time.monotonic() < self.deadline:
             return None
         why = f"no answer within {self.limits.seconds:g} s, so its process was ended"
-        return Lost("timed_out", why, self.place.value)
+        return (Lost("timed_out", why, self.place.value),)
 
     def end(self) -> None:
         left_behind.end_group(self.process.pid or 0)  # with whatever the piece has started
