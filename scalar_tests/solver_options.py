@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import random
 
 import numpy as np
@@ -10,7 +9,6 @@ import numpy as np
 from spook_tracker.engine import (
     Box,
     ConstraintForce,
-    ContactForce,
     Energy,
     Final,
     Material,
@@ -19,7 +17,6 @@ from spook_tracker.engine import (
     Position,
     RigidBody,
     Scene,
-    Sphere,
     Trace,
     Velocity,
 )
@@ -37,25 +34,21 @@ from spook_tracker.scalar_tests.case import (
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.door.scene import least_norm_forces
 from spook_tracker.scalar_tests.door.scene import scene as hung
+from spook_tracker.scalar_tests.pendulum.scene import LENGTH
 from spook_tracker.scalar_tests.pendulum.scene import scene as pendulum
 from spook_tracker.scalar_tests.sweep import line
 
 GRAVITY = 9.81  # m/s²
 TIME_STEP = 1.0 / 60.0  # s
 EDGE = 0.5  # m, of boxes of the heap
-HEAPED, STACKED = 30, 5
+HEAPED = 30
 MANY, SIDE = 216, 6  # so many that threads share them: more than 512 contacts
 FALLING = 0.25  # s: while the heap falls together
-LYING = 3.0  # s
-SLEEPY = Method(sleep_speed=0.02)
-AFTER = SLEEPY.sleep_after  # s
 THREADS = (2, 4)
-RADIUS = 0.1  # m, of the ball
-SLOPE = math.radians(30.0)
-PULL = GRAVITY * math.sin(SLOPE)  # m/s², along it
-FINE = TIME_STEP / 4.0  # s, on the slope
-DRAWN = (0.0, 1.0, 1.5)  # m/s
-CAPS = (0.03, 0.1, 1.0)  # beside the default; a pendulum of 1 m bends by 0.003 a step at most
+BEND = GRAVITY * TIME_STEP**2 / LENGTH  # of its length, by which the pendulum bends in a step at its fastest
+CAPS = (0.03, 0.1, 1.0)  # beside the default
+DRAWN = (1e-4, 3e-4, 1e-3, 2e-3, 2.5e-3, 3e-3, 1e-2, 1e-1)
+SEARCHED = 1e-3
 FLOORS = (1e-16, 1e-14, 1e-10, 1e-8)  # from 1e-6 on the hinges share the door as they like
 THRESHOLDS = (0.3, 0.1, 0.03, 0.01)  # m/s, below what ten sweeps leave by themselves, 0.17, but for the first
 ROUGH = Material(friction=0.5)
@@ -82,26 +75,6 @@ def heap(count: int = HEAPED, side: int = 2) -> Scene:
     return Scene(bodies=(FLOOR, *boxes), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def stack() -> Scene:
-    """Boxes of 1 kg one on the other, at rest."""
-    boxes = tuple(
-        RigidBody(
-            name=f"box {k}", mass=1.0, shape=Box((1.0,) * 3), position=(0.0, 0.0, 0.5 + k), material=ROUGH
-        )
-        for k in range(STACKED)
-    )
-    return Scene(bodies=(FLOOR, *boxes), gravity=(0.0, 0.0, -GRAVITY))
-
-
-def thrown(speed: float, slope: float = 0.5 * math.pi) -> Scene:
-    """A ball on its way straight up, or up a smooth slope [rad]; x is up the slope."""
-    ball = RigidBody(
-        name="ball", mass=1.0, shape=Sphere(RADIUS), position=(0.0, 0.0, RADIUS), velocity=(speed, 0.0, 0.0)
-    )
-    ground = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
-    return Scene(bodies=(ground, ball), gravity=(-GRAVITY * math.sin(slope), 0.0, -GRAVITY * math.cos(slope)))
-
-
 def _threads(simulate: Simulate) -> dict[str, float]:
     def fallen(threads: int) -> np.ndarray:
         result = simulate(
@@ -117,24 +90,6 @@ def _threads(simulate: Simulate) -> dict[str, float]:
     return {"bits_of_threads": float(sum((fallen(threads) != alone).sum() for threads in THREADS))}
 
 
-def _asleep(simulate: Simulate) -> dict[str, float]:
-    """What lies keeps its place and its weight, and what flies is left alone."""
-    observe = {"x": Trace(quantity=Position()), "load": Final(quantity=ContactForce("floor"))}
-    result = simulate(stack(), time_step=TIME_STEP, duration=LYING, method=SLEEPY, observe=observe)
-    late = result["x"][result.sample_times["x"] > AFTER + 2.0 * TIME_STEP]
-    flight = {"x": Trace(quantity=Position("ball"))}
-    flown, free = (
-        simulate(thrown(4.0), time_step=TIME_STEP, duration=1.0, method=method, observe=flight)["x"]
-        for method in (Method(sleep_speed=3.0), Method())
-    )
-    return {
-        "awake": STACKED - float(result.counters.get("asleep", 0)),
-        "moved_asleep": float(np.abs(late - late[-1]).max()),
-        "load_asleep": float(abs(result["load"][2]) / (STACKED * GRAVITY) - 1.0),
-        "held_in_flight": float(np.abs(flown - free).max()),
-    }
-
-
 def _reported(simulate: Simulate) -> dict[str, float]:
     """Thresholds that ten sweeps and those they call for reach: runs that left more, or are not called completed."""
     wrong = 0
@@ -145,17 +100,16 @@ def _reported(simulate: Simulate) -> dict[str, float]:
     return {"misreported": float(wrong)}
 
 
-def _capped(simulate: Simulate) -> dict[str, float]:
-    def swung(cap: float) -> np.ndarray:
-        method = Method(corrections=2, correction_cap=cap)
-        observe = {"x": Trace(quantity=Position()), "energy": Trace(quantity=Energy())}
-        result = simulate(
-            pendulum(TIME_STEP), time_step=TIME_STEP, duration=5.0, method=method, observe=observe
-        )
-        return np.hstack((result["x"].reshape(len(result["energy"]), -1), result["energy"][:, None]))
+def _swung(simulate: Simulate, cap: float) -> np.ndarray:
+    method = Method(corrections=2, correction_cap=cap)
+    observe = {"x": Trace(quantity=Position()), "energy": Trace(quantity=Energy())}
+    result = simulate(pendulum(TIME_STEP), time_step=TIME_STEP, duration=5.0, method=method, observe=observe)
+    return np.hstack((result["x"].reshape(len(result["energy"]), -1), result["energy"][:, None]))
 
-    usual = swung(Method().correction_cap)
-    return {"bits_of_the_cap": float(sum((swung(cap) != usual).sum() for cap in CAPS))}
+
+def _capped(simulate: Simulate) -> dict[str, float]:
+    usual = _swung(simulate, Method().correction_cap)
+    return {"bits_of_the_cap": float(sum((_swung(simulate, cap) != usual).sum() for cap in CAPS))}
 
 
 def _floored(simulate: Simulate) -> dict[str, float]:
@@ -172,32 +126,23 @@ def _floored(simulate: Simulate) -> dict[str, float]:
     return {"split_of_floors": worst}
 
 
-def laziest(simulate: Simulate) -> BreakPoint:
-    """The largest sleep speed [m/s] with which a ball is not put to sleep where it turns back on a smooth slope."""
-
-    def returns(slow: float) -> bool:
-        observe = {"v": Final(quantity=Velocity("ball"))}
-        result = simulate(
-            thrown(2.0 * slow, SLOPE),
-            time_step=FINE,
-            duration=2.0 * slow / PULL + AFTER,
-            method=Method(sleep_speed=slow),
-            observe=observe,
-        )
-        return bool(result["v"][0] < 0.0)
-
-    return break_point(returns, 0.1, 20.0, resolution=1e-3, walk=9)
+def tightest(simulate: Simulate) -> BreakPoint:
+    """The smallest cap of a correction that leaves the pendulum alone, to the bit."""
+    usual = _swung(simulate, Method().correction_cap)
+    return break_point(
+        lambda cap: bool((_swung(simulate, cap) == usual).all()), 1.0, 1e-5, resolution=SEARCHED, walk=6
+    )
 
 
 def _draw(simulate: Simulate) -> Drawing:
-    curves = []
-    for slow in DRAWN:
-        observe = {"x": Trace(quantity=Position("ball"))}
-        method = Method(sleep_speed=slow)
-        result = simulate(thrown(2.0, SLOPE), time_step=FINE, duration=1.0, method=method, observe=observe)
-        name = f"sleep_speed {slow:g} m/s" if slow else "without"
-        curves.append(line(name, result.sample_times["x"], result["x"][:, 0]))
-    return Drawing(curves=tuple(curves), x_label="time [s]", y_label="ball, up a smooth slope of 30° [m]")
+    usual = _swung(simulate, Method().correction_cap)
+    moved = [float(np.abs(_swung(simulate, cap) - usual).max()) for cap in DRAWN]
+    return Drawing(
+        curves=(line("largest move of the bob or change of its energy", DRAWN, moved, "both"),),
+        x_label="correction_cap",
+        y_label="difference from the default's [m, J]",
+        x_scale="log",
+    )
 
 
 def _none(name: str, description: str, unit: str, source: str) -> Metric:
@@ -215,24 +160,19 @@ def _none(name: str, description: str, unit: str, source: str) -> Metric:
 TEST = ScalarTest(
     title="Options of the solver",
     question="Do options that shall only save work, or only report, leave the answer alone?",
-    why="Threads, sleeping and guards are set once and trusted. One that changes an answer a little is never suspected.",
-    model="A heap of boxes, a stack, a thrown ball, a pendulum and a door, with one option turned at a time.",
+    why="Threads and guards are set once and trusted. One that changes an answer a little is never suspected.",
+    model="A heap of boxes, a pendulum and a door, with one option turned at a time.",
     parameters=(
         ("threads", "1 against 2 and 4: 216 boxes fall together, more than 512 contacts, 20 sweeps"),
-        (
-            "sleep_speed",
-            f"{SLEEPY.sleep_speed} m/s for {AFTER} s: five boxes; 3 m/s: a ball thrown up at 4 m/s; up a smooth slope of 30°",
-        ),
         ("unsettled_residual", "0.3 to 0.01 m/s, 30 boxes fall together, 10 sweeps"),
         ("correction_cap", "0.03 to 1, a pendulum that bends 0.003 a step"),
         ("floor", "1e-16 to 1e-8, a door of 45 kg on five hinges of compliance 0"),
         ("time step", "1/60 s"),
     ),
     theory=(
-        "Work shared among threads is the same work. A cap that nothing reaches caps nothing.",
+        "Work shared among threads is the same work. A cap that nothing reaches caps nothing: a pendulum let go level departs "
+        "from its chord by (v h)²/(2 l), g h² where it is fastest.",
         "A threshold is kept by more sweeps where that can be; a run within it is settled.",
-        "What falls freely is not at rest at the top. On a smooth slope it is slower than s for 2 s/(g sin α): with s below half "
-        "of g sin α times sleep_after it does not sleep.",
     ),
     reference="The same scene without the option, to the bit; statics.",
     conclusion="Green: they may be turned freely. Red: one of them is part of the answer.",
@@ -252,34 +192,6 @@ TEST = ScalarTest(
             "A heap falls together.",
             TIME_STEP,
             "threads",
-        ),
-        ask(
-            _asleep,
-            (
-                _none("awake", "boxes of the stack awake after 3 s", "1", "they lie still from the start"),
-                _none(
-                    "moved_asleep",
-                    "largest move of a box of the stack once asleep",
-                    "m",
-                    "a sleeping body keeps every bit",
-                ),
-                error(
-                    "load_asleep",
-                    "relative error of the floor's load",
-                    "1",
-                    1e-9,
-                    "the weight, as it was last",
-                ),
-                _none(
-                    "held_in_flight",
-                    "largest change of a ball's path by sleeping",
-                    "m",
-                    "what nothing holds is not at rest, however slow it is at its top",
-                ),
-            ),
-            "A stack lies, a ball flies.",
-            TIME_STEP,
-            "sleeping",
         ),
         ask(
             _reported,
@@ -326,23 +238,19 @@ TEST = ScalarTest(
         ),
     ),
     example=lambda: Example(scene=heap(), time_step=TIME_STEP),
-    figures=(
-        Figure(
-            name="sleep",
-            title="Below g sin α/2 times sleep_after, 1.23 m/s, sleeping leaves a ball alone",
-            draw=_draw,
-        ),
-    ),
+    figures=(Figure(name="cap", title="From g h² on, 0.0027, a cap leaves the pendulum alone", draw=_draw),),
     stability=(
         StabilityStudy(
-            name="laziest",
-            title="Largest sleep speed with which a ball is not put to sleep where it turns back on a slope",
-            configuration="sleeping",
-            definition="thrown up a smooth slope of 30° at twice that speed, it comes down again",
-            study=laziest,
-            unit="m/s",
-            expected=(0.5 * PULL * (AFTER - 2.0 * FINE), 0.5 * PULL * (AFTER + 2.0 * FINE)),
-            expected_source="2 s/(g sin α) = sleep_after, counted in steps of 1/240 s, two at most more or less",
+            name="tightest",
+            title="Smallest cap of a correction that leaves the pendulum alone",
+            configuration="caps",
+            definition="every bit of places and energies over 5 s is the default's",
+            study=tightest,
+            unit="1",
+            better="smaller",
+            expected=((1.0 - BEND) * BEND, (1.0 + BEND + 1.1 * SEARCHED) * BEND),
+            expected_source="(v h)²/(2 l) with v² = 2 g l at the bottom, more or less by what is left of its next order, g h²/l of it; "
+            "the search ends 0.1 % above it at most",
         ),
     ),
 )

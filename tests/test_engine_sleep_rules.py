@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +13,7 @@ from spook_tracker.engine import (
     WORLD,
     Box,
     ConstraintForce,
+    ContactForce,
     Distance,
     Hinge,
     JointSpring,
@@ -30,6 +32,7 @@ from spook_tracker.engine import (
     Sphere,
     Spring,
     Trace,
+    Velocity,
     Wire,
     simulate,
 )
@@ -45,6 +48,7 @@ from tests.sleep_scenes import (
     held,
     scene,
     sleepy,
+    stack,
     wakes_as_a_whole,
 )
 
@@ -317,3 +321,51 @@ def test_what_begins_to_fall_slowly_is_not_asleep(hung: bool) -> None:
         assert fallen == pytest.approx(0.5 * gravity * seconds**2, rel=0.01)
     else:
         assert fallen == pytest.approx(0.5 * gravity * seconds**2 - 0.01 * seconds, abs=1e-3)
+
+
+@pytest.mark.parametrize(("thrown", "slow"), [(4.0, 3.0), (0.5, 3.0)])
+def test_what_flies_is_left_alone_however_slow_it_is_at_its_top(thrown: float, slow: float) -> None:
+    """To the bits of a run without sleeping: what nothing holds is not at rest."""
+    ball = RigidBody(
+        name="ball", mass=1.0, shape=Sphere(0.1), position=(0.0, 0.0, 0.1), velocity=(0.0, 0.0, thrown)
+    )
+    asked = scene(FLOOR, ball)
+    observe = {"x": Trace(quantity=Position("ball"))}
+    flight = 2.0 * thrown / GRAVITY - TIME_STEP
+    flown, free = (
+        simulate(asked, time_step=TIME_STEP, duration=flight, method=method, observe=observe)["x"]
+        for method in (Method(sleep_speed=slow), Method())
+    )
+
+    assert np.array_equal(flown, free)
+
+
+@pytest.mark.parametrize(("share", "sleeps"), [(0.98, False), (1.02, True)])
+def test_a_ball_turns_back_on_a_slope_unless_it_is_slow_for_as_long_as_sleep_takes(
+    share: float, sleeps: bool
+) -> None:
+    """Slower than s for 2 s/(g sin α): it sleeps where that is sleep_after, two steps more or less."""
+    method, pull = Method(), 0.5 * GRAVITY  # along a smooth slope of 30°
+    slow = share * 0.5 * pull * method.sleep_after
+    ball = RigidBody(
+        name="ball", mass=1.0, shape=Sphere(0.1), position=(0.0, 0.0, 0.1), velocity=(2.0 * slow, 0.0, 0.0)
+    )
+    ground = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
+    slope = Scene(bodies=(ground, ball), gravity=(-pull, 0.0, -math.sqrt(0.75) * GRAVITY))
+    result = simulate(
+        slope,
+        time_step=1.0 / 240.0,
+        duration=2.0 * slow / pull + method.sleep_after,
+        method=replace(method, sleep_speed=slow),
+        observe={"v": Trace(quantity=Velocity("ball"))},
+    )
+
+    assert (result["v"][-1, 0] == 0.0) == sleeps
+    assert (result["v"][-1, 0] < 0.0) != sleeps
+
+
+def test_a_stack_at_rest_from_the_start_sleeps_with_its_weight() -> None:
+    run = held(scene(FLOOR, *stack(count=5)), sleepy(), 180, load=ContactForce("floor"))
+
+    assert asleep(run) == 5
+    assert abs(run["load"][2]) == pytest.approx(5.0 * GRAVITY, rel=1e-9)

@@ -230,9 +230,6 @@ def test_other_engines_are_asked_every_time_step_that_any_of_our_settings_takes(
     assert all(theirs.time_steps == (1.0, 0.5, 0.25) for theirs in asked["pendulum"].ladders)
 
 
-ABOUT_OPTIONS = "solver_options"  # asks what sleeping itself does
-
-
 def test_nobody_sleeps_while_a_question_is_asked() -> None:
     """What is asleep is out of the steps: neither answers nor run times would be those of the solver that is asked."""
     root = Path(__file__).parent.parent
@@ -249,11 +246,10 @@ def test_nobody_sleeps_while_a_question_is_asked() -> None:
     assert {method.sleep_speed for method in methods} == {awake}
     for room in ("scalar_tests", "tracker/measure"):  # those that are made where a question is asked
         for file in sorted((root / room).rglob("*.py")):
-            found = re.search(r"\bsleep_(speed|after)\b", file.read_text())
-            assert not found or file.stem == ABOUT_OPTIONS, file
+            assert not re.search(r"\bsleep_(speed|after)\b", file.read_text()), file
 
 
-@pytest.mark.parametrize("name", [name for name in CATALOGUE if name != ABOUT_OPTIONS])
+@pytest.mark.parametrize("name", CATALOGUE)
 def test_no_first_run_of_a_question_has_sleepers(name: str) -> None:
     """As the engine is asked, and not as the file reads."""
 

@@ -9,7 +9,7 @@ from typing import Any, cast
 import pytest
 
 from spook_tracker.engine import Method, simulate
-from spook_tracker.scalar_tests.case import Simulate
+from spook_tracker.scalar_tests.case import BreakPoint, Simulate
 from spook_tracker.scalar_tests.solver_options import TEST
 
 
@@ -33,7 +33,6 @@ def eager(scene: Any, **options: Any) -> Any:
     ("configuration", "engine"),
     [
         ("threads", taking(lambda method: replace(method, threads=1), 1e-15)),
-        ("sleeping", taking(lambda method: replace(method, sleep_speed=0.0))),
         ("thresholds", taking(lambda method: replace(method, unsettled_residual=1e9))),
         ("thresholds", eager),
         ("caps", taking(lambda m: replace(m, correction_cap=1e-4) if m.correction_cap < 0.3 else m)),
@@ -48,10 +47,20 @@ def test_an_option_that_is_part_of_the_answer_is_red(configuration: str, engine:
     assert not all(metric.passes(values[metric.name]) for metric in asked.metrics), values
 
 
+@pytest.mark.parametrize(("wider", "held"), [(1.0, True), (0.99, False), (1.01, False)])
+def test_the_cap_bites_where_the_pendulum_bends_as_much(wider: float, held: bool) -> None:
+    (study,) = TEST.stability
+    low, high = study.expected or (0.0, 0.0)
+    found = study.study(taking(lambda m: replace(m, correction_cap=min(1.0, m.correction_cap * wider))))
+
+    assert isinstance(found, BreakPoint)
+    assert (low <= found.value <= high) == held
+
+
 def test_every_guard_users_rely_on_is_asked() -> None:
     asked = {name for name, _ in TEST.parameters}
 
-    assert {"threads", "sleep_speed", "unsettled_residual", "correction_cap", "floor"} <= asked
+    assert {"threads", "unsettled_residual", "correction_cap", "floor"} <= asked
     assert asked - {"time step"} <= set(Method.__dataclass_fields__)
 
 
