@@ -102,6 +102,7 @@ pictures: develop
 looks: develop
 	@! command -v clang++-19 >/dev/null || $(MAKE) --no-print-directory wasm
 	SPOOK_TEST_EVERY_LOOK=1 $(BIN)/pytest -q --timeout 1800 tests/test_site_access.py
+	@! command -v clang++-19 >/dev/null || $(BIN)/python bench/live_tasks.py
 
 hostile: develop
 	SPOOK_HOSTILE_DOCUMENTS=10000 $(BIN)/pytest -q --timeout 7200 tests/test_tracker_hostile.py tests/test_tracker_damaged.py
