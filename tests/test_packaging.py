@@ -30,7 +30,7 @@ backend = pytest.importorskip("scikit_build_core.build", reason="the build backe
 ROOT = Path(__file__).resolve().parents[1]
 REAL = os.environ.get("SPOOK_TEST_REAL_WHEEL") == "1"
 FOLDERS = ("engine", "scalar_tests", "tracker", "migrations", "site")
-SLIM, EVERYTHING = 150, 370  # MB (10⁶ bytes) on the disk: without an extra, and with all of ours (43 Plotly)
+SLIM, EVERYTHING = 150, 350  # MB (10⁶ bytes) on the disk: without an extra, and with all of ours
 OURS = (
     "standard,data,dask,postgresql"  # the other extras are other people's engines, and tools of development
 )
