@@ -67,18 +67,24 @@ DECLARATION = re.compile(r"inline constexpr ([\w:]+)((?:\s+\w+ =[^,;]+,?)+);")
 PART = re.compile(r"namespace tolerances::(\w+) \{")
 
 
-def constants(text: str, room: str) -> Iterator[Constant]:
-    """Those of one header, in its order; what has no part of its own is its room's."""
+def declarations(text: str, room: str) -> Iterator[tuple[str, str, list[Constant]]]:
+    """Each statement of a header, the type and the constants that it declares, if it does; what has no part of its own is
+    its room's."""
     part = room
     for line in statements(text):
         if found := PART.match(line):
             part = found[1]
         elif line == "}":
             part = room
-        elif found := DECLARATION.match(line):
-            for one in found[2].split(","):
-                name, value = (side.strip() for side in one.split("="))
-                yield Constant(room, part, name, value)
+        declared = DECLARATION.match(line)
+        sides = [one.split("=") for one in declared[2].split(",")] if declared else []
+        constants = [Constant(room, part, name.strip(), value.strip()) for name, value in sides]
+        yield line, declared[1] if declared else "", constants
+
+
+def constants(text: str, room: str) -> list[Constant]:
+    """Those of one header, in its order."""
+    return [constant for _, _, found in declarations(text, room) for constant in found]
 
 
 def every_constant() -> list[Constant]:
@@ -100,19 +106,11 @@ def statements(text: str) -> Iterator[str]:
 
 def changeable(text: str, room: str) -> str:
     """The same header with numbers that the environment may change."""
-    part, lines = room, ['#include "run/tolerance.hpp"']
-    for line in statements(text):
-        if found := PART.match(line):
-            part = found[1]
-        elif line == "}":
-            part = room
-        if found := DECLARATION.match(line):
-            for one in found[2].split(","):
-                name, value = (side.strip() for side in one.split("="))
-                lines.append(
-                    f'inline const {found[1]} {name} = tolerance<{found[1]}>("{room}/{part}/{name}", {value});'
-                )
-        elif line:
+    lines = ['#include "run/tolerance.hpp"']
+    for line, kind, found in declarations(text, room):
+        for one in found:
+            lines.append(f'inline const {kind} {one.name} = tolerance<{kind}>("{one}", {one.value});')
+        if line and not found:
             lines.append(line)
     return "\n".join(lines) + "\n"
 

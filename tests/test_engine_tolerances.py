@@ -32,7 +32,7 @@ NO_TOLERANCES = {  # a number of another kind
 
 
 def declared(header: Path) -> list[tolerances.Constant]:
-    return list(tolerances.constants(header.read_text(), header.parent.name))
+    return tolerances.constants(header.read_text(), header.parent.name)
 
 
 @pytest.mark.parametrize("room", ROOMS, ids=lambda room: room.name)
