@@ -7,38 +7,11 @@ import math
 import numpy as np
 from scipy.special import ellipk
 
-from spook_tracker.engine import (
-    PLAIN,
-    WORLD,
-    Box,
-    Hinge,
-    JointCoordinate,
-    Method,
-    Result,
-    RigidBody,
-    Scene,
-    Trace,
-)
+from spook_tracker.engine import WORLD, Box, Hinge, JointCoordinate, Method, RigidBody, Scene, Trace
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
-from spook_tracker.scalar_tests.measured.readings import (
-    Reading,
-    against_theory,
-    agreement,
-    deviation,
-    told,
-)
+from spook_tracker.scalar_tests.case import BreakPoint, Drawing, Example, Figure, Simulate
+from spook_tracker.scalar_tests.measured import readings
+from spook_tracker.scalar_tests.measured.readings import Reading, deviation
 from spook_tracker.scalar_tests.sweep import line
 
 GRAVITY = 9.81  # m/s²
@@ -114,11 +87,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return period(simulate, LENGTHS[0], STARTS[0], time_step, method) / right(LENGTHS[0], STARTS[0]) - 1.0
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same swing with nothing observed."""
-    return simulate(scene(LENGTHS[0], STARTS[0]), time_step=time_step, duration=DURATION, method=method)
-
-
 def longest_step(simulate: Simulate) -> BreakPoint:
     """The longest step [s] with which a bar that hardly swings goes on hardly swinging."""
 
@@ -143,69 +111,54 @@ def _draw(simulate: Simulate) -> Drawing:
     )
 
 
-TEST = ScalarTest(
+TEST = readings.measured_test(
+    SOURCE,
+    ", by video and by telephone, five times each; half of what the two clocks differ by is the standard deviation of their mean.",
+    READINGS,
+    "s",
+    (
+        ("bars", "0.48 to 0.672 m long, uniform, 8 mm thick"),
+        ("gravity", "9.81 m/s²"),
+        ("time step", "1/240 s, 20 s"),
+    ),
+    measure,
+    readings.against_theory(1e-8, "fourth order in h; zeros by straight lines between samples"),
+    configuration="order 4",
+    time_step=TIME_STEP,
+    note="five lengths, each from its own angle",
     title="Bar pendulum, measured",
     question="Do bars of toy bricks swing as slowly as two kinds of clock have it?",
     why="A period joins gravity, inertia, a hinge and the clock. Nothing was fitted: a ruler is all that goes in.",
     model="Bars of 50 to 70 bricks hang by their end and are let go some ten degrees from the vertical.",
-    parameters=(
-        ("bars", "0.48 to 0.672 m long, uniform, 8 mm thick"),
-        ("gravity", "9.81 m/s²"),
-        ("time step", "1/240 s, 20 s"),
-        *told(READINGS, "s"),
-    ),
     theory=(
         "T = 4 √(J/(m g l/2)) K(sin(φ₀/2)), J = m (l² + d²)/12 + m l²/4: √(2 l/(3 g)) 2π for a thin bar and small swings.",
         "Left out: air, the pin's friction, studs and the telephone's own weight, and that the pin is not quite at the end.",
     ),
-    reference=f"Measured: {SOURCE}, by video and by telephone, five times each; half of what the two clocks differ by is the "
-    "standard deviation of their mean.",
     conclusion="Green: a hinged body swings as a real one does. Red: gravity, inertia or the clock is wrong.",
-    source=f"measured: {SOURCE}",
-    measured=True,
-    measurements=(
-        Measurement(
-            configuration="order 4",
-            time_step=TIME_STEP,
-            metrics=(
-                agreement(READINGS, SOURCE),
-                against_theory(1e-8, "fourth order in h; zeros by straight lines between samples"),
-            ),
-            measure=measure,
-            note="five lengths, each from its own angle",
-        ),
-    ),
     example=lambda: Example(scene=scene(LENGTHS[0], STARTS[0]), time_step=TIME_STEP, method=ORDER_4),
     figures=(Figure(name="period", title="Period against length", draw=_draw),),
-    ladders=(
-        Ladder(
-            name="period",
-            description="relative error of the period against the elliptic integral",
-            unit="1",
-            time_steps=tuple(1.0 / n for n in (60, 120, 240, 480, 960)),
-            configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=2.0, order_range=(1 / 960, 1 / 240)),
-                Configuration(
-                    name="order 4", method=ORDER_4, expected_order=None
-                ),  # down to how zeros are read
-            ),
-            error=ladder_error,
-            run=ladder_run,
-            target_error=1e-6,
-            target_seconds=0.01,
-        ),
+    ladders=readings.ladder(
+        ladder_error,
+        lambda: scene(LENGTHS[0], STARTS[0]),
+        DURATION,
+        (1.0 / n for n in (60, 120, 240, 480, 960)),
+        2.0,
+        better="order 4",
+        method=ORDER_4,
+        order_range=(1 / 960, 1 / 240),
+        name="period",
+        description="relative error of the period against the elliptic integral",
+        unit="1",
+        target_error=1e-6,
     ),
-    stability=(
-        StabilityStudy(
-            name="longest-step",
-            title="Longest time step of a small swing",
-            configuration="plain",
-            definition="400 steps without a hundredfold or larger swing",
-            study=longest_step,
-            unit="s",
-            expected=((1.0 - 1.1 * SEARCHED) * 2.0 / RATE, 2.0 / RATE),
-            expected_source="h ω = 2 of a small swing, where symplectic Euler's eigenvalues leave the circle and a swing grows by "
-            "two starts a step; the search ends 0.2 % short of it at most",
-        ),
+    stability=readings.breaks_at(
+        2.0 / RATE,
+        SEARCHED,
+        longest_step,
+        "h ω = 2 of a small swing, where symplectic Euler's eigenvalues leave the circle and a swing grows by two starts a step",
+        name="longest-step",
+        title="Longest time step of a small swing",
+        definition="400 steps without a two-hundredfold or larger swing",
+        unit="s",
     ),
 )

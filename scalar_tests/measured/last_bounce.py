@@ -6,46 +6,19 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    Energy,
-    Method,
-    Plane,
-    Position,
-    Result,
-    RigidBody,
-    Scene,
-    Sphere,
-    Trace,
-)
+from spook_tracker.engine import PLAIN, Energy, Method, Plane, Position, RigidBody, Scene, Sphere, Trace
 from spook_tracker.engine.bodies import Material
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
-from spook_tracker.scalar_tests.measured.readings import (
-    Reading,
-    against_theory,
-    agreement,
-    deviation,
-    told,
-)
+from spook_tracker.scalar_tests.case import BreakPoint, Drawing, Example, Figure, Simulate, StabilityStudy
+from spook_tracker.scalar_tests.measured import readings
+from spook_tracker.scalar_tests.measured.readings import Reading, deviation
 from spook_tracker.scalar_tests.sweep import line
 
 GRAVITY = 9.81  # m/s²
 RADIUS, MASS = 0.02, 0.01  # m, kg; neither matters
 FIRST = 0.63  # s, of the first bounce
 KEPT = 0.80  # of the height, bounce after bounce
-READ = 0.01  # how well that was read off a video, whose heights are "somewhat rough"
+READ = 0.01  # one of its last digit: the source calls its heights "somewhat rough" and says no more
 RESTITUTION = math.sqrt(KEPT)
 END = FIRST / (1.0 - RESTITUTION)  # s
 STEEP = FIRST / (2.0 * RESTITUTION * (1.0 - RESTITUTION) ** 2)  # s: dEND/dKEPT
@@ -102,11 +75,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return end(simulate, time_step, method) / heard() - 1.0
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same bounces with nothing observed."""
-    return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
-
-
 def liveliest(simulate: Simulate) -> BreakPoint:
     """The largest restitution with which no bounce is higher than the first."""
 
@@ -139,58 +107,50 @@ def _draw(simulate: Simulate) -> Drawing:
     )
 
 
-TEST = ScalarTest(
-    title="Last bounce, measured",
-    question="Is a ball heard to bounce for as long as its first bounces say?",
-    why="Restitution as one number is a bold claim: that a ball loses the same share at 4 m/s and at 4 cm/s.",
-    model="A ball whose first bounce takes 0.63 s and that keeps 0.80 of its height each time bounces until it lies still.",
-    parameters=(
+TEST = readings.measured_test(
+    SOURCE,
+    ": heights of a video, and 6.42 s of its sound from the first impact to the end.",
+    READINGS,
+    "s",
+    (
         ("first bounce", "0.63 s"),
         ("height kept", "0.80 ± 0.01, restitution √0.80"),
         ("gravity", "9.81 m/s²"),
         ("time step", "1e-3 s, 9 s"),
-        *told(READINGS, "s"),
     ),
+    measure,
+    readings.against_theory(
+        (BOUNCES + 1.0) * TIME_STEP / heard(),
+        "each bounce higher than 0.1 mm ends up to a step too early, and it is looked at once a step",
+    ),
+    configuration="plain",
+    time_step=TIME_STEP,
+    note="until it lies still",
+    title="Last bounce, measured",
+    question="Is a ball heard to bounce for as long as its first bounces say?",
+    why="Restitution as one number is a bold claim: that a ball loses the same share at 4 m/s and at 4 cm/s.",
+    model="A ball whose first bounce takes 0.63 s and that keeps 0.80 of its height each time bounces until it lies still.",
     theory=(
-        "All bounces together: t₁/(1 − e); those lower than 0.1 mm, the last 0.08 s, are not counted as heard. What is read of e as 0.80 ± 0.01 of the height moves that by 5 %: σ.",
+        "All bounces together: t₁/(1 − e); those lower than 0.1 mm, the last 0.08 s, are not counted as heard. ",
+        "σ is a choice: the source has 0.80 without an uncertainty; one of its last digit, 0.01, moves the end by 5 %.",
         "Left out: air, the ball's spin, and that rubber keeps more of a gentle impact: why the real ball is heard longer.",
     ),
-    reference=f"Measured: {SOURCE}: heights of a video, and 6.42 s of its sound from the first impact to the end.",
     conclusion="Green: many impacts add up as they do in the world. Red: energy is lost or made as bounces get small.",
-    source=f"measured: {SOURCE}",
-    measured=True,
-    measurements=(
-        Measurement(
-            configuration="plain",
-            time_step=TIME_STEP,
-            metrics=(
-                agreement(READINGS, SOURCE),
-                against_theory(
-                    (BOUNCES + 1.0) * TIME_STEP / heard(),
-                    "each bounce higher than 0.1 mm ends up to a step too early, and it is looked at once a step",
-                ),
-            ),
-            measure=measure,
-            note="until it lies still",
-        ),
-    ),
     example=lambda: Example(scene=scene(), time_step=TIME_STEP),
     figures=(Figure(name="bounces", title="Bounces, and when the real ball was heard last", draw=_draw),),
-    ladders=(
-        Ladder(
-            name="end",
-            description="relative error of the time at which the ball is last above 0.1 mm",
-            unit="1",
-            time_steps=(1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5),
-            configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=1.0),
-                Configuration(name="four substeps", method=Method(substeps=4), expected_order=1.0),
-            ),
-            error=ladder_error,
-            run=ladder_run,
-            target_error=1e-3,
-            target_seconds=0.01,
-        ),
+    ladders=readings.ladder(
+        ladder_error,
+        scene,
+        DURATION,
+        (1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5),
+        1.0,
+        better="four substeps",
+        method=Method(substeps=4),
+        better_order=1.0,
+        name="end",
+        description="relative error of the time at which the ball is last above 0.1 mm",
+        unit="1",
+        target_error=1e-3,
     ),
     stability=(
         StabilityStudy(

@@ -7,25 +7,9 @@ import math
 from spook_tracker.engine import AngularVelocity, Final, Plane, RigidBody, Scene, Sphere, Velocity
 from spook_tracker.engine.bodies import Material
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
-from spook_tracker.scalar_tests.measured.readings import (
-    Reading,
-    against_theory,
-    agreement,
-    deviation,
-    said,
-    told,
-)
+from spook_tracker.scalar_tests.case import BreakPoint, Drawing, Example, Figure, Metric, Simulate
+from spook_tracker.scalar_tests.measured import readings
+from spook_tracker.scalar_tests.measured.readings import Reading, deviation
 from spook_tracker.scalar_tests.sweep import line
 
 RADIUS, DENSITY = 2.5e-3, 4000.0  # m, kg/m³
@@ -113,65 +97,57 @@ def _draw(simulate: Simulate) -> Drawing:
         ),
         x_label="angle of impact [degrees]",
         y_label="angle of rebound [degrees]",
-        note=said(measure(simulate)["deviation"]),
+        note=readings.distance(measure(simulate)["deviation"]),
     )
 
 
-TEST = ScalarTest(
+TEST = readings.measured_test(
+    SOURCE,
+    " (validation data of MFiX and of Lethe). ±0.1° is what the two readings of the figure differ by; the "
+    "scatter of the impacts, of which there are no digits, is not in it.",
+    READINGS,
+    "degrees",
+    (
+        ("ball", "diameter 5 mm, 4000 kg/m³"),
+        ("speed", "3.9 m/s"),
+        ("friction coefficient", "0.092, as MFiX has it"),
+        ("restitution", "1, as MFiX has it; along the plate 0.41 where the ball grips"),
+        ("time step", "1e-3 s, one step"),
+    ),
+    measure,
+    readings.against_theory(1e-12, "one impact by Coulomb's law; rounding"),
+    Metric(
+        name="at_20_degrees",
+        description="rebound at 20.56° minus the measured 12.36°, where real balls grip elastically",
+        unit="degrees",
+        role="reported",
+        tolerance=1e-9,
+    ),
+    configuration="plain",
+    time_step=TIME_STEP,
+    note="four impacts beyond 30°, where real balls slide",
     title="Oblique impact, measured",
     question="Does a hard ball leave a glass plate at the angle at which it was photographed?",
     why="Impact with friction is where rigid bodies are the crudest model: one number for rebound, one for friction.",
     model="A ball of aluminium oxide of 5 mm meets thick glass at 3.9 m/s without spin; one impact, no gravity.",
-    parameters=(
-        ("ball", "diameter 5 mm, 4000 kg/m³"),
-        ("speed", "3.9 m/s"),
-        ("friction coefficient", "0.092"),
-        ("restitution", "1, along the plate 0.41 where the ball grips"),
-        ("time step", "1e-3 s, one step"),
-        *told(READINGS, "degrees"),
-    ),
     theory=(
         "Sliding: e tan α' = tan α − (1 + e) µ, r ω = ⁵⁄₂ (1 + e) µ v cos α.",
         "It grips where tan α < ⁷⁄₂ (1 + e) µ/(1 + e_grip).",
         "Left out: the elasticity along the plate (one number of the material stands for it; measured rebounds below 25° need "
         "more), wear, and spin of which readings scatter by 7 %.",
     ),
-    reference=f"Measured: {SOURCE} (validation data of MFiX and of Lethe). ±0.1° is what the two readings of the figure differ by.",
     conclusion="Green: rigid bodies with Coulomb's law rebound as real ones do. Red: friction in an impact is wrong.",
-    source=f"measured: {SOURCE}",
-    measured=True,
-    measurements=(
-        Measurement(
-            configuration="plain",
-            time_step=TIME_STEP,
-            metrics=(
-                agreement(READINGS, SOURCE),
-                against_theory(1e-12, "one impact by Coulomb's law; rounding"),
-                Metric(
-                    name="at_20_degrees",
-                    description="rebound at 20.56° minus the measured 12.36°, where real balls grip elastically",
-                    unit="degrees",
-                    role="reported",
-                    tolerance=1e-9,
-                ),
-            ),
-            measure=measure,
-            note="four impacts beyond 30°, where real balls slide",
-        ),
-    ),
     example=lambda: Example(scene=scene(ANGLES[0]), time_step=TIME_STEP, duration=0.01),
     figures=(Figure(name="rebound", title="Angle of rebound, simulated and measured", draw=_draw),),
     lacks={"ladder": "exact at every step"},
-    stability=(
-        StabilityStudy(
-            name="steepest-grip",
-            title="Steepest impact at which the ball grips",
-            configuration="plain",
-            definition="its slip turns round by 0.41 to 1e-9",
-            study=steepest_grip,
-            unit="degrees",
-            expected=((1.0 - 1.1 * SEARCHED) * STEEPEST_GRIP, STEEPEST_GRIP),
-            expected_source="tan α = ⁷⁄₂ (1 + e) µ/(1 + e_grip), Coulomb's bound; the search ends 0.1 % short of it at most",
-        ),
+    stability=readings.breaks_at(
+        STEEPEST_GRIP,
+        SEARCHED,
+        steepest_grip,
+        "tan α = ⁷⁄₂ (1 + e) µ/(1 + e_grip), Coulomb's bound",
+        name="steepest-grip",
+        title="Steepest impact at which the ball grips",
+        definition="its slip turns round by 0.41 to 1e-9",
+        unit="degrees",
     ),
 )

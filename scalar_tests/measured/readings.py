@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from scipy.special import chdtri
 
-from spook_tracker.scalar_tests.case import Metric, Role
-from spook_tracker.scalar_tests.sweep import told as told_number
+from spook_tracker.engine import PLAIN, Method, Result, Scene
+from spook_tracker.scalar_tests.case import (
+    BreakPoint,
+    Configuration,
+    Ladder,
+    Measurement,
+    Metric,
+    Role,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
+from spook_tracker.scalar_tests.sweep import told as number
 
 BY_CHANCE = 1e-3  # so often a right model lies further off than the limit
 
@@ -34,16 +46,16 @@ def farthest(count: int) -> float:
     return math.sqrt(float(chdtri(count, BY_CHANCE)) / count)
 
 
-def told(readings: Sequence[Reading], unit: str) -> tuple[tuple[str, str], ...]:
+def table_rows(readings: Sequence[Reading], unit: str) -> tuple[tuple[str, str], ...]:
     """The digits, for a page's table of parameters."""
     return tuple(
         (f"measured, {one.at}", f"{one.value:.6g} ± {one.sigma:.2g}{unit and ' '}{unit}") for one in readings
     )
 
 
-def said(off: float) -> str:
-    """The same as a sentence beside a figure."""
-    return f"The simulation is {told_number(off, 3)} standard deviations from what was measured, root mean square."
+def distance(off: float) -> str:
+    """How far that is, as a sentence beside a figure."""
+    return f"The simulation is {number(off, 3)} standard deviations from what was measured, root mean square."
 
 
 def agreement(readings: Sequence[Reading], source: str) -> Metric:
@@ -72,4 +84,89 @@ def against_theory(limit: float, why: str, role: Role = "companion") -> Metric:
         limit_source=why,
         reference=0.0,
         tolerance=1e-3 * limit,
+    )
+
+
+def ladder(
+    error: Callable[[Simulate, float, Method], float],
+    built: Callable[[], Scene],
+    duration: float,
+    time_steps: Iterable[float],
+    order: float,
+    *,
+    better: str,
+    method: Method,
+    better_order: float | None = None,
+    order_range: tuple[float, float] | None = None,
+    **rest: Any,
+) -> tuple[Ladder, ...]:
+    """Plain SPOOK and its order, beside one better method; timed is the scene over its duration [s], nothing observed.
+
+    `better_order` None: its error ends in rounding, or in how it is read. `rest` is as in any other ladder.
+    """
+
+    def unobserved(simulate: Simulate, time_step: float, method: Method) -> Result:
+        return simulate(built(), time_step=time_step, duration=duration, method=method)
+
+    plain = Configuration(name="plain", method=PLAIN, expected_order=order, order_range=order_range)
+    other = Configuration(name=better, method=method, expected_order=better_order)
+    return (
+        Ladder(
+            time_steps=tuple(time_steps),
+            configurations=(plain, other),
+            error=error,
+            run=unobserved,
+            target_seconds=0.01,
+            **rest,
+        ),
+    )
+
+
+def breaks_at(
+    right: float, searched: float, study: Callable[[Simulate], BreakPoint], source: str, **rest: Any
+) -> tuple[StabilityStudy, ...]:
+    """A break point of plain SPOOK at `right`, by theory; a search to a relative `searched` ends that far short of it."""
+    return (
+        StabilityStudy(
+            configuration="plain",
+            study=study,
+            expected=((1.0 - 1.1 * searched) * right, right),
+            expected_source=f"{source}; the search ends {100.0 * searched:.1g} % short of it at most",
+            **rest,
+        ),
+    )
+
+
+def measured_test(
+    source: str,
+    published: str,
+    readings: Sequence[Reading],
+    unit: str,
+    parameters: tuple[tuple[str, str], ...],
+    measure: Callable[[Simulate], dict[str, float]],
+    *metrics: Metric,
+    configuration: str,
+    time_step: float,
+    note: str,
+    **rest: Any,
+) -> ScalarTest:
+    """A test that is held to `readings` of a source; `metrics` and `rest` are as in any other test.
+
+    `published` goes on where the sentence "Measured: source" ends: how it was measured, and what stands for σ.
+    """
+    return ScalarTest(
+        parameters=(*parameters, *table_rows(readings, unit)),
+        reference=f"Measured: {source}{published}",
+        source=f"measured: {source}",
+        measured=True,
+        measurements=(
+            Measurement(
+                configuration=configuration,
+                time_step=time_step,
+                metrics=(agreement(readings, source), *metrics),
+                measure=measure,
+                note=note,
+            ),
+        ),
+        **rest,
     )

@@ -5,13 +5,11 @@ from __future__ import annotations
 import math
 
 from spook_tracker.engine import (
-    PLAIN,
     AngularVelocity,
     Final,
     Method,
     Plane,
     Position,
-    Result,
     RigidBody,
     Scene,
     Sphere,
@@ -20,26 +18,9 @@ from spook_tracker.engine import (
 )
 from spook_tracker.engine.bodies import Material
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
-from spook_tracker.scalar_tests.measured.readings import (
-    Reading,
-    against_theory,
-    agreement,
-    deviation,
-    told,
-)
+from spook_tracker.scalar_tests.case import BreakPoint, Drawing, Example, Figure, Metric, Simulate
+from spook_tracker.scalar_tests.measured import readings
+from spook_tracker.scalar_tests.measured.readings import Reading, deviation
 from spook_tracker.scalar_tests.sweep import line
 
 GRAVITY = 9.81  # m/s²
@@ -51,7 +32,7 @@ HALF_STEP = Method(half_step_velocities=True)
 TIME_STEP = BEAT / 20.0  # s
 BEATS = 8
 FRETS = (33, 130, 298, 526, 824, 1192, 1620, 2123)  # points from where the ball is let go
-EAR = 1.0 / 64.0  # s: how well beats are heard
+EAR = 1.0 / 64.0  # s: how well beats are heard, by Drake
 SOURCE = "Galileo, Ms. Gal. 72, folio 107 verso (about 1604), deciphered by Drake"
 READINGS = tuple(
     Reading(
@@ -102,11 +83,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(result["place"][0]) - 0.5 * PULL * LADDER_DURATION**2
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same rolling with nothing observed."""
-    return simulate(scene(), time_step=time_step, duration=LADDER_DURATION, method=method)
-
-
 def steepest_rolled(simulate: Simulate) -> BreakPoint:
     """Steepest slope (its tangent) down which the ball rolls without slip."""
 
@@ -132,74 +108,62 @@ def _draw(simulate: Simulate) -> Drawing:
     )
 
 
-TEST = ScalarTest(
-    title="Galileo's slope, measured",
-    question="Does a ball roll down a slope past Galileo's frets, beat by beat?",
-    why="The first measurement of an accelerated motion there is; what it found, t², is what every step of ours adds up.",
-    model="A ball rolls from rest down a slope of 1.7°; where it is at eight equal beats is compared with eight frets.",
-    parameters=(
+TEST = readings.measured_test(
+    SOURCE,
+    ": 33, 130, 298, 526, 824, 1192, 1620, 2123 points.",
+    READINGS,
+    "",
+    (
         ("slope", "1.7°"),
         ("beat", "0.55 s, as Drake has it; ratios do not depend on it"),
         ("friction coefficient", "0.3: it rolls"),
         ("time step", "1/20 beat"),
-        *told(READINGS, ""),
     ),
+    measure,
+    readings.against_theory(1e-12, "a steady pull is exact with velocities at mid-step; rounding", "gate"),
+    Metric(
+        name="last_fret",
+        description="distance at the eighth beat over the last fret, less 1, with Drake's slope and beat, each known to 2 or 3 %",
+        unit="1",
+        role="reported",
+        tolerance=1e-9,
+    ),
+    configuration="half-step",
+    time_step=TIME_STEP,
+    note="velocities live at mid-step",
+    title="Galileo's slope, measured",
+    question="Does a ball roll down a slope past Galileo's frets, beat by beat?",
+    why="The first measurement of an accelerated motion there is; what it found, t², is what every step of ours adds up.",
+    model="A ball rolls from rest down a slope of 1.7°; where it is at eight equal beats is compared with eight frets.",
     theory=(
         "x = ½ (5/7) g sin θ t² of a solid ball that rolls; over the last distance (n/8)², whatever slope, beat and ball.",
-        "σ: an ear is 1/64 s off, at this fret and at the last: 2 (1/64 s)/(n · 0.55 s) of the distance.",
+        "σ: an ear is 1/64 s off (Drake), at this fret and at the last: 2 (1/64 s)/(n · 0.55 s) of the distance.",
         "Left out: the groove, rolling friction, and the knock of the frets.",
     ),
-    reference=f"Measured: {SOURCE}: 33, 130, 298, 526, 824, 1192, 1620, 2123 points.",
     conclusion="Green: a rolling ball is as far after each beat as the first one measured. Red: motion is not t², or not rolling.",
-    source=f"measured: {SOURCE}",
-    measured=True,
-    measurements=(
-        Measurement(
-            configuration="half-step",
-            time_step=TIME_STEP,
-            metrics=(
-                agreement(READINGS, SOURCE),
-                against_theory(1e-12, "a steady pull is exact with velocities at mid-step; rounding", "gate"),
-                Metric(
-                    name="last_fret",
-                    description="distance at the eighth beat over the last fret, less 1, with Drake's slope and beat, each known to 2 or 3 %",
-                    unit="1",
-                    role="reported",
-                    tolerance=1e-9,
-                ),
-            ),
-            measure=measure,
-            note="velocities live at mid-step",
-        ),
-    ),
     example=lambda: Example(scene=scene(), time_step=TIME_STEP, method=HALF_STEP),
     figures=(Figure(name="frets", title="Distance at each beat", draw=_draw),),
-    ladders=(
-        Ladder(
-            name="distance",
-            description="distance after eight beats against ½ a t²",
-            unit="m",
-            time_steps=tuple(BEAT / n for n in (10, 20, 40, 80, 160)),
-            configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=1.0),
-                Configuration(name="half-step", method=HALF_STEP, expected_order=None),  # rounding
-            ),
-            error=ladder_error,
-            run=ladder_run,
-            target_error=0.01,
-            target_seconds=0.01,
-        ),
+    ladders=readings.ladder(
+        ladder_error,
+        scene,
+        LADDER_DURATION,
+        (BEAT / n for n in (10, 20, 40, 80, 160)),
+        1.0,
+        better="half-step",
+        method=HALF_STEP,
+        name="distance",
+        description="distance after eight beats against ½ a t²",
+        unit="m",
+        target_error=0.01,
     ),
-    stability=(
-        StabilityStudy(
-            name="steepest-rolled",
-            title="Steepest slope down which the ball rolls",
-            configuration="plain",
-            definition="speed and spin agree to 1e-9 after 40 steps",
-            study=steepest_rolled,
-            unit="1",
-            expected=((1.0 - 1.1 * SEARCHED) * 3.5 * FRICTION, 3.5 * FRICTION),
-            expected_source="tan θ = 3.5 µ of a solid ball; the search ends 0.2 % short of it at most",
-        ),
+    stability=readings.breaks_at(
+        3.5 * FRICTION,
+        SEARCHED,
+        steepest_rolled,
+        "tan θ = 3.5 µ of a solid ball",
+        name="steepest-rolled",
+        title="Steepest slope down which the ball rolls",
+        definition="speed and spin agree to 1e-9 after 40 steps",
+        unit="1",
     ),
 )

@@ -6,37 +6,11 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    Distance,
-    Method,
-    Particle,
-    Position,
-    Result,
-    Scene,
-    Trace,
-)
+from spook_tracker.engine import PLAIN, Distance, Method, Particle, Position, Scene, Trace
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
-from spook_tracker.scalar_tests.measured.readings import (
-    Reading,
-    against_theory,
-    agreement,
-    deviation,
-    said,
-    told,
-)
+from spook_tracker.scalar_tests.case import BreakPoint, Drawing, Example, Figure, Simulate
+from spook_tracker.scalar_tests.measured import readings
+from spook_tracker.scalar_tests.measured.readings import Reading, deviation
 from spook_tracker.scalar_tests.sweep import line
 
 INCH = 0.0254  # m
@@ -59,7 +33,7 @@ READINGS = (
         at="a beat", value=1.0, sigma=0.5 * math.hypot(FARTHEST / LENGTH, NEARBY / GRAVITY)
     ),  # s of mean solar time
 )
-STEPS = 400  # of a search; at h ω = 2 a swing has grown some hundredfold
+STEPS = 400  # of a search; at h ω = 2 a swing has grown two times that
 SEARCHED = 2e-3
 
 
@@ -91,11 +65,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return beat(simulate, time_step, method) / BEAT - 1.0
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same swing with nothing observed."""
-    return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
-
-
 def longest_step(simulate: Simulate) -> BreakPoint:
     """The longest step [s] with which a pendulum that hardly swings goes on hardly swinging."""
 
@@ -119,79 +88,61 @@ def _draw(simulate: Simulate) -> Drawing:
         y_label="off [s]",
         x_scale="log",
         y_scale="log",
-        note=said(measure(simulate)["deviation"]),
+        note=readings.distance(measure(simulate)["deviation"]),
     )
 
 
-TEST = ScalarTest(
-    title="Seconds pendulum, measured",
-    question="Does a pendulum of Kater's length beat seconds under the gravity of today's gravimeters?",
-    why="Two measurements 134 years apart, one with a ruler and one without, meet in a single period, to six digits.",
-    model="A bob on a rod of 39.13929 inches, the length that beat seconds in London, swings by a thousandth of a radian.",
-    parameters=(
+TEST = readings.measured_test(
+    SOURCE,
+    " (981 196.29 mGal on the Potsdam system, less its 14.0 mGal).",
+    READINGS,
+    "s",
+    (
         ("length", "39.13929 in; trials at most 0.00028 in from their mean"),
         ("gravity", "9.811823 m/s² at Teddington; London within 1e-4"),
         ("swing", "0.001 rad"),
         ("time step", "1/120 s, 40 s"),
-        *told(READINGS, "s"),
     ),
+    measure,
+    readings.against_theory(
+        1e-9, "fourth order in h: 2e-11 are left; zeros by straight lines between samples"
+    ),
+    configuration="order 4",
+    time_step=TIME_STEP,
+    note="40 beats",
+    title="Seconds pendulum, measured",
+    question="Does a pendulum of Kater's length beat seconds under the gravity of today's gravimeters?",
+    why="Two measurements 134 years apart, one with a ruler and one without, meet in a single period, to six digits.",
+    model="A bob on a rod of 39.13929 inches, the length that beat seconds in London, swings by a thousandth of a radian.",
     theory=(
         "A beat is π √(l/g) (1 + φ₀²/16).",
         "σ = ½ √((0.00028/39.139)² + (1e-4/9.81)²) s: what Kater's trials differ by, and gravity between the two places.",
-        "Left out: air and its drag, the knife edges, the height above the sea: Kater reckoned them out of the length.",
+        "Left out: air and its drag, the knife edges, the height above the sea: the length is corrected for them by Kater.",
     ),
-    reference=f"Measured: {SOURCE} (981 196.29 mGal on the Potsdam system, less its 14.0 mGal).",
     conclusion="Green: the engine's second, metre and gravity are those of the world. Red: the pendulum runs fast or slow.",
-    source=f"measured: {SOURCE}",
-    measured=True,
-    measurements=(
-        Measurement(
-            configuration="order 4",
-            time_step=TIME_STEP,
-            metrics=(
-                agreement(READINGS, SOURCE),
-                against_theory(
-                    1e-9, "fourth order in h: 2e-11 are left; zeros by straight lines between samples"
-                ),
-            ),
-            measure=measure,
-            note="40 beats",
-        ),
-    ),
     example=lambda: Example(scene=scene(), time_step=TIME_STEP, method=ORDER_4),
     figures=(Figure(name="beat", title="How far a beat is from a second", draw=_draw),),
-    ladders=(
-        Ladder(
-            name="beat",
-            description="relative error of the beat against π √(l/g)",
-            unit="1",
-            time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480)),
-            configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=2.0),
-                Configuration(
-                    name="order 4", method=ORDER_4, expected_order=None
-                ),  # down to how zeros are read
-            ),
-            error=ladder_error,
-            run=ladder_run,
-            target_error=1e-5,
-            target_seconds=0.01,
-        ),
+    ladders=readings.ladder(
+        ladder_error,
+        scene,
+        DURATION,
+        (1.0 / n for n in (30, 60, 120, 240, 480)),
+        2.0,
+        better="order 4",
+        method=ORDER_4,
+        name="beat",
+        description="relative error of the beat against π √(l/g)",
+        unit="1",
+        target_error=1e-5,
     ),
-    stability=(
-        StabilityStudy(
-            name="longest-step",
-            title="Longest time step of a small swing",
-            configuration="plain",
-            definition="400 steps without a hundredfold swing",
-            study=longest_step,
-            unit="s",
-            expected=(
-                (1.0 - 1.1 * SEARCHED) * 2.0 * math.sqrt(LENGTH / GRAVITY),
-                2.0 * math.sqrt(LENGTH / GRAVITY),
-            ),
-            expected_source="h ω = 2 of a small swing, where symplectic Euler's eigenvalues leave the circle; the search ends 0.2 % "
-            "short of it at most",
-        ),
+    stability=readings.breaks_at(
+        2.0 * math.sqrt(LENGTH / GRAVITY),
+        SEARCHED,
+        longest_step,
+        "h ω = 2 of a small swing, where symplectic Euler's eigenvalues leave the circle",
+        name="longest-step",
+        title="Longest time step of a small swing",
+        definition="400 steps without a hundredfold swing",
+        unit="s",
     ),
 )
