@@ -80,7 +80,7 @@ GUARDS = (
     Guard("red goes before what was not written", "tracker/cli/main.py", "exit(RED if red else UNUSABLE)", "exit(RED if kept else UNUSABLE)", "test_tracker_after_measuring"),
     Guard("what is stored is on the disk", "tracker/store/connection.py", '"synchronous = FULL"', '"synchronous = OFF"', "test_tracker_database told"),
     Guard("a worker ends with its supervisor", WORKERS, "    _never_outlive(lifeline, parent)\n", "", "test_tracker_workers outlives"),
-    Guard("settings above a repository are others'", "tracker/cli/settings.py", "for folder in above[: root + 1] if", "for folder in above if", "test_tracker_settings somebody_elses"),
+    Guard("settings above a repository are others'", "tracker/cli/settings.py", "for folder in above[: root + 1] if", "for folder in above if", "test_tracker_settings belongs_to_others"),
     Guard("a worker elsewhere is like this one", "tracker/measure/executors.py", "if not there.like(here):", "if False:", "test_tracker_executors refused"),
 )  # fmt: skip
 

@@ -1,4 +1,4 @@
-// The particle scenes as loops written by hand: what a programmer would write who simulates only this scene.
+// The particle scenes as loops written by hand: what a programmer would write for only this scene.
 // Same arithmetic as the engine's plain SPOOK step, -O3, no fast-math. Each returns a number of the end state so
 // that nothing is optimised away; h = 1/60 s, g = 9.81 m/s².
 #include <cmath>

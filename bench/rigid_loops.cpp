@@ -1,4 +1,4 @@
-// Rods in a row on hinges, in a plane, as a loop written by hand: what a programmer would write who simulates only this.
+// Rods in a row on hinges, in a plane, as a loop written by hand: what a programmer would write for only this scene.
 // Same arithmetic as the engine's plain SPOOK step of this scene (bench_rigid.py, rods): 1 kg, half a metre long, each end
 // on the next one's beginning, the first on a wall; h = 1/240 s, g = 9.81 m/s² along -y, rows damped over 2 h, as
 // compliant as the engine's and measured in the first body's frame, so that its arm reaches to the second one's point. Two

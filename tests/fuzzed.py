@@ -1,7 +1,7 @@
 """What fuzzing puts to the Python side: any bytes are taken, or refused in one sentence of ours; nothing else.
 
     documents   the bytes as a file given to `tracker import`
-    scenes      the bytes as what somebody builds a scene of, sense and nonsense mixed, then steps a little
+    scenes      the bytes as what a scene is built of, sense and nonsense mixed, then steps a little
     settings    the bytes as tracker.toml and as accepted.toml
 
 `make fuzz` runs each under atheris, guided by what of our code it reaches (tests/fuzz_run.py).
@@ -156,7 +156,7 @@ def _body(said: Bytes, name: str) -> Any:
 
 
 def _constraint(said: Bytes, name: str, known: str) -> Any:
-    ends = tuple(said.among((*known, spook.WORLD), "nobody") for _ in range(2))
+    ends = tuple(said.among((*known, spook.WORLD), "absent") for _ in range(2))
     common: Any = {"name": name, "compliance": said.size() if said.below(4) == 0 else 0.0}
     placed = common | {"between": ends, "at": said.maybe(said.vector), "strength": said.maybe(said.size)}
     kind = said.below(9)

@@ -16,8 +16,8 @@ STEP = 1e-3  # s
 STIFFNESS = 2e4  # N/m
 DRAG = 100.0  # N s/m
 DAMPED = 0.9  # of the critical damping
-SKIN = 0.1  # m: pairs nearer than this beyond touching are looked at until somebody has gone half of it
-ASIDE = 0.005  # m: how far another start is from the pile's own, and nobody overlaps yet
+SKIN = 0.1  # m: pairs nearer than this beyond touching are looked at until a body has gone half of it
+ASIDE = 0.005  # m: how far another start is from the pile's own, and none overlaps yet
 
 
 def _turned(arm: np.ndarray, force: np.ndarray) -> np.ndarray:

@@ -17,6 +17,7 @@ from typing import Any
 
 import psycopg
 
+WITHOUT_RIGHTS = 65534  # the id of the user that Linux gives no file
 MISSING = "no PostgreSQL server binaries (initdb) here; .ci/install-system installs them"
 
 
@@ -38,7 +39,7 @@ class Server:
 
     @contextlib.contextmanager
     def new_database(self, copied: str = "template1") -> Iterator[str]:
-        """The URL of a new database, dropped at the end: empty, or a copy of one that nobody has open."""
+        """The URL of a new database, dropped at the end: empty, or a copy of one that is not open."""
         name = f"tracker_{next(self._numbers)}"  # made here: nothing given from outside enters a statement
         with self._connection() as connection:
             files = " STRATEGY FILE_COPY" if connection.info.server_version >= 150000 else ""  # less work
@@ -118,9 +119,9 @@ def _where() -> str:
 
 
 def _other_user() -> pwd.struct_passwd:
-    for name in ("postgres", "nobody"):
+    for known in (lambda: pwd.getpwnam("postgres"), lambda: pwd.getpwuid(WITHOUT_RIGHTS)):
         with contextlib.suppress(KeyError):
-            return pwd.getpwnam(name)
+            return known()
     raise RuntimeError("there is no user but root to run PostgreSQL")
 
 

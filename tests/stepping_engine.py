@@ -1,4 +1,4 @@
-"""An engine of somebody else's behind the protocol: falling bodies by the symplectic step, a page long."""
+"""Another team's engine behind the protocol: falling bodies by the symplectic step, a page long."""
 
 from __future__ import annotations
 

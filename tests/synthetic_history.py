@@ -185,7 +185,7 @@ def _cards(hostile: bool) -> Iterable[TestCard]:
     for test, (title, _, _, _, question) in SEVEN.items():
         yield TestCard(
             name=test, title=title, question=question,
-            why="A number that moves here moves in every scene built from the same parts, and nobody sees it by eye.",
+            why="A number that moves here moves in every scene built from the same parts, and cannot be seen by eye.",
             model="A sphere of 1 kg at the end of a massless rod of 1 m, released at 90°, for 22 s at h = 1/60 s.",
             parameters=(("mass", "1 kg"), ("length", "1 m"), ("gravity", "9.81 m/s²"), ("time step", "1/60 s")),
             theory=(

@@ -70,7 +70,7 @@ def test_the_page_says_who_is_first_and_why_we_are_behind(
         ("not_supported", "unasked", "spook 500 µs (only one asked)"),
     ],
 )
-def test_a_place_is_won_reached_alone_or_nobody_elses_to_win(
+def test_a_place_is_won_reached_alone_or_not_for_others_to_win(
     engines: Any, theirs: str, how: str, told: str
 ) -> None:
     """Ours within an error in half a millisecond; the other a little sooner, not at all, or never asked."""
@@ -295,7 +295,7 @@ def test_a_package_called_tests_that_an_engine_brings_is_taken_out_and_nothing_e
         "tests/test_theirs.py,,\nbrings_tests/tests/kept.py,,\nbrings_tests/engine.py,,\n"
     )
     script = FILE.parents[1] / ".ci" / "without_tests.py"
-    for name in ("brings_tests", "nobody_has_this"):
+    for name in ("brings_tests", "no_such_package"):
         subprocess.run(
             [sys.executable, str(script), name], check=True, env={**os.environ, "PYTHONPATH": str(tmp_path)}
         )

@@ -70,7 +70,7 @@ def test_the_command_reads_its_options(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Down to the commit that is looked for: the rest builds engines."""
-    monkeypatch.setattr("sys.argv", ["mutants.py", "sticky", "--commit", "nobody"])
+    monkeypatch.setattr("sys.argv", ["mutants.py", "sticky", "--commit", "absent"])
 
-    with pytest.raises(mutants.commits.CommitError, match="git knows no commit 'nobody'"):
+    with pytest.raises(mutants.commits.CommitError, match="git knows no commit 'absent'"):
         mutants.main()

@@ -33,7 +33,14 @@ def test_a_version_is_given_counted_or_unknown_but_never_guessed() -> None:
 
 
 def git(folder: Path, *arguments: str) -> str:
-    identity = ("-c", "user.name=nobody", "-c", "user.email=nobody@example.org", "-c", "commit.gpgsign=false")
+    identity = (
+        "-c",
+        "user.name=Ada Example",
+        "-c",
+        "user.email=ada@example.org",
+        "-c",
+        "commit.gpgsign=false",
+    )
     command = ["git", *identity, "-C", str(folder), *arguments]
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
 
@@ -103,7 +110,7 @@ def test_clones_and_archives_are_told_apart(tmp_path: Path) -> None:
         "git_hash": head, "commit_time": "2026-11-21T03:17:00+00:00", "parents": f"{head} {head}", "dirty": "true",
     } == facts(deeper)  # fmt: skip
 
-    # An unpacked archive inside somebody else's repository must not borrow that repository's commit.
+    # An unpacked archive inside another repository must not borrow that repository's commit.
     inside = full / "third_party"
     shutil.copytree(archive, inside)
     (inside / ".source-archive").unlink()

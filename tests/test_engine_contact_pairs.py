@@ -1,4 +1,4 @@
-"""Who touches whom: collision is left out where nothing can touch, and pairs can be excepted."""
+"""Which bodies touch: collision is left out where nothing can touch, and pairs can be excepted."""
 
 from __future__ import annotations
 

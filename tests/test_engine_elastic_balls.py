@@ -141,7 +141,7 @@ def test_a_ball_that_rises_along_a_wall_is_not_carried_by_it(
 def test_balls_locked_to_each_other_are_carried_by_no_body(
     share: float, solver: str, impacts: Impacts
 ) -> None:
-    """One above the other they rise to a roof, and both turn round: a lock holds them together, and nobody up."""
+    """One above the other they rise to a roof, and both turn round: a lock holds them together, and holds none up."""
     speed = 3.0
     bodies = [
         wall("roof", (0.0, 0.0, RADIUS + share * H * speed + 0.5), (4.0, 4.0, 1.0)),

@@ -1,4 +1,4 @@
-"""A run that has completed holds no value that is none: what ran away is said, whoever was asked about it."""
+"""A run that has completed holds no value that is none: what ran away is said, whatever was asked for."""
 
 from __future__ import annotations
 

@@ -147,7 +147,7 @@ def test_what_comes_down_on_another_is_no_slider_at_its_side(seed: int, restitut
 
 @pytest.mark.parametrize("seed", [46, 61, 146, 233, 234, 256])
 def test_a_side_skipped_between_iterations_is_met_if_the_body_gets_there(seed: int) -> None:
-    """Between sweeps he was taken for one that slides by, as fast as he still fell; his velocity was the one that they ended
-    with, and nobody asked again: he came to lie 3 to 80 mm in the other."""
+    """Between iterations it was taken for one that slides by, as fast as it still fell; its velocity was the one they ended
+    with, and was not tested again: it came to lie 3 to 80 mm in the other."""
     fall = falling_pile.read(simulate, seed, 0.0, 0.0, falling_pile.SWEEPS)
     assert (fall.depth - fall.bent).max() < 1e-7

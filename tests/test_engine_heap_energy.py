@@ -137,7 +137,7 @@ def test_a_stack_that_iterations_lift_apart_stands() -> None:
 
 
 @pytest.mark.parametrize(("seed", "solver"), [(1000, "iterative"), (1544, "iterative")])
-def test_what_merely_lies_near_pays_for_nobodys_gain(seed: int, solver: str) -> None:
+def test_what_merely_lies_near_pays_for_no_gain(seed: int, solver: str) -> None:
     """A heavy ball falls past a few cubes, and is looked at until it touches one. Weighed together with it, a solve of
     the cubes that stops early gained 1.4e-5 of their energy in a step.
     """

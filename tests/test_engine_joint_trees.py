@@ -121,7 +121,7 @@ def test_a_pair_that_floats_keeps_its_momenta_and_its_hinge() -> None:
 
 @pytest.mark.parametrize("kind", [Cylindrical, Planar, PointOnLine])
 def test_freer_joints_move_as_their_rows_have_it(kind: type[Any]) -> None:
-    """A particle on a distance elsewhere makes everybody's rows be solved, which other tests hold to the equations; their turns
+    """A particle on a distance elsewhere makes the rows of all be solved, which other tests hold to the equations; their turns
     are of another map, the same to order four."""
     free, axis = hung("ball", "hinge"), np.array([0.6, 0.0, 0.8])
     slide = kind(name="slide", between=(WORLD, "b0"), at=(0.5, 0.0, 0.0), axis=tuple(axis), compliance=0.0)

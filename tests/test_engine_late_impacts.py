@@ -42,7 +42,7 @@ def after_a_step(bodies: tuple[RigidBody, ...], solver: str) -> np.ndarray:
 
 
 RADIUS = 0.25  # m
-GAP = 0.01  # m, between the pusher and whom it pushes
+GAP = 0.01  # m, between the pusher and the one it pushes
 PUSH = 12.0  # m/s
 PUSHED = PUSH - GAP / TIME_STEP  # m/s, so that the gap is closed where the step ends
 

@@ -85,7 +85,7 @@ def moved_points(by: float) -> np.ndarray:
 def test_a_loop_that_does_not_fit_is_refused(
     monkeypatch: pytest.MonkeyPatch, by: float, compliance: float
 ) -> None:
-    """Six hinges in a loop that is no Bricard mechanism are a truss: it stands, which nobody asked of it."""
+    """Six hinges in a loop that is no Bricard mechanism are a truss: it stands, which it was not asked to."""
     monkeypatch.setattr(bricard, "POINTS", moved_points(by))
     run, _ = third_after_a_second(compliance, H)
 

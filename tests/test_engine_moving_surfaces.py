@@ -1,4 +1,4 @@
-"""Conveyors: a surface that moves along itself takes along what rubs on it, whatever it is and whoever solves it."""
+"""Conveyors: a surface that moves along itself takes along what rubs on it, whatever it is and whichever solver is used."""
 
 from __future__ import annotations
 

@@ -146,7 +146,7 @@ def test_a_model_answers_with_the_same_bits_in_another_process(tmp_path: Path) -
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends a process with its parent")
-def test_a_run_elsewhere_ends_with_whoever_asked_for_it(tmp_path: Path) -> None:
+def test_a_run_elsewhere_ends_with_the_process_that_asked(tmp_path: Path) -> None:
     code = (
         "import pickle, sys; from spook_tracker.engine.find import find; "
         "run, h = pickle.load(open(sys.argv[1], 'rb')); find('mujoco').simulate(run, time_step=h, duration=1e6)"

@@ -105,7 +105,7 @@ def test_a_task_that_is_never_read_is_timed_out(tmp_path: Path, monkeypatch: pyt
 @needs_node
 @pytest.mark.skipif(sys.platform != "linux", reason="only Linux ends a process with its parent")
 def test_a_process_ends_with_the_one_that_asked(tmp_path: Path) -> None:
-    """Whether it waits for a task or never ends one, and though nobody could say good-bye."""
+    """Whether it waits for a task or never ends one; the parent is killed and tells it nothing."""
     engine = script(
         tmp_path, "if (task.steps === 1) for (;;); return { state: () => [process.pid], step: () => {} };"
     )

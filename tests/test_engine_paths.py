@@ -137,7 +137,7 @@ LEAN, AHEAD = 0.8, 0.3 * math.sin(0.7)  # rad; m, where the wave begins
 
 def shaken(h: float, method: Method, by_path: bool) -> tuple[float, float]:
     """Error of a rod's centre [m] that hangs on a hinge shaken from the start on, and how far the hinge opens [m] once
-    the first step, before which nobody told how it moved, is forgotten."""
+    the first step, before which its motion was not known, is forgotten."""
     speed = 0.3 * 0.8 * math.pi
     moved: dict[str, Any] = (
         {"path": (Sinusoid(amplitude=0.3, frequency=0.4, phase=0.7, offset=-AHEAD), 0.0, 0.0)}

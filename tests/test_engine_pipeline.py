@@ -102,7 +102,7 @@ def tables(scene: Scene) -> dict[str, Any]:
     ("table", "column", "what"),
     [("joints", "kind", "joint"), ("bodies", "motion", "motion"), ("colliders", "kind", "shape")],
 )
-def test_a_kind_that_nobody_knows_is_named_at_the_start(table: str, column: str, what: str) -> None:
+def test_an_unknown_kind_is_named_at_the_start(table: str, column: str, what: str) -> None:
     rng = np.random.default_rng(SEED)
     planted = tables(rigid_scenes.everything(rng))
     if table == "colliders":

@@ -201,7 +201,7 @@ def test_a_rod_whose_swing_pulls_more_than_a_step_can_follow_is_named() -> None:
 
 @pytest.mark.parametrize("method", [*METHODS.values(), Method(substeps=3)], ids=[*METHODS, "substeps"])
 @pytest.mark.parametrize("make", [lambda: rods(3), four_bar], ids=["rods", "four-bars"])
-def test_whoever_looks_changes_no_bit(make: Callable[[], Scene], method: Method) -> None:
+def test_observation_changes_no_bit(make: Callable[[], Scene], method: Method) -> None:
     """Samples of all kinds, stage times, and a run that is held, kept and taken back."""
     scene = make()
     first = scene.constraints[0].name

@@ -142,7 +142,7 @@ def test_forces_come_from_the_engine_or_not_at_all() -> None:
         "joint": Final(quantity=ConstraintForce(name)),
         "first": Final(quantity=ContactForce("b0")),
         "second": Final(quantity=ContactForce("b1", "b0")),
-        "nobody": Final(quantity=ContactForce("b0", "b0")),
+        "itself": Final(quantity=ContactForce("b0", "b0")),
     }
 
     values, _ = observed(scene, shown, observe, rigid_scenes.TIME_STEP)
@@ -150,7 +150,7 @@ def test_forces_come_from_the_engine_or_not_at_all() -> None:
     assert list(values["joint"]) == list(force[-1])
     assert list(values["first"]) == list(force[-1, :3])
     assert list(values["second"]) == list(-force[-1, :3])
-    assert list(values["nobody"]) == [0.0, 0.0, 0.0]
+    assert list(values["itself"]) == [0.0, 0.0, 0.0]
     with pytest.raises(MethodError, match="ContactCount"):
         observed(scene, bare, {"count": Final(quantity=ContactCount())}, 0.01)
 

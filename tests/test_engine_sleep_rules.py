@@ -1,4 +1,4 @@
-"""Sleeping, rule by rule: what counts as at rest, what hangs together, and what wakes whom."""
+"""Sleeping, rule by rule: what counts as at rest, what is connected, and what wakes what."""
 
 from __future__ import annotations
 

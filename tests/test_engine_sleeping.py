@@ -71,7 +71,7 @@ def test_a_heap_asleep_carries_its_weight_and_stays_to_the_last_bit(solver: str)
     assert run.result().counters["slept_steps"] >= 100 * 30
 
 
-def test_nothing_is_different_until_somebody_sleeps() -> None:
+def test_nothing_is_different_until_a_body_sleeps() -> None:
     """Its bits are those of a run without: a ball that rolls for ever keeps its heap awake, and one alone does not."""
     rolls = RigidBody(
         name="ball",
@@ -298,7 +298,7 @@ def test_a_slow_turn_counts_at_the_surface() -> None:
 
 
 def test_a_pendulum_at_its_turning_point_does_not_sleep() -> None:
-    """Beside a floor, so that somebody may sleep at all: to the bits of a run without."""
+    """Beside a floor, so that a body may sleep at all: to the bits of a run without."""
     bob = box("bob", 1.0, 5.0)
     post = Hinge(name="post", between=(WORLD, "bob"), at=(0.0, 0.0, 5.0), axis=(0.0, 1.0, 0.0))
     built = scene(FLOOR, bob, constraints=(post,))

@@ -239,7 +239,7 @@ def test_tiles_that_can_move_are_one_floor(solver: str) -> None:
 @pytest.mark.parametrize("solver", ["direct", "iterative", "hybrid"])
 @pytest.mark.parametrize("slider", ["box", "cylinder", "pyramid"])
 def test_an_edge_that_stands_out_is_met(slider: str, solver: str) -> None:
-    """The same slide where the third row is 5 mm higher: nobody goes on as if it were not there."""
+    """The same slide where the third row is 5 mm higher: no slider goes on as if it were not there."""
     body = slider_at(slider, 0.03, (5.0, 0.0, 0.0))
     scene = Scene(bodies=(*floor(raised=0.005), body), gravity=GRAVITY)
     result = simulate(

@@ -20,6 +20,13 @@ ROOT = Path(__file__).parent.parent
 PYTHON_FILES = sorted(
     path for package in ("engine", "scalar_tests", "tracker") for path in (ROOT / package).rglob("*.py")
 )
+WHO, BODY = "who", "body"  # retired in words that are made of them, which are not written here either
+ROOMS = (
+    ".ci/a", ".clang-tidy", ".github/workflows/a.yml", "Makefile", "README.md", "action.yml", "bench/a.py", "docs/how-to/a.md",
+    "docs/a.toml", "engine/a.py", "engine/native/a.cmake", "engine/native/src/a.hpp", "engine/peers/a.mjs",
+    "examples/a/a.cpp", "examples/a/a.json", "migrations/versions/a.py", "scalar_tests/a/a.py", "site/static/a.css", "site/static/a.js",
+    "site/templates/a.html", "spook_tracker/a.py", "tests/test_a.py", "tracker/judge/a.py",
+)  # fmt: skip
 
 
 def test_site_holds_data_only() -> None:
@@ -48,16 +55,66 @@ def test_native_code_takes_nothing_from_the_c_library_that_it_may_round_as_it_li
     assert found == []
 
 
+def retired(folder: Path) -> tuple[int, list[tuple[str, str]]]:
+    """What `make lint` says of a folder: the exit code, and each file with a retired word in it."""
+    ask = [sys.executable, str(ROOT / ".ci" / "words.py"), str(folder)]
+    told = subprocess.run(ask, capture_output=True, text=True)
+    found = re.findall(r'^(.*):\d+: "(\w+)": say', told.stdout, re.MULTILINE)
+    assert len(found) == len(told.stdout.splitlines())
+    return told.returncode, [(Path(file).relative_to(folder).as_posix(), word) for file, word in found]
+
+
 def test_native_code_is_told_in_the_words_of_the_field(tmp_path: Path) -> None:
     """Retired words come back neither in code nor in comments; `make lint` names them and what to say instead."""
-    ask = [sys.executable, str(ROOT / ".ci" / "words.py")]
-    (tmp_path / "some.cpp").write_text('int sweeps = 0;  // who "strikes" whom\nconst char* name = "blow";\n')
+    text = f'int sweeps = 0;  // who "strikes" {WHO}m\nconst char* name = "blow";\n'
+    (tmp_path / "some.cpp").write_text(text)
 
-    told = subprocess.run([*ask, str(tmp_path)], capture_output=True, text=True)
-    assert told.returncode == 1
-    assert re.findall(r': "(\w+)": say', told.stdout) == ["sweeps", "who", "whom"]
-    clean = subprocess.run([*ask, str(ROOT / "engine" / "native")], capture_output=True, text=True)
-    assert (clean.returncode, clean.stdout) == (0, "")
+    assert retired(tmp_path) == (1, [("some.cpp", word) for word in ("sweeps", WHO, f"{WHO}m")])
+    assert retired(ROOT / "engine" / "native") == (0, [])
+
+
+@pytest.mark.parametrize("clone", [True, False], ids=["clone", "archive"])
+def test_every_room_is_told_without_persons(tmp_path: Path, clone: bool) -> None:
+    """A retired word is seen in each room, in text, in quotes and in names; not in what others wrote."""
+    words = [f"No{BODY}", f"some{BODY}", f"ANY{BODY}", f"every{BODY}", f"{WHO}ever", f"{WHO}m"]
+    lines = [
+        f"{words[0]} reads, {WHO}se",
+        f"is_{words[1]}s = 1",
+        f"'{words[2]}'",
+        f'"by {words[3]}"',
+        *words[4:],
+    ]
+    others = (
+        "LICENSE",
+        "site/static/a-LICENSE.txt",
+        "site/static/a.min.js",
+        "tests/fuzz/settings/a",
+        "engine/native/fuzz/corpus/a/a",
+    )
+    for name in (*ROOMS, *others):
+        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / name).write_text("\n".join(lines))
+    (tmp_path / "a.png").write_bytes(b"\x89" + words[0].encode())
+    if clone:
+        subprocess.run(["git", "init", "-q", str(tmp_path)], check=True)
+
+    code, found = retired(tmp_path)
+
+    assert code == 1
+    seen = [words[0], f"{words[1]}s", *words[2:]]
+    assert sorted(found) == sorted((room, word) for room in ROOMS for word in seen)
+
+
+def test_this_tree_is_told_without_persons() -> None:
+    tops = subprocess.run(
+        ["git", "ls-tree", "--name-only", "HEAD"], cwd=ROOT, capture_output=True, text=True
+    ).stdout
+    if not tops:
+        pytest.skip("not a git checkout")
+
+    assert retired(ROOT) == (0, [])
+    rooms = {top for top in tops.splitlines() if (ROOT / top).is_dir()}
+    assert rooms == {room.partition("/")[0] for room in ROOMS if "/" in room}, "plant a word in each room"
 
 
 def test_all_names_of_the_engine_exist_and_are_public() -> None:

@@ -1,6 +1,6 @@
 """Over all series of a night few alarms are false, because every alarm is rarer than RARE by itself.
 
-So it makes no difference how many series somebody asks about. Counted here after a hundred nights of learning.
+So it makes no difference how many series are asked about. Counted here after a hundred nights of learning.
 """
 
 from __future__ import annotations

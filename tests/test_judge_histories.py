@@ -70,14 +70,14 @@ def test_a_red_series_with_a_new_definition_does_not_stay_red_on_the_site(tmp_pa
     assert not red_on_the_site([*runs, again], tmp_path / "green")
 
 
-def test_more_work_stays_red_however_long_nobody_mends_it(tracker: Any) -> None:
+def test_more_work_stays_red_however_long_it_is_not_mended(tracker: Any) -> None:
     runs = [night(n, worked(0.1, 100 if n < 10 else 200)) for n in range(LONG)]
 
     code, said = tracker(runs, "judge", "latest")
     assert (code, "more work" in said) == (1, True)
 
 
-def test_a_slow_down_stays_red_however_long_nobody_mends_it(tracker: Any) -> None:
+def test_a_slow_down_stays_red_however_long_it_is_not_mended(tracker: Any) -> None:
     slow = 3 * SPARSE  # a level needs nights to be known
     runs = [night(n, rungs(1e-3 * noise(n) * (1.3 if n >= slow else 1.0))) for n in range(LONG + slow)]
 

@@ -1,4 +1,4 @@
-"""A stability map that is gone: since which run, for whom it is news, and until when, told alike by everybody."""
+"""A stability map that is gone: since which run, where it is news, and until when, told alike by every reader."""
 
 from __future__ import annotations
 

@@ -103,7 +103,7 @@ def test_ways_to_give_no_answer_are_equally_bad(pair: tuple[str, str]) -> None:
     assert not judge(series(), sample(math.nan, pair[0]), sample(math.nan, pair[1])).red
 
 
-CELLS = ("settled", "bounded", "growing", "diverged", "not_finite", "a word nobody knows")
+CELLS = ("settled", "bounded", "growing", "diverged", "not_finite", "an unknown word")
 
 
 @pytest.mark.parametrize(("better", "worse"), list(itertools.pairwise(CELLS)))
@@ -120,7 +120,7 @@ def test_cells_of_a_map_have_the_documented_order(better: str, worse: str) -> No
 
 UNLIKE = [
     ({"git_hash": "b" * 40}, "another commit"),
-    ({"git_hash": ""}, "a commit nobody knows"),
+    ({"git_hash": ""}, "an unknown commit"),
     ({"dirty": True}, "a changed tree"),
 ]
 

@@ -96,7 +96,7 @@ OLD_LEVELS = {
 
 
 @pytest.mark.parametrize("name", OLD_LEVELS)
-def test_an_old_level_blinds_nobody(name: str) -> None:
+def test_an_old_level_hides_no_change(name: str) -> None:
     old = OLD_LEVELS[name]
     for seed in range(10):
         values = np.array([*old, *[1.25 * old[-1]] * 20]) * noise(seed, 0.005, len(old) + 20)

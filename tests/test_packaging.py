@@ -48,7 +48,7 @@ def tracked() -> set[str]:
         timeout=300,
     )
     if done.returncode:
-        pytest.skip("not a clone, so nobody says which files belong to it")
+        pytest.skip("not a clone, so git cannot say which files belong to it")
     return {name for name in done.stdout.splitlines() if (ROOT / name).is_file()}
 
 

@@ -155,7 +155,7 @@ def test_every_door_of_the_tracker_is_in_the_contracts() -> None:
 
 @pytest.mark.parametrize("room", ["judge", "store", "measure"])
 def test_who_does_not_know_the_addresses_writes_none(room: str) -> None:
-    """The contract holds who asks for an address; nobody makes one up in a text either."""
+    """The contract holds what asks for an address; none is made up in a text either."""
     files = (ROOT / "tracker" / room).glob("*.py")
 
     assert [path.name for path in files if ".html" in path.read_text()] == []

@@ -215,7 +215,7 @@ def test_to_ask_one_test_imports_no_other() -> None:
 
 
 def test_other_engines_are_asked_every_time_step_that_any_of_our_settings_takes() -> None:
-    """Else our coarse compositions would race against nobody."""
+    """Else our coarse compositions would race against none."""
     coarse = Configuration(name="coarse", method=PLAIN, expected_order=None, time_steps=(1.0, 0.5))
     ladder = replace(CATALOGUE["pendulum"].ladders[0], time_steps=(0.5, 0.25))
     ladder = replace(ladder, configurations=(*ladder.configurations, coarse))
@@ -230,7 +230,7 @@ def test_other_engines_are_asked_every_time_step_that_any_of_our_settings_takes(
     assert all(theirs.time_steps == (1.0, 0.5, 0.25) for theirs in asked["pendulum"].ladders)
 
 
-def test_nobody_sleeps_while_a_question_is_asked() -> None:
+def test_no_body_sleeps_while_a_question_is_asked() -> None:
     """What is asleep is out of the steps: neither answers nor run times would be those of the solver that is asked."""
     root = Path(__file__).parent.parent
     awake = Method().sleep_speed

@@ -181,7 +181,7 @@ def test_a_limit_on_one_side_is_as_wide_as_it_is_far_from_what_it_shall_be() -> 
     assert wide(180.0, unit="degrees") == pytest.approx(math.pi)
     assert wide(0.6, better="larger", reference=1.0) == pytest.approx(0.4)
     assert wide(1.4, better="smaller", reference=1.0) == pytest.approx(0.4)
-    assert wide(0.6, better="larger") > ROUNDING  # nobody says what it shall be
+    assert wide(0.6, better="larger") > ROUNDING  # its value is not given
     assert wide(3.0, better="larger") == 0.0  # a count: all of three
     assert wide(1.0 + 1e-9, better="smaller") < ROUNDING
     assert wide(0.0, set_point=(-0.1, 0.1), set_point_source="s") == pytest.approx(0.1)

@@ -94,7 +94,7 @@ def test_what_is_said_beside_a_figure_is_drawn_from_it_or_is_a_fact(figure):
     assert sentences(right) & sentences(wrong) <= FACTS
 
 
-def test_no_fact_is_listed_that_nobody_says():
+def test_every_fact_that_is_listed_is_said():
     with np.errstate(all="ignore"):
         said = [
             sentences(figure.draw(read_off(wrong=False)).note)

@@ -111,7 +111,7 @@ def by_axe(place):
 
 
 @pytest.mark.parametrize("page", PAGES)
-def test_a_page_is_open_to_everybody_at_every_width(driver, site, axe, page):
+def test_a_page_is_accessible_at_every_width(driver, site, axe, page):
     """With all that unfolds unfolded, and a replay or a run in view that has begun."""
     asked = by_axe(PAGES.index(page))
     found = []

@@ -38,7 +38,7 @@ def runs(pid: str) -> bool:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc; only Linux ends a process with its parent")
 def test_a_browser_ends_with_a_test_that_is_killed() -> None:
-    """The driver, the browser and what the browser started, though nobody could say good-bye."""
+    """The driver, the browser and what the browser started, though the killed test tells them nothing."""
     if programs() is None:
         pytest.skip(MISSING)
     done = subprocess.run(

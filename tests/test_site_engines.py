@@ -83,7 +83,7 @@ def test_every_gate_shows_what_each_engine_says_in_the_configuration_it_names_fi
     assert told["Friction Largest friction deviation"][1:] == ["kept: 0.5", "not supported"]
 
 
-def test_whoever_is_first_at_an_error_stands_out_and_ours_is_not_spared(site: Path) -> None:
+def test_the_first_engine_at_an_error_stands_out_and_ours_is_not_spared(site: Path) -> None:
     """By hand: ours of order 2 is 0.3 h² in 4.04e-6/h s, theirs 0.3 h⁴ in 2e-5/h s, between the steps by powers."""
     scene = "Pendulum length [%]"
     one, middle, fine = (
@@ -99,7 +99,7 @@ def test_whoever_is_first_at_an_error_stands_out_and_ours_is_not_spared(site: Pa
         ["Pendulum length", "10⁻⁴ %", "rival 3.3", "200 µs", "221 µs", "1.1 ×"],
     ]
     page = (site / "engines.html").read_text(encoding="utf-8")
-    assert len(re.findall('class="num best"', page)) == 3  # one a column that anybody fills
+    assert len(re.findall('class="num best"', page)) == 3  # one a column that any engine fills
 
 
 def test_scenes_that_one_engine_alone_was_asked_are_no_race(site: Path) -> None:

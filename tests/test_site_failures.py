@@ -22,7 +22,7 @@ def test_a_page_that_fails_says_so_and_the_rest_is_published(tmp_path, monkeypat
     true = page_test.scenery
 
     def broken(scene):
-        raise ValueError("a scene <b>nobody</b> can draw")
+        raise ValueError("a scene that <b>cannot</b> be drawn")
 
     publish(DocumentHistory([document(0)]), tmp_path / "sound")
     monkeypatch.setattr(page_test, "scenery", broken)
@@ -30,7 +30,7 @@ def test_a_page_that_fails_says_so_and_the_rest_is_published(tmp_path, monkeypat
     page = (tmp_path / "public" / "tests" / "beam.html").read_text()
 
     assert [line.partition(":")[0] for line in report.failed] == [f"tests/{name}.html" for name in SEVEN]
-    assert "ValueError: a scene &lt;b&gt;nobody&lt;/b&gt; can draw" in page
+    assert "ValueError: a scene that &lt;b&gt;cannot&lt;/b&gt; be drawn" in page
     assert "tracker db remove" in page
     names = {p.relative_to(tmp_path / "sound") for p in (tmp_path / "sound").rglob("*.html")}
     assert names == {p.relative_to(tmp_path / "public") for p in (tmp_path / "public").rglob("*.html")}
@@ -103,7 +103,7 @@ def test_a_run_is_taken_out_with_everything_measured_in_it(tmp_path):
     database.dispose()
     with session_on(url) as session:
         assert record(session, document(1))  # and can come again
-    assert CliRunner().invoke(main, ["db", "remove", "nobody", "--db", url]).exit_code == 2
+    assert CliRunner().invoke(main, ["db", "remove", "absent", "--db", url]).exit_code == 2
 
 
 def test_the_database_is_offered_when_asked(tmp_path):

@@ -25,7 +25,7 @@ from tests.test_tracker_one_judge import night, one
 NIGHTS = [night(n, one(0.1 if n < 3 else 0.3 if n < 6 else 0.5)) for n in range(8)]  # worse on two nights
 LATE = 3  # the first of them
 WITHOUT_IT = [run for n, run in enumerate(NIGHTS) if n != LATE]
-TAKEN = Accepted(series="t/*", low=0.2, high=0.4, who="somebody", why="a trade", until=None)
+TAKEN = Accepted(series="t/*", low=0.2, high=0.4, who="Ada Example", why="a trade", until=None)
 
 
 def other_engine(number: int) -> RunDocument:

@@ -1,4 +1,4 @@
-"""The page of engines that are wrong on purpose: what was broken, who noticed, and what nobody noticed."""
+"""The page of engines that are wrong on purpose: what was broken, which test noticed, and what none noticed."""
 
 from __future__ import annotations
 

@@ -89,7 +89,7 @@ def kept(tmp_path: Path) -> Kept:
 
 
 def test_two_nights_that_overlap_keep_three_of_three(kept: Kept, tmp_path: Path) -> None:
-    """Both began from the history with the first night alone; whoever comes second takes nothing away."""
+    """Both began from the history with the first night alone; the second takes nothing away."""
     first, one, other = night(1), night(2), night(3)
     kept.keep(months(tmp_path / "first", first))
 
@@ -176,7 +176,7 @@ def of_a_later_tracker(file: Path) -> None:
     connection.close()
 
 
-def of_somebody_else(file: Path) -> None:
+def of_another_program(file: Path) -> None:
     import sqlite3
 
     file.unlink()
@@ -193,7 +193,7 @@ def with_another_value(file: Path) -> None:
     connection.close()
 
 
-USELESS = [damaged, no_database, of_a_later_tracker, of_somebody_else, with_another_value]
+USELESS = [damaged, no_database, of_a_later_tracker, of_another_program, with_another_value]
 
 
 def ci(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Result:

@@ -60,7 +60,7 @@ def test_a_night_tells_of_the_run_it_recorded(ahead: timedelta, monkeypatch: pyt
     assert "failing" in Path("public/badge.svg").read_text() or "red" in Path("public/badge.json").read_text()
 
 
-def test_what_is_dated_ahead_is_in_nobodys_history_and_is_said() -> None:
+def test_what_is_dated_ahead_is_in_no_history_and_is_said() -> None:
     ahead, now = dated(timedelta(days=3)), dated(timedelta(hours=-1))
     for document in (ahead, now):
         record(document, DATABASE)

@@ -100,7 +100,7 @@ class Desk:
             cwd=self.folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, start_new_session=True,
         )  # fmt: skip
 
-    def killed(self, words: list[str], after: float, everybody: bool) -> float | None:
+    def killed(self, words: list[str], after: float, all_of_it: bool) -> float | None:
         """End a command without warning, with all it has started or alone; how long it took if it was faster."""
         process = self.start(words)
         begun = time.monotonic()
@@ -109,7 +109,7 @@ class Desk:
         if process.returncode is not None:
             return time.monotonic() - begun
         with suppress(ProcessLookupError):
-            (os.killpg if everybody else os.kill)(process.pid, signal.SIGKILL)
+            (os.killpg if all_of_it else os.kill)(process.pid, signal.SIGKILL)
         process.communicate()
         end = time.monotonic() + PATIENCE
         while at_work(self.folder):
@@ -165,7 +165,7 @@ class Desk:
 
 
 def at_work(folder: Path) -> list[int]:
-    """Processes that were started for this folder, by whomever, and have not ended; zombies have no environment."""
+    """Processes that were started for this folder, by any process, and have not ended; zombies have no environment."""
     mark = f"CRASHING_AT={folder}".encode()
     found = []
     for place in Path("/proc").glob("[0-9]*/environ"):
@@ -246,7 +246,7 @@ def test_whatever_is_killed_the_history_is_whole(url: str, tmp_path: Path) -> No
         command = COMMANDS[number % len(COMMANDS)]
         for _ in range(TRIES):
             words = desk.prepared(command)
-            took = desk.killed(words, chance.uniform(0.3, 1.0) * lasts[command], everybody=number % 2 == 0)
+            took = desk.killed(words, chance.uniform(0.3, 1.0) * lasts[command], all_of_it=number % 2 == 0)
             if took is None:
                 lasts[command] *= 1.05  # or else only its beginning is ever met
                 break

@@ -179,7 +179,7 @@ def test_on_a_full_disk_nothing_half_is_left(command: tuple[str, ...], size: int
     assert tracker(*command).exit_code == 0
 
 
-def test_a_word_where_a_moment_belongs_is_called_damage_by_whoever_reads_it() -> None:
+def test_a_word_where_a_moment_belongs_is_called_damage_by_every_reader() -> None:
     with sqlite3.connect("tracker.db") as connection:
         connection.execute("UPDATE run SET started = 'yesterday'")
 

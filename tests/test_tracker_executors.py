@@ -1,4 +1,4 @@
-"""The same run whoever measures it: processes here, threads, a real Dask cluster of two workers; to the bit."""
+"""The same run whatever measures it: processes here, threads, a real Dask cluster of two workers; to the bit."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def dask(cluster: Any) -> str:
 
 
 def without_clocks(document: RunDocument) -> list[bytes]:
-    """The same of a night with run times: those are taken on this machine, alone, whoever measures the values."""
+    """The same of a night with run times: those are taken on this machine, alone, whatever measures the values."""
     by_clock = {series.key for series in document.series if series.kind == "time"}
     assert by_clock, "a sweep takes run times"
     kept = [replace(s, timing=None) for s in document.samples if s.series not in by_clock]

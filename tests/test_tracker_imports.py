@@ -281,7 +281,7 @@ def test_records_that_make_no_sense_are_one_sentence_and_nothing_is_stored(
     assert said.count("\n") == 1
 
 
-def test_a_document_of_ours_is_not_read_as_anybody_else_s(
+def test_a_document_of_ours_is_not_read_as_another_tool_s(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A look at its top tells: reading each of a thousand nights once more in vain took a third of an import."""

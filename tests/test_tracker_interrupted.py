@@ -1,4 +1,4 @@
-"""A command that is interrupted ends at once, leaves nobody behind, keeps what was finished and says so."""
+"""A command that is interrupted ends at once, leaves no process behind, keeps what was finished and says so."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""An engine that is not there costs nobody else the night."""
+"""An engine that is not there costs no other the night."""
 
 from __future__ import annotations
 

@@ -83,7 +83,7 @@ def test_what_was_to_be_read_off_the_clock_says_why_it_is_not(monkeypatch):
     assert "crashed" in table
 
 
-def test_a_death_of_which_nobody_knows_the_place_is_told_of_every_rung():
+def test_a_death_at_an_unknown_place_is_told_of_every_rung():
     test = Questions(catalogue="toy_questions:CATALOGUE", engine="toy_engine").tests()["fall"]
     (ladder,) = test.ladders
     errors = {

@@ -127,7 +127,7 @@ def test_a_difference_would_be_seen(session):
 
 
 def test_revisions_carry_the_comments_of_the_models(postgresql_url):
-    """SQLite keeps no comments; PostgreSQL shows them to whoever reads the tables."""
+    """SQLite keeps no comments; PostgreSQL shows them to readers of the tables."""
     engine = open_database(postgresql_url)
     inspector = inspect(engine)
     for table in models.Base.metadata.sorted_tables:
@@ -294,7 +294,7 @@ def test_a_newer_database_is_refused(url, monkeypatch, tmp_path):
 
 
 def test_no_key_of_a_large_table_lacks_the_time():
-    """Hypertables and partitions ask for it, and that nobody refers to the large tables."""
+    """Hypertables and partitions ask for it, and that no table refers to the large ones."""
     metadata = models.Base.metadata
     large = {name for name, table in metadata.tables.items() if "run_key" in table.columns}
 

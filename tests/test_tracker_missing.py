@@ -1,4 +1,4 @@
-"""Asked for and not answered is missing; a gate that left the catalogue is red until somebody accepts it."""
+"""Asked for and not answered is missing; a gate that left the catalogue is red until it is accepted."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def test_a_test_that_was_asked_for_and_gave_nothing_at_all_is_missing() -> None:
     assert GATE.key not in found([both(0), replace(asked(1, one(0.5), "t"), asked=None)])
 
 
-def test_a_gate_is_removed_if_the_whole_catalogue_was_asked_whoever_asked() -> None:
+def test_a_gate_is_removed_if_the_whole_catalogue_was_asked_by_any_run() -> None:
     runs = [both(0), asked(1, one(0.5), "t", whole=True)]
 
     assert found(runs)[GATE.key] == ("removed", True, True)

@@ -1,4 +1,4 @@
-"""Whoever asks what became of a series gets the same word: night, page, feed, trend, comparison, JUnit."""
+"""Every answer to what became of a series is the same word: night, page, feed, trend, comparison, JUnit."""
 
 from __future__ import annotations
 
@@ -351,7 +351,7 @@ def _counts_alike(runs: list[RunDocument], told: Any, stands: dict[str, Any], re
     for definition, measured in pairs(runs[-1]):
         shown, page = word(definition, measured), stands[definition.key]
         if page == "accepted":
-            continue  # what somebody accepted, the bare number does not know
+            continue  # what was accepted, the bare number does not know
         if definition.key not in red:
             assert shown == signs[page], definition.key
         else:  # what only became worse than before, the bare number does not know either
@@ -368,7 +368,7 @@ def _counts_alike(runs: list[RunDocument], told: Any, stands: dict[str, Any], re
         )
 
 
-def test_an_order_nobody_could_read_is_a_broken_limit_for_the_command_and_for_the_page(
+def test_an_order_that_cannot_be_read_is_a_broken_limit_for_the_command_and_for_the_page(
     tmp_path: Path,
 ) -> None:
     """The order of a ladder with fewer than three usable points is recorded as missing."""
@@ -383,7 +383,7 @@ def test_an_order_nobody_could_read_is_a_broken_limit_for_the_command_and_for_th
     assert "One limit is broken tonight" in (tmp_path / "public" / "index.html").read_text()
 
 
-def test_a_series_nobody_measured_is_no_limit_of_that_run(tmp_path: Path) -> None:
+def test_a_series_that_was_not_measured_is_no_limit_of_that_run(tmp_path: Path) -> None:
     """What the history adds, because it was asked for and not answered, the command that shows a run cannot count."""
     runs = [night(0, one(0.5) + order(1.0)), night(1, one(0.5))]
 

@@ -267,7 +267,7 @@ def test_the_same_file_twice_is_one_run() -> None:
 
 
 @pytest.mark.parametrize("said", [{}, [], 3, {"benchmarks": []}, {"results": []}, {"schema_version": 1}])
-def test_what_is_nobody_elses_is_left_to_others(said: Any) -> None:
+def test_what_is_of_no_known_tool_is_left_to_others(said: Any) -> None:
     assert read(said) is None
 
 

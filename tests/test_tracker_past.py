@@ -134,7 +134,7 @@ def test_ends_that_say_nothing_are_refused(repository: Repository) -> None:
     with pytest.raises(TrackerError, match="no ancestor"):
         repository.bisect(made[2], made[0])
     with pytest.raises(TrackerError, match="git knows no commit"):
-        repository.bisect("nobody", made[0])
+        repository.bisect("absent", made[0])
 
 
 def test_commits_are_named_one_by_one_or_as_a_range(repository: Repository) -> None:
@@ -186,7 +186,7 @@ def test_what_the_history_blames_is_where_a_search_begins(
 
     made = [repository.commit(0.1 if n < 5 else 0.3) for n in range(9)]
     database = f"sqlite:///{tmp_path}/t.db"
-    for place, number in enumerate((0, 2, 7)):  # nights between which nobody measured
+    for place, number in enumerate((0, 2, 7)):  # nights between which none was measured
         found = repository.measure(made[number])
         engine = replace(found.engine, commit_time=f"2026-01-0{place + 1}T00:00:00+00:00", parents=())
         record(replace(found, engine=engine, started=f"2026-01-0{place + 1}T00:00:00+00:00"), database)

@@ -58,8 +58,8 @@ MAIN = nights()[4].id
         (("--role", "gate"), 1),
         (("--test", "u"), 0),
         (("--test", "*", "--kind", "scalar", "--role", "reported"), 0),
-        (("--test", "nobody"), 2),
-        (("--engine", "nobody"), 2),
+        (("--test", "absent"), 2),
+        (("--engine", "absent"), 2),
         (("--engine", "spook"), 1),
     ],
 )

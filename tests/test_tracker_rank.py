@@ -1,4 +1,4 @@
-"""Ranking two engines: at equal error, each in the configuration that does it best, and nobody is red."""
+"""Ranking two engines: at equal error, each in the configuration that does it best, and none is red."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def recorded(folder: Path, versions: dict[tuple[str, str], dict[str, Any]], **ma
     return database
 
 
-def test_comparing_two_engines_ranks_them_scene_by_scene_and_nobody_has_regressed(tmp_path: Path) -> None:
+def test_comparing_two_engines_ranks_them_scene_by_scene_and_none_has_regressed(tmp_path: Path) -> None:
     plain, fine = both().values()
     database = recorded(tmp_path, {("spook", "1.0"): plain, ("mujoco", "3.4.0"): fine})
 

@@ -42,7 +42,7 @@ def test_a_recorded_document_comes_back_equal(session):
     assert History(session).document(given.id) == given
 
 
-def test_a_recorded_run_is_there_for_everybody_at_once(session, migrated_url):
+def test_a_recorded_run_is_there_for_every_reader_at_once(session, migrated_url):
     given = run()
     record(session, given)
 

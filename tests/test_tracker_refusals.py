@@ -122,7 +122,7 @@ def test_a_link_to_itself_and_a_pipe_are_no_databases() -> None:
     for command in (("run", "--workers", "0"), ("db", "check"), ("publish", "--out", "public")):
         refused(tracker(*command, "--db", "a"), "a link that leads back to itself")
         refused(tracker(*command, "--db", "pipe"), "a pipe or a device")
-    assert time.monotonic() - begun < 60.0  # nobody waits for the other end of a pipe
+    assert time.monotonic() - begun < 60.0  # none waits for the other end of a pipe
 
 
 def test_the_old_name_of_postgresql_is_told_its_new_one() -> None:

@@ -78,8 +78,8 @@ def test_a_file_that_is_not_text_is_named(tmp_path: Path) -> None:
         read(tmp_path)
 
 
-def test_a_file_above_the_repository_is_somebody_elses(tmp_path: Path) -> None:
-    """Whoever may write to a folder above could else name the module that is imported here."""
+def test_a_file_above_the_repository_belongs_to_others(tmp_path: Path) -> None:
+    """A user that may write to a folder above could else name the module that is imported here."""
     (tmp_path / "tracker.toml").write_text('title = "theirs"\n')
     inside = tmp_path / "repository" / "src"
     inside.mkdir(parents=True)

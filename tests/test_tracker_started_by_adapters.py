@@ -18,7 +18,7 @@ from toy_engine import build_info
 import toy_engine
 MARK = [sys.executable, "-c", "import time; time.sleep(300)", "{mark}"]
 def simulate(*asked, **more):
-    subprocess.Popen(MARK)  # as the peers for Node do: it has the streams of whoever started it
+    subprocess.Popen(MARK)  # as the peers for Node do: it has the streams of its parent
     open("started", "w").close()
     {then}
     return toy_engine.simulate(*asked, **more)
@@ -110,7 +110,7 @@ def test_what_a_piece_has_started_ends_with_its_time_limit_while_the_others_go_o
     tmp_path: Path, mark: str
 ) -> None:
     starts = STARTS.replace(
-        "    subprocess.Popen(MARK)  # as the peers for Node do: it has the streams of whoever started it\n",
+        "    subprocess.Popen(MARK)  # as the peers for Node do: it has the streams of its parent\n",
         "",
     )
     (tmp_path / "starting.py").write_text(
@@ -125,7 +125,9 @@ def test_what_a_piece_has_started_ends_with_its_time_limit_while_the_others_go_o
 
 
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGINT, signal.SIGKILL])
-def test_a_command_that_is_ended_leaves_nobody_behind(how: signal.Signals, tmp_path: Path, mark: str) -> None:
+def test_a_command_that_is_ended_leaves_no_process_behind(
+    how: signal.Signals, tmp_path: Path, mark: str
+) -> None:
     process = start(tmp_path, mark, "subprocess.Popen(MARK, start_new_session=True); time.sleep(300)")
     end = time.monotonic() + 60
     while len(left(mark)) < 2 and time.monotonic() < end:

@@ -61,7 +61,7 @@ def test_the_whole_step_is_laid_beside_the_step_as_compiled() -> None:
     assert [one * 100.0 for one in found.saved.values()] == pytest.approx([2.0, 3.0, 1.0], rel=0.11)
 
 
-def test_a_stage_that_runs_though_nobody_needs_it_breaks_the_limit() -> None:
+def test_a_stage_that_runs_though_it_is_not_needed_breaks_the_limit() -> None:
     test = CATALOGUE["pendulum"]
     for slow, outcome in ((1.0, "value"), (8.0, "out_of_limit")):
         pairs, _ = step_costs("pendulum", test, Clocked(slow), None)

@@ -121,7 +121,7 @@ def test_an_engine_that_is_only_shown_never_takes_our_place() -> None:
 
     assert found(runs, "latest").engine.name == "pebble"
     assert [line[0].engine.name for line in lines(runs)] == ["pebble", "mujoco", "bullet"]
-    assert found(runs[1:], "latest").engine.name == "mujoco", "where nobody has gates, the newest"
+    assert found(runs[1:], "latest").engine.name == "mujoco", "where none has gates, the newest"
     assert found([replace(runs[1], gates=1), *runs[:1]], "latest").engine.name == "mujoco", (
         "gating, and newer"
     )

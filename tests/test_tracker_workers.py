@@ -137,7 +137,7 @@ if __name__ == "__main__":
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 @pytest.mark.parametrize("how", [signal.SIGKILL, signal.SIGTERM, signal.SIGINT])
-def test_nobody_outlives_a_supervisor_that_is_killed(how: signal.Signals, tmp_path: Path):
+def test_no_worker_outlives_a_supervisor_that_is_killed(how: signal.Signals, tmp_path: Path):
     program = tmp_path / "hanging.py"
     program.write_text(HANGING)
     process = subprocess.Popen(

@@ -23,8 +23,8 @@ void put_right(const PebbleRod& rod, double* positions, const double* inverse_ma
 }  // namespace
 
 void pebble_step(double* positions, double* velocities, const double* inverse_masses, int particles,
-                 const PebbleRod* rods, int rod_count, const double gravity[3], double time_step, int sweeps,
-                 int steps) {
+                 const PebbleRod* rods, int rod_count, const double gravity[3], double time_step,
+                 int iterations, int steps) {
     std::vector<double> before(3 * static_cast<std::size_t>(particles));
     for (int step = 0; step < steps; ++step) {
         for (int p = 0; p < 3 * particles; ++p) {
@@ -33,7 +33,7 @@ void pebble_step(double* positions, double* velocities, const double* inverse_ma
             velocities[p] += time_step * gravity[p % 3];
             positions[p] += time_step * velocities[p];
         }
-        for (int sweep = 0; sweep < sweeps; ++sweep)
+        for (int iteration = 0; iteration < iterations; ++iteration)
             for (int r = 0; r < rod_count; ++r) put_right(rods[r], positions, inverse_masses);
         if (rod_count > 0)
             for (int p = 0; p < 3 * particles; ++p) velocities[p] = (positions[p] - before[p]) / time_step;

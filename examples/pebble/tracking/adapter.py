@@ -10,10 +10,12 @@ from tracking import pebble
 class Pebble(Stepped):
     name = "pebble"
     capabilities = Capabilities(joints=frozenset({Distance}), rigid_bodies=False)
-    configurations = (Configuration(name="default", reason="as we ship it: 50 sweeps", expected_order=1.0),)
+    configurations = (
+        Configuration(name="default", reason="as we ship it: 50 iterations", expected_order=1.0),
+    )
 
     def world(self, task):
-        world = pebble.World(task.scene.gravity, task.time_step, sweeps=50)
+        world = pebble.World(task.scene.gravity, task.time_step, iterations=50)
         places = {body.name: world.add(body.position, body.velocity, body.mass) for body in task.scene.bodies}
         for rod in task.scene.constraints:
             ends = [places[end] if isinstance(end, str) else world.add(end) for end in rod.between]

@@ -13,8 +13,8 @@ ROD = np.dtype([("first", np.int32), ("second", np.int32), ("length", np.float64
 class World:
     """Particles and rods; `add` and `join`, then `step`."""
 
-    def __init__(self, gravity, time_step, sweeps):
-        self.gravity, self.time_step, self.sweeps = np.array(gravity, dtype=float), time_step, sweeps
+    def __init__(self, gravity, time_step, iterations):
+        self.gravity, self.time_step, self.iterations = np.array(gravity, dtype=float), time_step, iterations
         self.positions, self.velocities, self.inverse_masses = np.empty((0, 3)), np.empty((0, 3)), np.empty(0)
         self.rods = np.empty(0, dtype=ROD)
         self.shown = None
@@ -40,7 +40,7 @@ class World:
         x, v, w, rods, g = (array.ctypes.data_as(ctypes.c_void_p) for array in arrays)
         LIBRARY.pebble_step(
             x, v, w, len(self.positions), rods, len(self.rods), g,
-            ctypes.c_double(self.time_step), self.sweeps, count,
+            ctypes.c_double(self.time_step), self.iterations, count,
         )  # fmt: skip
 
     def state(self):
