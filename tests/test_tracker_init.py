@@ -149,6 +149,45 @@ def test_a_name_that_cannot_be_is_refused_in_a_sentence(
     assert not list(tmp_path.iterdir())
 
 
+@pytest.mark.parametrize("stands", [".github", "tracking", ".github/workflows"])
+def test_where_one_file_cannot_be_written_none_is(
+    stands: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A file stands where a folder should; once it is away, the same command goes on from the beginning."""
+    (tmp_path / stands).parent.mkdir(exist_ok=True)
+    (tmp_path / stands).write_text("ours\n")
+    before = sorted(tmp_path.rglob("*"))
+
+    refused = init(tmp_path, monkeypatch, "marble")
+
+    assert (refused.exit_code, len(refused.output.splitlines())) == (2, 1)
+    assert "nothing was written" in refused.output
+    assert sorted(tmp_path.rglob("*")) == before
+    (tmp_path / stands).unlink()
+    assert init(tmp_path, monkeypatch, "marble").exit_code == 0
+
+
+def test_a_link_to_nowhere_is_there_too(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "tracker.toml").symlink_to(tmp_path / "elsewhere.toml")
+
+    assert "tracker.toml is there already" in init(tmp_path, monkeypatch, "marble").output
+    assert [path.name for path in tmp_path.iterdir()] == ["tracker.toml"]
+
+
+@pytest.mark.parametrize(
+    "url",
+    ["not a url", 'https://h.example/a/b"', "https://us:secret@h.example/a/b", "https://h.example/a", "https://h.example/a/b\n"],
+)  # fmt: skip
+def test_an_address_that_no_workflow_can_call_is_refused(
+    url: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    refused = init(tmp_path, monkeypatch, "marble", "--tracker", url)
+
+    assert refused.exit_code == 2
+    assert "is no address of a repository" in refused.output
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_folder_of_adapters_that_is_there_keeps_what_it_says(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -7,8 +7,10 @@ under gravity, so that the first night runs before the engine itself is bound.
 from __future__ import annotations
 
 import json
+import os
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
@@ -21,6 +23,7 @@ from spook_tracker.tracker.measure.run import tracker_version
 ADAPTER, SETTINGS, WORKFLOW = "tracking/adapter.py", "tracker.toml", ".github/workflows/physics.yml"
 PLACEHOLDER = "OWNER"  # in pyproject.toml, until the sources have a home
 NAME = re.compile(r"[A-Za-z][A-Za-z0-9_.-]*")
+ADDRESS = re.compile(r"https?://[\w.:-]+(/[\w.~-]+){2,}/?", re.ASCII)  # without a user: it would be published
 BUILDS = {  # a file in the root: the command that builds what it describes
     "CMakeLists.txt": "cmake -S . -B build && cmake --build build",
     "Cargo.toml": "cargo build --release",
@@ -99,7 +102,12 @@ class Home:
 
 
 def home(url: str = "") -> Home:
-    """`url`, or what the installed package says; the commit is the one that it was built from."""
+    """`url`, or what the installed package says; the commit is the one that it was built from.
+
+    Raises TrackerError for what a workflow cannot call, or what would write a password into it.
+    """
+    if url and not ADDRESS.fullmatch(url):
+        raise TrackerError(f"{url!r} is no address of a repository, such as https://host/owner/name")
     return Home(url.rstrip("/") or _source(), build_info.git_hash, tracker_version())
 
 
@@ -146,8 +154,11 @@ def build_command(folder: Path) -> str:
 
 
 def write_first_files(folder: Path, files: Mapping[str, str]) -> list[str]:
-    """Write them all, or, where one is there already, none: TrackerError names those. Returns the paths written."""
-    there = [path for path in files if (folder / path).exists()]
+    """Write them all, or none: TrackerError names those that are there already, or the one that cannot be written.
+
+    Returns the paths written.
+    """
+    there = [path for path in files if os.path.lexists(folder / path)]
     if there:
         verb = "is" if len(there) == 1 else "are"
         raise TrackerError(
@@ -155,13 +166,27 @@ def write_first_files(folder: Path, files: Mapping[str, str]) -> list[str]:
         )
     if ADAPTER in files and not (folder / ADAPTER).with_name("__init__.py").exists():
         files = {str(Path(ADAPTER).with_name("__init__.py")): "", **files}
+    made: list[Path] = []
     for path, content in files.items():
+        target = folder / path
+        missing = [one for one in (target, *target.parents) if not os.path.lexists(one)]
         try:
-            (folder / path).parent.mkdir(parents=True, exist_ok=True)
-            (folder / path).write_text(content, encoding="utf-8")
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_text(content, encoding="utf-8")
         except OSError as error:
-            raise TrackerError(f"{path} cannot be written: {error.strerror}") from None
+            _unmake([*missing, *made])
+            raise TrackerError(
+                f"{path} cannot be written, and nothing was written: {error.strerror}"
+            ) from None
+        made = [*missing, *made]
     return list(files)
+
+
+def _unmake(made: Sequence[Path]) -> None:
+    """Remove files and folders, those inside a folder before it."""
+    for path in made:
+        with suppress(OSError):
+            path.rmdir() if path.is_dir() else path.unlink()
 
 
 def _settings(name: str, build: str, known: bool) -> str:
