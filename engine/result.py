@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from html import escape
 from importlib import import_module
@@ -116,7 +117,10 @@ class Result:
         for name, value in self.observables.items():
             rows.append((name, f"{value:.6g}" if value.shape == () else f"array of shape {value.shape}"))
         cells = "".join(f"<tr><th>{escape(name)}</th><td>{escape(text)}</td></tr>" for name, text in rows)
-        seen = framed(self.show().html) if self.origin and 0.0 < self.seconds <= SHORT else ""
+        seen = ""
+        if self.origin and 0.0 < self.seconds <= SHORT:
+            with suppress(EngineError):  # as of a run that ended in its first step: the table says so
+                seen = framed(self.show().html)
         return f"<table>{cells}</table>{seen}"
 
     def show(self) -> Shown:

@@ -12,7 +12,7 @@ from spook_tracker.engine.bodies import WORLD, Body, Particle, RigidBody
 from spook_tracker.engine.check import Vector
 from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.display import display, framed
-from spook_tracker.engine.errors import SceneError
+from spook_tracker.engine.errors import EngineError, SceneError
 from spook_tracker.engine.forces import CentralGravity, Fluid, Force, Load, Spring
 from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Hinge, Joint
 from spook_tracker.engine.time_functions import TimeFunction
@@ -81,9 +81,12 @@ class Scene:
         object.__setattr__(self, "no_contact", tuple(self._pair(pair, known) for pair in self.no_contact))
         self._check_directions()
 
-    def _repr_html_(self) -> str:
-        """The scene at its start, to be turned, for notebooks."""
-        return framed(display().scene(self), height=420)
+    def _repr_html_(self) -> str | None:
+        """The scene at its start, to be turned, for notebooks; None, so its text, where nothing draws it."""
+        try:
+            return framed(display().scene(self), height=420)
+        except EngineError:
+            return None
 
     def _check_directions(self) -> None:
         """One ellipse of friction meets any surface; two that cross have no law that is generally agreed on."""

@@ -121,6 +121,16 @@ def test_a_long_run_is_not_run_again_because_a_cell_ends_with_it(
     assert "<table>" in replace(fallen, seconds=2.1)._repr_html_()
 
 
+def test_a_cell_that_ends_with_what_cannot_be_drawn_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A run that ended in its first step is a table; where nothing that draws is installed, a scene is its text."""
+    pulled = Scene(bodies=SCENE.bodies, gravity=(0.0, 0.0, -1e308))
+    shown = simulate(pulled, time_step=0.1, steps=9)._repr_html_()
+    monkeypatch.setattr(display, "entry_points", lambda group: ())
+
+    assert "ran away" in shown and "<iframe" not in shown
+    assert SCENE._repr_html_() is None
+
+
 def test_traces_are_a_figure_with_the_columns_of_the_table(fallen: Result) -> None:
     figure, table = fallen.plot(), fallen.to_dataframe()
 
