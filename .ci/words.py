@@ -25,11 +25,14 @@ RETIRED = {
     r"keeps?_off|let_pass|let past": "occludes; skipped",
     r"whole_fall|let_go|foresee\w*|unheld|fundable|free_ties": "see the glossary in ARCHITECTURE.md",
     r"[Hh](ang|angs|ung) together": "are connected",
-    r"he|him|his|she|[Ww]ho|[Aa]nyone|[Ee]veryone": "it; which body; none",
+    r"[Ww]ho": "it; which body; none",
 }
 PATTERN = re.compile("|".join(rf"\b(?:{words})\b" for words in RETIRED))
 QUOTED = re.compile(r'"(?:\\.|[^"\\\n])*"')
-PERSONS = re.compile(r"(?<![a-z])(?:(?:no|some|any|every)body|who(?:ever|m))\w*", re.IGNORECASE)
+PERSONS = re.compile(
+    r"(?<![a-z])(?:(?:no|some|any|every)body|(?:some|any|every)one|who(?:ever|m))\w*|\b(?:s?h[e]|h(?:im|is|ers?))\b",
+    re.IGNORECASE,
+)
 INSTEAD = "it; which; none; no test; any reader; people"
 NATIVE = {".cpp", ".hpp", ".inl"}
 # Not written here: licences, libraries in one line, what a fuzzer found.

@@ -3,7 +3,7 @@
     python bench/against.py OLD_CHECKOUT [--most 1.02] [--slices 400]
 
 Both builds answer from a process of their own, on one core, in slices of about a millisecond in turn: whatever else the
-machine does falls on both alike, and the least of many slices is undisturbed. Who begins changes with each slice. Exit code 1 where this build's step takes more than `--most` times the other's,
+machine does falls on both alike, and the least of many slices is undisturbed. Which begins changes with each slice. Exit code 1 where this build's step takes more than `--most` times the other's,
 or ends in another state. OLD_CHECKOUT needs its own .venv (`make install` there).
 """
 

@@ -443,7 +443,7 @@ def main() -> int:
         "cost per contact grows little": growth(given.largest, given.steps),
         "two threads are faster than one": threaded(given.largest, max(20, given.steps // 4)),
         "rest is cheap, and linear": direct_at_rest(),
-        "who sleeps costs next to nothing": asleep(1000),
+        "a sleeping body costs next to nothing": asleep(1000),
         "bodies of every shape are solved directly": unlike_bodies(given.steps),
     }
     for claim, kept in claims.items():

@@ -50,7 +50,7 @@ class Row:
 
     name: str
     scene: Callable[[float], Scene]
-    error: Callable[..., float]  # of a time step, a method and who simulates
+    error: Callable[..., float]  # of a time step, a method and an engine
     target: float  # rad or m
     method: Method
     per_second: float

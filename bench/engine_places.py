@@ -1,4 +1,4 @@
-"""Who comes within an error first, scene by scene, and what a first place is worth: the tables of docs/engines.md."""
+"""Which engine comes within an error first, scene by scene, and what a first place is worth: the tables of docs/engines.md."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Place:
 
     @property
     def first(self) -> str:
-        """Who is soonest."""
+        """The soonest."""
         return self.race.order[0][1]
 
     @property
@@ -121,7 +121,7 @@ def single(run: Sequence[Place]) -> list[str]:
 def first(run: Sequence[Place]) -> list[str]:
     """Scene by scene: which engine comes within an error first, in what time, and what the next needs."""
     lines = [
-        "## Who is first",
+        "## Which engine is first",
         "",
         "Run time to come within an error, in the setting named; in brackets how much longer the next engine takes. *Alone*:",
         "others can be asked and do not come so near. *Only one asked*: no other has what the scene needs.",

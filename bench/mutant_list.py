@@ -339,7 +339,7 @@ MUTANTS = (
     wrong(
         "contacts",
         "past-the-post",
-        "who is pushed past a post meets the side he faced where the step began, not the one he comes to",
+        "what is pushed past a post meets the side it faced where the step began, not the one it comes to",
         "tests/test_engine_late_impacts.py::test_a_ball_pushed_past_a_post_is_turned_by_the_side_it_comes_to",
         "contacts/impact_search.cpp",
         "    if (elsewhere) return false;\n",
@@ -357,7 +357,7 @@ MUTANTS = (
     wrong(
         "contacts",
         "let-past",
-        "who is let past a side between sweeps is not asked again when they end",
+        "a side skipped between iterations is not tested again when they end",
         "tests/test_engine_falling.py::test_a_side_skipped_between_iterations_is_met_if_the_body_gets_there",
         "contacts/contact_pgs.cpp",
         "const bool all = first || (was_settling && over && swings_);",

@@ -158,7 +158,7 @@ class Method:
                 )
 
     def _refuse_beside_sleep(self) -> None:
-        """What looks further than the step at hand, or bends its rows, would not see who sleeps."""
+        """What looks further than the step at hand, or bends its rows, would not see what sleeps."""
         plain = {
             "composition": "none",
             "half_step_velocities": False,

@@ -288,7 +288,7 @@ class Run:
             self._settings = {key: self._start_of(*key) for key in set_since} | dict(snapshot.settings)
             for kind, name in sorted(set_since):
                 self._apply(kind, name)
-            self._native.go_back(snapshot.native)  # then: who slept sleeps, whatever was set since
+            self._native.go_back(snapshot.native)  # then: what slept sleeps, whatever was set since
             self._steps = snapshot.native.steps
             self._failure = snapshot.failure
             self._read = None

@@ -149,7 +149,7 @@ def grown(time_step: float) -> float:
 
 
 def on_the_table(simulate: Simulate) -> dict[str, float]:
-    """Half a second: who still rides, and where all are."""
+    """Half a second: which still ride, and where all are."""
     observe = {f"x{k}": Trace(quantity=Position(f"box {k}")) for k in range(len(SHARES))}
     result = simulate(table(), time_step=TABLE_STEP, steps=TABLE_STEPS, observe=observe)
     place, kept = 0.0, 0

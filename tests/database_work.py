@@ -13,7 +13,7 @@ from sqlalchemy.orm import Session
 from spook_tracker.tracker.store import (
     connection,
     database,
-    revisions,  # (imported by the first who migrates: here, so that it takes no time any more)
+    revisions,  # (imported by the first process that migrates: here, so that it takes no time any more)
 )
 from spook_tracker.tracker.store.record import record
 from tests.run_documents import run_of

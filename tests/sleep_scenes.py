@@ -1,4 +1,4 @@
-"""Scenes in which bodies come to rest, and how to see who sleeps."""
+"""Scenes in which bodies come to rest, and how to see which sleep."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from spook_tracker.engine import (
 
 GRAVITY = 9.81  # m/s²
 TIME_STEP = 1.0 / 60.0  # s
-SLOW = 0.02  # m/s: who is slower, sleeps
+SLOW = 0.02  # m/s: what is slower, sleeps
 FALLEN = 240  # steps, within which all that is dropped here lies and sleeps
 ROUGH = Material(friction=0.5)
 SMOOTH = Material()

@@ -1,4 +1,4 @@
-"""The page of all engines: counted gates, who is first, where ours is behind and why, from recorded runs."""
+"""The page of all engines: counted gates, which is first, where ours is behind and why, from recorded runs."""
 
 from __future__ import annotations
 

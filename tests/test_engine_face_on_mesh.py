@@ -44,7 +44,7 @@ HEAP = (  # mass, place, turn, velocity, angular velocity of three boxes that co
 @pytest.mark.parametrize("solver", ["direct", "hybrid"])
 @pytest.mark.parametrize("seed", range(24))
 def test_a_face_on_a_mesh_neither_gains_energy_nor_is_pulled(seed: int, solver: str) -> None:
-    """Places that differ by 1e-5 m, without friction. Where a search for who pushes took long, its end was not looked at once
+    """Places that differ by 1e-5 m, without friction. Where a search for what pushes took long, its end was not looked at once
     more: impulses of +1e9 and -1e9 N s passed for an answer of residual 1e-7 m/s, and four of 24 heaps exploded."""
     rng = np.random.default_rng(seed)
     bodies = [RigidBody(name="ground", motion="static", shape=TENTS, position=(-3.0, -3.0, -0.1))]

@@ -139,7 +139,7 @@ def test_piles_overlap_by_no_more_than_what_turns_unforeseen(seed: int, friction
     [(8, 0.0), (44, 0.0), (50, 0.1), (53, 0.1), (91, 0.0), (148, 0.0), (172, 0.1), (183, 0.0)],
 )
 def test_what_comes_down_on_another_is_no_slider_at_its_side(seed: int, restitution: float) -> None:
-    """Taken for one that sweeps have left falling beside a tile, he would come to lie up to 10 mm in it."""
+    """Taken for one that iterations have left falling beside a tile, it would come to lie up to 10 mm in it."""
     friction = 0.0 if seed == 91 else 0.4
     fall = falling_pile.read(simulate, seed, restitution, friction, falling_pile.SWEEPS)
     assert (fall.depth - fall.bent).max() < 1e-7

@@ -251,7 +251,7 @@ def meetings(
 @pytest.mark.parametrize("seed", range(24))
 def test_successive_impacts_come_in_the_order_of_their_times(seed: int, ends: int, solver: str) -> None:
     """Rows of up to seven balls with gaps of 1e-9 to 1e-4 m, struck from one end or both: blows follow each other within a
-    step, and which comes first decides who leaves with what. All pairs that approached were answered at once: 16 of
+    step, and which comes first decides which leaves with what. All pairs that approached were answered at once: 16 of
     24 rows struck from one end left otherwise, by up to their whole speed."""
     rng, h = np.random.default_rng(seed), (H, 1 / 240, 1e-3)[seed % 3]
     count = int(rng.integers(3, 8))

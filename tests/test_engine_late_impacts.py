@@ -1,4 +1,4 @@
-"""Who is pushed in a step meets others in the same one: where, by which normal, and what the row of that meeting asks for.
+"""What is pushed in a step meets others in the same one: where, by which normal, and what the row of that meeting asks for.
 
 A kinematic ball pushes a body, which without it would not move; only the solve sets it on its way to the next one. Of what
 does not move by itself the normal is that of the meeting, or the body would be turned away from a side it never comes to.

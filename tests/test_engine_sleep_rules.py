@@ -64,7 +64,7 @@ def told(name: str, x: float, z: float, **options: Any) -> RigidBody:
     return RigidBody(name=name, motion="kinematic", position=(x, 0.0, z), **options)
 
 
-# --- who is at rest -----------------------------------------------------------------------------------------
+# --- what is at rest ----------------------------------------------------------------------------------------
 
 
 def test_what_loses_its_hold_in_a_step_does_not_fall_asleep_in_it() -> None:
@@ -187,7 +187,7 @@ def test_wires_and_springs_that_pull_aside_tie_sleepers(kind: str) -> None:
 
 
 def test_a_woken_body_is_at_rest_no_sooner_than_any_other() -> None:
-    """Two boxes that touch: one is pulled away, and the other sleeps again half a second later; who is set while awake
+    """Two boxes that touch: one is pulled away, and the other sleeps again half a second later; what is set while awake
     begins anew."""
     bodies = (box("a", 0.0, 0.0), box("b", 1.0, 0.0))
     run = held(scene(*bodies, weighs=False, forces=(Load(name="pull", body="b"),)), sleepy(), 40)

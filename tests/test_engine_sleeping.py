@@ -1,4 +1,4 @@
-"""Sleeping: who is at rest is left out of the steps, and back in the step that something comes to it."""
+"""Sleeping: what is at rest is left out of the steps, and back in the step that something comes to it."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_a_heap_asleep_carries_its_weight_and_stays_to_the_last_bit(solver: str)
 
     assert asleep(run) == 30
     before, load, there = run.state, run["load"], run["points"]
-    # Who falls asleep is slower than that before and after its last step: forces are off by what changes speeds so much.
+    # What falls asleep is slower than that before and after its last step: forces are off by what changes speeds so much.
     total = sum(body.mass or 0.0 for body in built.bodies)
     assert abs(-load[2] - total * GRAVITY) <= 2.0 * total * slow / TIME_STEP
     run.step(100)

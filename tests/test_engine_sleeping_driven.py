@@ -1,4 +1,4 @@
-"""Sleeping with joints, springs and loads: who falls asleep together, and what wakes them that is no contact."""
+"""Sleeping with joints, springs and loads: what falls asleep together, and what wakes them that is no contact."""
 
 from __future__ import annotations
 

@@ -199,7 +199,7 @@ def test_iterations_over_tiles_that_can_move_meet_no_edge(
     slider: str, heading: float, y: float, h: float, sweeps: int
 ) -> None:
     """The tile that holds a body sinks a little beside the next one, between sweeps and by what they leave: its side was
-    met then, and who fell onto it for a micron was stopped by the side he faced before. That was .6 to 4.4 m/s."""
+    met then, and what fell onto it for a micron was stopped by the side it faced before. That was .6 to 4.4 m/s."""
     method = Method(solver="iterative", iterations=sweeps)
     change, raised = slide(slider, heading, y, h, method, duration=0.8, mass=1000.0)
     assert change < 0.1

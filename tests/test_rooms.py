@@ -58,7 +58,7 @@ PLANTED = {  # contract: where a forbidden import is planted, and what it import
         for module in ("jinja2", "plotly")
     ] + [("tracker/judge", "jinja2"), ("tracker/cli", "jinja2")]
     + [(f"tracker/{door}.py", "jinja2") for door in ("library", "past", "resources")],
-    "who measures, keeps or judges knows no addresses": [
+    "what measures, keeps or judges knows no addresses": [
         (f"tracker/{room}", "spook_tracker.tracker.document.addresses") for room in ("judge", "measure", "store")
     ],
     "the engine needs NumPy at most": [("engine", "scipy"), ("engine", "msgspec")],
@@ -154,7 +154,7 @@ def test_every_door_of_the_tracker_is_in_the_contracts() -> None:
 
 
 @pytest.mark.parametrize("room", ["judge", "store", "measure"])
-def test_who_does_not_know_the_addresses_writes_none(room: str) -> None:
+def test_rooms_that_know_no_addresses_write_none(room: str) -> None:
     """The contract holds what asks for an address; none is made up in a text either."""
     files = (ROOT / "tracker" / room).glob("*.py")
 

@@ -1,4 +1,4 @@
-"""Every scalar test is complete: it asks one question, says in which units, and who set its limits."""
+"""Every scalar test is complete: it asks one question, says in which units, and from what its limits are."""
 
 from __future__ import annotations
 

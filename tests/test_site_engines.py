@@ -178,7 +178,7 @@ def test_two_versions_of_another_engine_can_be_compared_in_the_page(driver: Any,
 
 
 def test_two_engines_stand_beside_each_other_gate_by_gate(driver: Any, site: Path) -> None:
-    """What the page says of each is what `tracker rank` says; first who breaks what the other keeps."""
+    """What the page says of each is what `tracker rank` says; first those of which one breaks what the other keeps."""
     runs = {"before": history(3).runs()[1].id, "after": "run-rival-3.2"}
     documents = with_rival(history(3))
     samples = {side: documents.samples(run) for side, run in runs.items()}

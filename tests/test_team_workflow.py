@@ -113,7 +113,7 @@ def test_first_night_regression_pull_requests_and_recovery(tmp_path: Path) -> No
     }, first["night"].log  # fmt: skip
     assert "measured for the first time" in first["night"].summary
     assert list(team.months().values()) == [1]
-    assert not (tmp_path / "notified.md").exists(), "a green night notifies no one"
+    assert not (tmp_path / "notified.md").exists(), "a green night notifies"
 
     bad = team.change(
         "Pull a little harder", "main", GRAVITY, GRAVITY.replace("time_step", "1.01 * time_step")

@@ -40,7 +40,7 @@ def nonsense() -> object:
 
 
 def answered(document: RunDocument) -> list[bytes]:
-    """Everything a run says of the engine: not when it ran and who it was, nor what the clock said."""
+    """Everything a run says of the engine: not when it ran and which it was, nor what the clock said."""
     return [encode(part) for part in (document.series, document.samples, document.figures, document.maps)]
 
 

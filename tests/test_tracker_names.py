@@ -39,7 +39,7 @@ def test_what_the_judge_speaks_of_is_defined_once() -> None:
 
 
 def test_boxed_numbers_are_decoded_at_the_border_and_nowhere_else() -> None:
-    """A `Number` is a float: who turns one into a float again does not trust the border."""
+    """A `Number` is a float: code that turns one into a float again does not trust the border."""
     found = [
         f"{path.relative_to(ROOT)}:{node.lineno}"
         for room in ("judge", "website", "cli")

@@ -159,7 +159,7 @@ def test_no_worker_outlives_a_supervisor_that_is_killed(how: signal.Signals, tmp
 
 
 def where(seconds: float) -> int:
-    """Who does it, after a while."""
+    """The process that does it, after a while."""
     time.sleep(seconds)
     return os.getpid()
 

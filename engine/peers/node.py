@@ -120,7 +120,7 @@ class Served:
         return self._process.poll() is None
 
     def _give(self, task: bytes, until: float | None) -> None:
-        """A pipe holds less than a large task, and who hangs reads none of it: writing may time out, too."""
+        """A pipe holds less than a large task, and a process that hangs reads none of it: writing may time out, too."""
         assert self._process.stdin is not None
         left = memoryview(task)
         try:

@@ -127,13 +127,13 @@
     const cell = ({ stands, text }, name) => make("td", { class: "num", "data-name": name, "data-stands": stands }, make("div", { class: "value" }, text), verdict(stands, { pass: "PASS", fail: "FAIL", followed: "FOLLOWED" }[stands] || "NONE"));
     const row = (one) => make("tr", { "data-group": one.group },
       make("th", { scope: "row" }, make("a", { href: one.page }, one.title), make("span", { class: "sub" }, `${one.what}; limit ${one.limit}`)),
-      cell(one.said[0], "Before"), cell(one.said[1], "After"), make("td", { "data-name": "Who" }, one.words));
+      cell(one.said[0], "Before"), cell(one.said[1], "After"), make("td", { "data-name": "Which keeps it" }, one.words));
     told.replaceChildren(
       make("p", { class: "sub" }, versions[i].label + " → " + versions[j].label),
       make("div", { class: "title-row" }, make("h2", {}, "Two engines on the same questions")),
       make("p", {}, [0, 1].map((side) => `${names[side]} keeps ${kept[side]} of ${answered[side]} limits it has an answer to`).join("; ") + "."),
       make("p", { class: "small soft" }, "Engines are not held to each other’s values: nothing here is red. Which is ahead at equal error stands on the page ", make("a", { href: "engines.html" }, "Engines"), "."),
-      ...listed("Every gate that one of them was asked; first those that one of them breaks.", [["Gate"], [names[0], "num"], [names[1], "num"], ["Who keeps the limit"]], shown, row));
+      ...listed("Every gate that one of them was asked; first those that one of them breaks.", [["Gate"], [names[0], "num"], [names[1], "num"], ["Which keeps the limit"]], shown, row));
     folds(told);
   }
 

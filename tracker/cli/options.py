@@ -294,13 +294,13 @@ def workers_option(command: Command) -> Command:
 
 
 def executor_option(command: Command) -> Command:
-    """--executor NAME: who measures values."""
+    """--executor NAME: where values are measured."""
     return click.option(
         "--executor",
         metavar="NAME",
         default="process",
         show_default=True,
-        help="Who measures values: process, dask://HOST:PORT, or module:factory of any executor.",
+        help="Where values are measured: process, dask://HOST:PORT, or module:factory of any executor.",
     )(command)
 
 

@@ -40,7 +40,7 @@ class Standing:
 
 @dataclass(frozen=True, kw_only=True)
 class Lead:
-    """Who reaches an error sooner, and by what factor; where only one reaches it, the factor is infinite."""
+    """Which reaches an error sooner, and by what factor; where only one reaches it, the factor is infinite."""
 
     test: str
     ladder: str
@@ -52,7 +52,7 @@ class Lead:
 
 @dataclass(frozen=True, kw_only=True)
 class Race:
-    """One error on one scene: who comes within it, soonest first; who never does is missing."""
+    """One error on one scene: which engines come within it, soonest first; one that never does is missing."""
 
     test: str
     ladder: str
@@ -62,7 +62,7 @@ class Race:
     settings: tuple[str, ...] = ()  # the configuration of each in `order`
 
     def behind(self, engine: str) -> tuple[str, float, float | None] | None:
-        """Who is first, in what time, and the time of this engine (None: never); None if none is sooner."""
+        """Which is first, in what time, and the time of this engine (None: never); None if none is sooner."""
         best, first = self.order[0]
         mine = {name: time for time, name in self.order}.get(engine)
         return None if mine is not None and mine <= best else (first, best, mine)
@@ -150,7 +150,7 @@ def races(found: Sequence[Standing]) -> list[Race]:
 
 
 def leads(found: Sequence[Standing], before: str, after: str) -> list[Lead]:
-    """Two engines at equal error: scene by scene, who is ahead and by what factor."""
+    """Two engines at equal error: scene by scene, which is ahead and by what factor."""
     by_place: dict[tuple[str, str], dict[str, Standing]] = {}
     for one in found:
         by_place.setdefault((one.test, one.ladder), {})[one.engine] = one

@@ -4,7 +4,7 @@
     dask://HOST:PORT        the workers of a Dask cluster; the extra spook-tracker[dask]
     module:factory          `factory()` returns an executor, such as a pool of MPI or of a batch system
 
-A value depends on the engine and on how this kind of processor rounds, not on who computes it: each piece comes
+A value depends on the engine and on how this kind of processor rounds, not on what computes it: each piece comes
 back with the version and the float environment it was computed in, and one that differs from this machine's is
 refused. It also says on which machine: a run names its workers. Wall time and memory of a piece are bounded by "process" only; elsewhere they are the cluster's affair.
 Run times are never taken there: they need a machine of which is known that it is quiet, which is this one.

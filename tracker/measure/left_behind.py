@@ -108,7 +108,7 @@ def end_with(lifeline: int) -> None:
 
 
 def _watch(session: int, *pipes: int) -> None:
-    """Until the one who asked, or the process watched, is gone."""
+    """Until the process that asked, or the one watched, is gone."""
     try:
         os.setsid()
         for number in map(int, os.listdir("/dev/fd")):  # noqa: PTH208 - numbers, not paths

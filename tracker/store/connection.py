@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from sqlalchemy.engine import ExceptionContext
 
 DEFAULT = "sqlite:///tracker.db"
-ONE_WRITER = 5755  # number of the lock that who writes to PostgreSQL holds
+ONE_WRITER = 5755  # number of the lock that a writer to PostgreSQL holds
 DRIVERS = frozenset({"sqlite", "sqlite+pysqlite", "postgresql", "postgresql+psycopg", "postgresql+psycopg2"})
 NETWORK = frozenset({"nfs", "nfs4", "cifs", "smb3", "smbfs", "afs", "9p", "ceph", "lustre", "fuse.sshfs"})
 

@@ -138,7 +138,7 @@ def _keep_copy(url: URL, revision: str) -> None:
         number += 1
         copy = source.with_name(f"{source.name}.revision-{revision}-{number}")
     part = source.with_name(f"{source.name}.revision-{revision}.part")  # a name of its own until it is whole
-    part.unlink(missing_ok=True)  # of one who was killed; this one alone writes now
+    part.unlink(missing_ok=True)  # of a process that was killed; this one alone writes now
     with sqlite3.connect(source) as old, sqlite3.connect(part) as new:
         old.backup(new)
     old.close()
