@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import click
 
@@ -13,13 +14,16 @@ from spook_tracker.tracker.document.wording import clock, version
 from spook_tracker.tracker.judge.causes import causes_tonight
 from spook_tracker.tracker.judge.tonight import Finding
 
+if TYPE_CHECKING:
+    from spook_tracker.tracker.store.versions import RunInfo
+
 MOST = 40  # rows of a summary
 MOST_ANNOTATIONS = 10  # GitHub shows as many of a step
 
 
-def night_markdown(run: object, findings: Sequence[Finding], site: str = "") -> str:
+def night_markdown(run: RunInfo, findings: Sequence[Finding], site: str = "") -> str:
     """One sentence, what broke by cause, and a row for each series red or recovered; `site` is the website's address."""
-    engine, started = run.engine, run.started  # type: ignore[attr-defined]
+    engine, started = run.engine, run.started
     red = [finding for finding in findings if finding.red]
     lines = [f"### {escape(engine.name)} {escape(version(engine))}, {clock(started)} UTC", ""]
     lines += [escape(click.unstyle(summary(findings))), ""]

@@ -78,7 +78,11 @@ class Answer:
     stands: Class  # for the limit alone
 
 
-def question(definition: SeriesDefinition) -> tuple[object, ...]:
+# test, kind, metric, time step and parameters
+Question = tuple[str, str, str, float | None, tuple[tuple[str, float], ...]]
+
+
+def question(definition: SeriesDefinition) -> Question:
     """What makes two series of different engines the same question: all but the configuration."""
     parameters = tuple(sorted(definition.parameters.items()))
     return definition.test, definition.kind, definition.metric, definition.time_step, parameters
@@ -88,7 +92,7 @@ def answers(
     gates: Sequence[SeriesDefinition], engines: Mapping[str, Samples]
 ) -> list[tuple[SeriesDefinition, list[Answer]]]:
     """Every gate with what each engine says to it."""
-    first: dict[str, dict[tuple[object, ...], tuple[SeriesDefinition, Sample]]] = {}
+    first: dict[str, dict[Question, tuple[SeriesDefinition, Sample]]] = {}
     for name, samples in engines.items():
         asked = first.setdefault(name, {})
         for definition, sample in samples.values():
@@ -97,7 +101,7 @@ def answers(
 
 
 def _answer(
-    gate: SeriesDefinition, engine: str, asked: Mapping[tuple[object, ...], tuple[SeriesDefinition, Sample]]
+    gate: SeriesDefinition, engine: str, asked: Mapping[Question, tuple[SeriesDefinition, Sample]]
 ) -> Answer:
     definition, sample = asked.get(question(gate), (None, None))
     if definition is None or sample is None:

@@ -12,6 +12,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import partial
+from typing import TypedDict, Unpack
 
 from msgspec.structs import replace
 
@@ -49,9 +50,18 @@ OFTEN = 2  # times left before: such a level is flaky,
 LONGER = 2  # until it lasts so many times its longest
 
 
-def judge_noisy(values: Sequence[float], **options: object) -> list[Noisy]:
+class Options(TypedDict, total=False):  # of judged_and_segments
+    larger_is_better: bool
+    releases: Sequence[bool] | None
+    accepted: Sequence[bool] | None
+    tolerance: float
+    absolute: float
+    ages: Sequence[int] | None
+
+
+def judge_noisy(values: Sequence[float], **options: Unpack[Options]) -> list[Noisy]:
     """A verdict for each value of one machine, oldest first: `judged_and_segments` without the segments."""
-    return judged_and_segments(values, **options)[0]  # type: ignore[arg-type]
+    return judged_and_segments(values, **options)[0]
 
 
 def judged_and_segments(

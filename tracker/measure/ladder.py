@@ -9,10 +9,12 @@ its error and fails while it is timed has the class of that failure: a crash is 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
+from spook_tracker.engine.method import Method
+from spook_tracker.engine.result import Result
 from spook_tracker.scalar_tests.case import Configuration, Ladder, ScalarTest, Simulate
 from spook_tracker.tracker.document.json_form import NAN, Number
 from spook_tracker.tracker.document.order import error_in_time, in_range, observed_order, time_at_error
@@ -100,7 +102,7 @@ def timed_series(
     found: dict[Place, Timing | Outcome] = {}
     places = _to_be_timed(tests, errors)
     for name, test in tests.items():
-        same: dict[object, Place] = {}
+        same: dict[Simulated, Place] = {}
         for i, ladder in enumerate(test.ladders):
             mine = [place for place in places if place[:2] == (name, i)]
             first_of = {place: same.setdefault(_simulated(ladder, place), place) for place in mine}
@@ -146,7 +148,10 @@ def _to_be_timed(tests: Mapping[str, ScalarTest], errors: Errors) -> list[Place]
     ]
 
 
-def _simulated(ladder: Ladder, place: Place) -> object:
+Simulated = tuple[Callable[[Simulate, float, Method], Result], float, str]
+
+
+def _simulated(ladder: Ladder, place: Place) -> Simulated:
     """What a rung runs."""
     configuration = ladder.configurations[place[2]]
     return ladder.run, ladder.steps_of(configuration)[place[3]], repr(configuration.method)

@@ -68,11 +68,11 @@ def in_configuration(
 def _measurements(
     test: ScalarTest, configurations: Sequence[Configuration], gating: bool, both_kinds: bool
 ) -> Iterator[Measurement]:
-    asked: set[tuple[object, ...]] = set()
+    asked: set[tuple[str, float | None, tuple[tuple[str, float], ...]]] = set()
     for measurement in sorted(test.measurements, key=_after_gates):
         fresh = []
         for metric in measurement.metrics:
-            question = (metric.name, measurement.time_step, *sorted(measurement.parameters.items()))
+            question = (metric.name, measurement.time_step, tuple(sorted(measurement.parameters.items())))
             if question not in asked:
                 asked.add(question)
                 fresh.append(metric)

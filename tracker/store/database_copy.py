@@ -13,6 +13,7 @@ from sqlalchemy import Connection, Engine, Table, func, insert, select
 from spook_tracker.tracker.document.errors import DatabaseError
 from spook_tracker.tracker.store import models
 from spook_tracker.tracker.store.database import in_words, open_database, shown
+from spook_tracker.tracker.store.reader import SqlValue
 
 if TYPE_CHECKING:
     from sqlalchemy import Row
@@ -61,7 +62,7 @@ def _copy(source: Engine, target: Engine) -> dict[str, Digest]:
     return digests
 
 
-def _copied(old: Connection, new: Connection, table: Table) -> Iterator[Row[tuple[object, ...]]]:
+def _copied(old: Connection, new: Connection, table: Table) -> Iterator[Row[*tuple[SqlValue, ...]]]:
     names = [column.name for column in table.columns]
     for part in _partitions(old, table):
         new.execute(insert(table), [dict(zip(names, row, strict=True)) for row in part])
@@ -81,7 +82,7 @@ def digest(connection: Connection, table: Table) -> Digest:
     return digest_of(row for part in _partitions(connection, table) for row in part)
 
 
-def digest_of(rows: Iterable[Sequence[object]]) -> Digest:
+def digest_of(rows: Iterable[Sequence[SqlValue]]) -> Digest:
     """Sum of the SHA-256 of every row: equal for equal rows in any order, and from any database."""
     count, total = 0, 0
     for row in rows:
@@ -91,12 +92,12 @@ def digest_of(rows: Iterable[Sequence[object]]) -> Digest:
     return Digest(count, f"{total % 2**256:064x}")
 
 
-def _partitions(connection: Connection, table: Table) -> Iterator[Sequence[Row[tuple[object, ...]]]]:
+def _partitions(connection: Connection, table: Table) -> Iterator[Sequence[Row[*tuple[SqlValue, ...]]]]:
     result = connection.execute(select(table), execution_options={"yield_per": CHUNK})
     yield from result.partitions()
 
 
-def _plain(value: object) -> str:
+def _plain(value: SqlValue) -> str:
     """A value as text that tells types, and floats by their bits, apart."""
     if isinstance(value, float):
         return f"float {value.hex()}"

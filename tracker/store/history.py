@@ -30,7 +30,7 @@ from spook_tracker.tracker.store import git, rows
 from spook_tracker.tracker.store.ancestry import commit_order, lineages
 from spook_tracker.tracker.store.damage import told_of_damage
 from spook_tracker.tracker.store.identity import identity
-from spook_tracker.tracker.store.reader import CHUNK, Reader, SessionReader, file_reader, listed
+from spook_tracker.tracker.store.reader import CHUNK, Reader, SessionReader, SqlValue, file_reader, listed
 from spook_tracker.tracker.store.release_order import in_release_order
 from spook_tracker.tracker.store.versions import RunInfo, resolve
 
@@ -360,7 +360,7 @@ class History:
         return self._definitions
 
     def _read_samples(
-        self, where: str, parameters: dict[str, object], evidence: bool = True, by_run: bool = False
+        self, where: str, parameters: dict[str, SqlValue], evidence: bool = True, by_run: bool = False
     ) -> list[Found]:
         """Samples in the order of time, then of their document; `by_run` where the conditions name runs."""
         query = f"SELECT {SAMPLE}{EVIDENCE if evidence else ''} FROM "

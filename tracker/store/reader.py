@@ -10,6 +10,7 @@ from __future__ import annotations
 import os
 import sqlite3
 from collections.abc import Iterable, Sequence
+from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import quote
@@ -23,12 +24,13 @@ if TYPE_CHECKING:
 LOCK_TIMEOUT = 30.0  # s to wait for another writer
 SAFE = ("trusted_schema = OFF", "cell_size_check = ON")  # for files from elsewhere
 CHUNK = 500  # values in one IN (...)
+SqlValue = str | int | float | bytes | datetime | None  # what a column can hold
 
 
 class Reader(Protocol):
     """Rows of a statement, all from one moment."""
 
-    def rows(self, statement: str, **parameters: object) -> Sequence[Sequence[Any]]: ...
+    def rows(self, statement: str, **parameters: SqlValue) -> Sequence[Sequence[Any]]: ...
 
 
 class SessionReader:
@@ -37,7 +39,7 @@ class SessionReader:
     def __init__(self, session: Session) -> None:
         self.session = session
 
-    def rows(self, statement: str, **parameters: object) -> Sequence[Sequence[Any]]:
+    def rows(self, statement: str, **parameters: SqlValue) -> Sequence[Sequence[Any]]:
         from sqlalchemy import text
 
         return self.session.connection().execute(text(statement), parameters).all()
@@ -49,7 +51,7 @@ class FileReader:
     def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
         self.connection, self.path = connection, path
 
-    def rows(self, statement: str, **parameters: object) -> Sequence[Sequence[Any]]:
+    def rows(self, statement: str, **parameters: SqlValue) -> Sequence[Sequence[Any]]:
         try:
             return self.connection.execute(statement, parameters).fetchall()
         except (sqlite3.Error, UnicodeDecodeError) as error:

@@ -16,6 +16,7 @@ from spook_tracker.tracker.store import models, rows
 from spook_tracker.tracker.store.border import checked
 from spook_tracker.tracker.store.database import in_words, one_writer
 from spook_tracker.tracker.store.identity import identity
+from spook_tracker.tracker.store.reader import SqlValue
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.run_document import FigureData, MapData, Trajectory
@@ -148,7 +149,7 @@ def _append(session: Session, model: type[models.Base], new: list[rows.Row]) -> 
     assert isinstance(table, Table)
     mark = {"qmark": "?", "format": "%s", "pyformat": "%s"}[connection.dialect.paramstyle]
     columns, marks = ", ".join(f'"{name}"' for name in names), ", ".join([mark] * len(names))
-    values: Iterable[tuple[object, ...]] = (tuple(row.values()) for row in new)
+    values: Iterable[tuple[SqlValue, ...]] = (tuple(row.values()) for row in new)
     if "started_at" in names:  # the one column that a database may write in a way of its own; it comes first
         kind = table.c.started_at.type.dialect_impl(connection.dialect)
         written = lru_cache(kind.bind_processor(connection.dialect) or (lambda moment: moment))

@@ -14,7 +14,7 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.document.errors import TrackerError
-from spook_tracker.tracker.store.reader import CHUNK, Reader, listed
+from spook_tracker.tracker.store.reader import CHUNK, Reader, SqlValue, listed
 from spook_tracker.tracker.store.rows import SPECIALS, stored_moment
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ def values_table(reader: Reader, run_keys: Iterable[int]) -> pandas.DataFrame:
     """
     frames = _pandas()
     keys = sorted(run_keys)
-    rows: list[tuple[object, ...]] = []
+    rows: list[tuple[SqlValue, ...]] = []
     for start in range(0, len(keys), CHUNK):
         chosen = listed(keys[start : start + CHUNK])
         found = reader.rows(QUERY.format(columns=", ".join(COLUMNS.values()), runs=chosen))

@@ -9,7 +9,7 @@ import hashlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 from spook_tracker.tracker.document.wording import (
     clean,
@@ -29,10 +29,27 @@ from spook_tracker.tracker.website.nights import Book, Night, TestHistory, as_ni
 from spook_tracker.tracker.website.page_rows import address
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from spook_tracker.tracker.document.run_document import Run
 
 SAID = {"detected": "RED", "accepted": "ACCEPTED", "recovered": "RECOVERED"}
 SIGN: dict[str, Class] = {"accepted": "accepted", "recovered": "pass"}
+
+
+class HitRow(TypedDict):
+    """One series, or one map, of a cause as a line of a table."""
+
+    test: str
+    address: str
+    name: str
+    sentence: str
+    state: Class
+    said: str
+    measure: str
+    end: Run | None
+    what: str
+    before: str
+    after: str
+    limit: str
 
 
 @dataclass
@@ -61,7 +78,7 @@ class ToldCause:
     blame: str
     damage: list[tuple[str, int]]  # what, how often; nothing that is zero
     tests: list[HitTest]
-    worst: Mapping[str, object]
+    worst: HitRow
     replay: str  # where its first wrong moment can be seen; empty where no motion was recorded
     compare: str
     ended: list[Night]  # runs where it came back or was accepted, first and last
@@ -187,11 +204,20 @@ def _replay(
     return max(found, key=lambda one: one[0], default=(0.0, ""))[1]
 
 
-def hit_row(hit: Hit, book: Book) -> dict[str, object]:
+def hit_row(hit: Hit, book: Book) -> HitRow:
     """One series, or one map, of a cause as a line of a table."""
     test = next(t for t in book.tests if t.name == hit.test)
     d = hit.definition
-    row: dict[str, object] = {
+    if d is None:
+        found = next((m for m in test.maps if map_key(m) == hit.series), None)
+        what = f"map: {found.title} ({found.configuration})" if found else f"map: {hit.series}"
+        before = after = "–"
+    else:
+        what = f"{named(d)[0]} ({conditions(d)})"
+        before, after = pair(hit.before, hit.value, d.unit)
+        before = before if math.isfinite(hit.before) else "–"
+        after = after if math.isfinite(hit.value) else "no value"
+    return {
         "test": test.card.title,
         "address": address(test),
         "name": hit.name,
@@ -200,17 +226,10 @@ def hit_row(hit: Hit, book: Book) -> dict[str, object]:
         "said": "" if hit.standing == "detected" else SAID[hit.standing],
         "measure": hit.measure,
         "end": hit.end,
-    }
-    if d is None:
-        found = next((m for m in test.maps if map_key(m) == hit.series), None)
-        title = f"{found.title} ({found.configuration})" if found else hit.series
-        return row | {"what": f"map: {title}", "before": "–", "after": "–", "limit": "", "kept": ""}
-    before, after = pair(hit.before, hit.value, d.unit)
-    return row | {
-        "what": f"{named(d)[0]} ({conditions(d)})",
-        "before": before if math.isfinite(hit.before) else "–",
-        "after": after if math.isfinite(hit.value) else "no value",
-        "limit": "" if d.limit is None else limit(d),
+        "what": what,
+        "before": before,
+        "after": after,
+        "limit": "" if d is None or d.limit is None else limit(d),
     }
 
 

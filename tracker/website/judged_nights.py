@@ -20,7 +20,7 @@ from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.judged import commit_of
 from spook_tracker.tracker.judge.known import of_two
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
-from spook_tracker.tracker.judge.rank import question
+from spook_tracker.tracker.judge.rank import Question, question
 from spook_tracker.tracker.judge.series_history import Told
 from spook_tracker.tracker.judge.work import Samples, is_read_off, with_work
 from spook_tracker.tracker.website.folder import digest
@@ -250,9 +250,9 @@ def gates_of_engines(book: Book) -> list[list[Writable]]:
     answers it with (the configuration that it names first), engine by engine as the nights stand; "" for none."""
     if len(book.engines) < 2:
         return []
-    first: list[dict[tuple[object, ...], str]] = []
+    first: list[dict[Question, str]] = []
     for chapter in book.engines:
-        asked: dict[tuple[object, ...], str] = {}
+        asked: dict[Question, str] = {}
         for trend in sorted((t for test in chapter.tests for t in test.trends), key=lambda t: t.order):
             asked.setdefault(question(trend.definition), trend.definition.key)
         first.append(asked)

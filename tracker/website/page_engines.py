@@ -5,10 +5,9 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from itertools import groupby, pairwise
-from typing import TypedDict
 
 import msgspec
 
@@ -30,6 +29,7 @@ from spook_tracker.tracker.judge.rank import (
     ERRORS,
     TIE,
     Answer,
+    Question,
     Samples,
     Standing,
     answers,
@@ -40,8 +40,16 @@ from spook_tracker.tracker.judge.rank import (
 )
 from spook_tracker.tracker.judge.release_notes import moved
 from spook_tracker.tracker.judge.standing import against_limit
-from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.diagrams import ladder_charts, trend_chart, view
+from spook_tracker.tracker.website.engine_rows import (
+    BehindRow,
+    Cell,
+    EngineCard,
+    GateRow,
+    OccasionRow,
+    RankRow,
+    VersionRow,
+)
 from spook_tracker.tracker.website.nights import Book, Chapter, TestHistory, Trend
 from spook_tracker.tracker.website.page_chooser import uses
 from spook_tracker.tracker.website.page_rows import Page
@@ -52,16 +60,6 @@ MOST_RELEASES = 200  # in the table of an engine's versions
 MOST_CHARTS = 24  # of series that changed over the versions
 MOST_CHANGES = 6  # named for one version
 STEADY = ("time", "work")  # kinds whose changes say nothing about an engine's answers
-
-
-@dataclass(frozen=True)
-class Cell:
-    """One engine on one question, or on one scene at one error."""
-
-    text: str
-    stands: Class
-    what: str = ""  # for a pointer that rests on it
-    best: bool = False
 
 
 def engine_address(name: str, folder: str = "engines") -> str:
@@ -142,7 +140,7 @@ def engines(book: Book, recorded: Recorded | None = None, path: str = ENGINES, b
     return Page(path, "engines.html", "Engines", "The same questions to other engines.", context, plotly=True)
 
 
-def _occasion(recorded: Recorded) -> dict[str, object]:
+def _occasion(recorded: Recorded) -> OccasionRow:
     """What has to be known of a recorded night: when, on which machine, how busy, and what is left out."""
     nights = [chapter.tonight for chapter in recorded.chapters]
     machine = nights[0].machine
@@ -161,17 +159,6 @@ def _occasion(recorded: Recorded) -> dict[str, object]:
     }
 
 
-class VersionRow(TypedDict):
-    """A version of an engine as a line of its page."""
-
-    version: str
-    measured: str
-    first: bool
-    count: int
-    tests: str
-    changes: list[str]
-
-
 def _title(chapter: Chapter) -> str:
     return clean(f"{chapter.name} {version(chapter.tonight.engine)}")
 
@@ -182,7 +169,7 @@ def _card(
     address: str,
     told: Sequence[tuple[SeriesDefinition, Sequence[Answer]]],
     found: Sequence[Standing],
-) -> dict[str, object]:
+) -> EngineCard:
     """One engine: what it answers, and how often none is quicker."""
     mine = [answer for _, of_gate in told for answer in of_gate if answer.engine == name]
     supported = [a for a in mine if a.sample is not None and a.sample.outcome != "not_supported"]
@@ -200,7 +187,7 @@ def _card(
     }
 
 
-def _line(test: TestHistory, gate: SeriesDefinition, told: Sequence[Answer]) -> dict[str, object]:
+def _line(test: TestHistory, gate: SeriesDefinition, told: Sequence[Answer]) -> GateRow:
     return {
         "title": test.card.title,
         "address": page_of(test.name),
@@ -228,7 +215,7 @@ def _told(definition: SeriesDefinition, sample: Sample) -> str:
     return clean(f"{conditions(definition)}{': ' + sample.failure if sample.failure else ''}")[:300]
 
 
-def _ranks(found: Sequence[Standing], book: Book, apart: Mapping[str, str]) -> Iterator[dict[str, object]]:
+def _ranks(found: Sequence[Standing], book: Book, apart: Mapping[str, str]) -> Iterator[RankRow]:
     """A line for every scene: its errors at h = 1/60, and the run times to each error; `apart` says whose do not compare,
     and why."""
     titles = {test.name: test.card.title for test in book.tests}
@@ -272,10 +259,10 @@ def _cells(
     return cells
 
 
-def _behind(found: Sequence[Standing], ours: str, book: Book) -> list[dict[str, object]]:
+def _behind(found: Sequence[Standing], ours: str, book: Book) -> list[BehindRow]:
     """Where another engine reaches an error before ours does, the largest factor first."""
     titles = {test.name: test.card.title for test in book.tests}
-    places: list[tuple[float, dict[str, object]]] = []
+    places: list[tuple[float, BehindRow]] = []
     for race in races(found):
         if (behind := race.behind(ours)) is None:
             continue
@@ -304,7 +291,7 @@ def engine_page(book: Book, chapter: Chapter, recorded: Recorded | None = None) 
     history = chapter if recorded is None else recorded.releases.get(chapter.name, chapter)
     ours = {test.name: test for test in book.tests}
     gates = {question(t.definition): t.definition for test in book.tests for t in test.gates()}
-    cells: dict[tuple[object, ...], dict[str, Cell]] = {place: {} for place in gates}
+    cells: dict[Question, dict[str, Cell]] = {place: {} for place in gates}
     for definition, sample in samples_of(chapter).values():
         if (place := question(definition)) in gates:
             cells[place][definition.configuration] = Cell(

@@ -16,7 +16,7 @@ from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.standing import Count, count_points, expected, worst
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, Class
 from spook_tracker.tracker.website.causes import ToldCause, damage_of, lasting, told
-from spook_tracker.tracker.website.nights import Book, TestHistory, Trend
+from spook_tracker.tracker.website.nights import Book, Night, TestHistory, Trend
 from spook_tracker.tracker.website.page_rows import Page, Row, address, row
 
 HEAT_NIGHTS = 60
@@ -85,7 +85,21 @@ def index(book: Book, causes: Sequence[Cause]) -> Page:
     return Page("index.html", "index.html", "Tonight", str(context["summary"]), context)
 
 
-def lead(book: Book, causes: Sequence[Cause]) -> dict[str, object]:
+class Lead(TypedDict):
+    """What the first page and the report begin with."""
+
+    state: Class
+    night: Night
+    headline: str
+    summary: str
+    new: list[ToldCause]
+    old: list[ToldCause]
+    old_left_out: int
+    most_tests: int
+    blamed: str
+
+
+def lead(book: Book, causes: Sequence[Cause]) -> Lead:
     """What the first page and the report begin with: the state of the night, and what is red since when."""
     red = [told(cause, book) for cause in lasting(causes)]
     new, old = [c for c in red if c.new], [c for c in red if not c.new]
@@ -254,7 +268,20 @@ class HeatRow(TypedDict):
     runs: list[HeatRun]
 
 
-def heat(book: Book, *, folded: bool = False) -> dict[str, object]:
+class Heat(TypedDict):
+    """Tests against nights, as the template draws it."""
+
+    columns: Sequence[Night]
+    rows: list[HeatRow]
+    ticks: list[tuple[float, str]]
+    width: int
+    height: int
+    left: int
+    first: int
+    description: str
+
+
+def heat(book: Book, *, folded: bool = False) -> Heat:
     """Tests against nights: cells of equal verdict beside each other are one bar.
 
     Folded, only the tests of the thesis and those that were red have a row, the others share one.

@@ -34,9 +34,13 @@ from spook_tracker.tracker.website.scenery import scenery
 from spook_tracker.tracker.website.svg import grid_picture, picture
 
 if TYPE_CHECKING:
-    from spook_tracker.tracker.website.causes import ToldCause
+    from spook_tracker.tracker.document.run_document import TestCard
+    from spook_tracker.tracker.judge.vocabulary import Class
+    from spook_tracker.tracker.website.causes import HitRow, ToldCause
     from spook_tracker.tracker.website.nights import Trend
     from spook_tracker.tracker.website.page_rows import Row
+    from spook_tracker.tracker.website.scenery import Scenery
+    from spook_tracker.tracker.website.svg import Picture
 
 MOST_CAUSES = 200  # on the page of regressions; the file has all
 MOST_ROWS, FEW_ROWS = 500, 25  # series of all causes; of one that is over
@@ -115,7 +119,7 @@ class Group(TypedDict):
     """A cause and the lines of what it hit."""
 
     told: ToldCause
-    rows: list[dict[str, object]]
+    rows: list[HitRow]
 
 
 def regressions(book: Book, causes: Sequence[Cause]) -> Page:
@@ -230,7 +234,22 @@ def _told_whole(test: TestHistory) -> bool:
     return test.card.seven or test.state in RED
 
 
-def _chapter(test: TestHistory, book: Book) -> dict[str, object]:
+class ReportedTest(TypedDict):
+    """What the report tells of one test."""
+
+    card: TestCard
+    slug: str
+    whole: bool
+    scenery: Scenery | None
+    state: Class
+    kept: list[str]
+    left_out: int
+    rows: list[Row]
+    pictures: list[tuple[Picture, str]]
+    conclusions: list[tuple[str, str]]
+
+
+def _chapter(test: TestHistory, book: Book) -> ReportedTest:
     """What the report tells of one test."""
     name, whole = slug(test.name), _told_whole(test)
     scalars = test.gates() + test.companions()

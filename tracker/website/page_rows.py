@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypedDict
 
 from spook_tracker.tracker.document.addresses import page_of
 from spook_tracker.tracker.document.wording import (
@@ -27,10 +27,13 @@ from spook_tracker.tracker.judge.standing import expected
 from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.events import Event
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory, Trend
-from spook_tracker.tracker.website.svg import sparkline
+from spook_tracker.tracker.website.svg import Spark, sparkline
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
+
+    from spook_tracker.tracker.document.run_document import Run, StageChoice
+    from spook_tracker.tracker.website.stage_times import StageTimes
 
 SPARK_NIGHTS = 40
 
@@ -45,9 +48,16 @@ class Page:
     description: str
     context: Mapping[str, object] = field(default_factory=dict)
     plotly: bool = False
-    nightly: tuple[str, dict[str, object]] | None = (
-        None  # the test, and what `times.html` tells of its run times
-    )
+    nightly: tuple[str, Times] | None = None  # the test, and what `times.html` tells of its run times
+
+
+class Times(TypedDict):
+    """What the page of a test says of run times, which every night writes anew."""
+
+    rows: list[Row]
+    stage_times: list[StageTimes]
+    saving: str
+    saved: list[StageChoice]
 
 
 @dataclass
@@ -74,7 +84,7 @@ class Row:
     state: Class
     judged: bool
     failure: str
-    spark: dict[str, object]
+    spark: Spark
     stale: str  # the night the value is of, if it is not tonight
     search: str  # what the words of the line do not say
     more: int = 0  # gates of the same test that are not shown
@@ -136,7 +146,29 @@ def address(test: TestHistory, root: str = "") -> str:
     return f"{root}{page_of(test.name)}"
 
 
-def event_row(event: Event, book: Book) -> dict[str, object]:
+class EventRow(TypedDict):
+    """An event as a line of a table."""
+
+    test: str
+    what: str
+    address: str
+    anchor: str
+    state: Class
+    name: str
+    sentence: str
+    now: str
+    before: str
+    night: Run
+    again: Run | None
+    blame: str
+    good: Run | None
+    end: Run | None
+    standing: str
+    accepted: str
+    key: str
+
+
+def event_row(event: Event, book: Book) -> EventRow:
     """An event as a line of a table."""
     d = event.definition
     test = next(t for t in book.tests if t.name == d.test)

@@ -23,12 +23,13 @@ from spook_tracker.tracker.website.diagrams import (
 from spook_tracker.tracker.website.events import Event, of_test
 from spook_tracker.tracker.website.model_history import model_history
 from spook_tracker.tracker.website.nights import Book, TestHistory
-from spook_tracker.tracker.website.page_rows import Page, address, event_row, row
+from spook_tracker.tracker.website.page_rows import Page, Times, address, event_row, row
 from spook_tracker.tracker.website.replays import replay
 from spook_tracker.tracker.website.scenery import scenery
 from spook_tracker.tracker.website.stage_times import stage_times
+from spook_tracker.tracker.website.svg import Spark
 
-NO_SPARK: dict[str, object] = {"path": "", "last": None, "failed": []}
+NO_SPARK: Spark = {"path": "", "last": None, "failed": [], "width": 0.0, "height": 0.0}
 LARGE = 3  # charts over nights that are not folded
 
 
@@ -92,7 +93,7 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
         "events": [event_row(e, book) for e in of_test(events, test)[:20]],
         "scalars": [every[id(t)] for t in scalars],
     }
-    told: dict[str, object] = {
+    told: Times = {
         "rows": [every[id(t)] for t in times],
         "stage_times": stage_times(test),
         "saving": saved(test.card.saving),

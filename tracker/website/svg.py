@@ -10,6 +10,7 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import TypedDict
 
 from spook_tracker.tracker.document.wording import clean, number
 from spook_tracker.tracker.website.charts import (
@@ -169,9 +170,19 @@ def describe(chart: Chart) -> str:
     return f"{clean(chart.y_label) or 'value'} against {clean(chart.x_label)}. Lines: {shown}."
 
 
+class Spark(TypedDict):
+    """A small line in a cell: its path, its last point, and where it failed, as coordinates."""
+
+    path: str
+    last: tuple[str, str] | None
+    failed: list[tuple[str, str]]
+    width: float
+    height: float
+
+
 def sparkline(
     values: Sequence[float], states: Sequence[str], width: float = 96.0, height: float = 24.0
-) -> dict[str, object]:
+) -> Spark:
     """A line of the newest values for a table cell: its path, its last point and where it failed."""
     finite = [v for v in values if math.isfinite(v)]
     if not finite:
