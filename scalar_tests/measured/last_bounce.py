@@ -131,7 +131,7 @@ TEST = readings.measured_test(
     why="Restitution as one number is a bold claim: that a ball loses the same share at 4 m/s and at 4 cm/s.",
     model="A ball whose first bounce takes 0.63 s and that keeps 0.80 of its height each time bounces until it lies still.",
     theory=(
-        "All bounces together: t₁/(1 − e); those lower than 0.1 mm, the last 0.08 s, are not counted as heard. ",
+        "All bounces together: t₁/(1 − e); those lower than 0.1 mm, the last 0.08 s, are not counted as heard.",
         "σ is a choice: the source has 0.80 without an uncertainty; one of its last digit, 0.01, moves the end by 5 %.",
         "Left out: air, the ball's spin, and that rubber keeps more of a gentle impact: why the real ball is heard longer.",
     ),
