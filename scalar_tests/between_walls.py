@@ -2,13 +2,24 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
 
 from spook_tracker.engine import AngularVelocity, Final, Plane, RigidBody, Scene, Sphere, Trace, Velocity
 from spook_tracker.engine.bodies import Material
-from spook_tracker.scalar_tests.case import Curve, Drawing, Example, Figure, ScalarTest, Simulate
+from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.case import (
+    BreakPoint,
+    Curve,
+    Drawing,
+    Example,
+    Figure,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
 from spook_tracker.scalar_tests.closed_form import ask, error
 
 TIME_STEP = 1.0 / 60.0  # s
@@ -17,6 +28,7 @@ ROOM = 1.0  # m, from floor to ceiling
 UP, ALONG = 4.0, 3.0  # m/s
 FLIGHT = (ROOM - 2.0 * RADIUS) / UP  # s, elastic
 BLOWS = 6
+GRIP = ALONG / (3.5 * 2.0 * UP)  # µ (1 + e) u = v/3.5: what turns sliding into rolling, at the bound
 CASES = {"sliding": (0.05, 0.0), "gripping": (5.0, 0.0), "returning": (5.0, 1.0)}  # friction, psi_t
 
 
@@ -69,6 +81,18 @@ def _measure(simulate: Simulate) -> dict[str, float]:
         values[f"{name}_speed_error"] = float(np.abs(result["v"] - (v, 0.0, up)).max())
         values[f"{name}_spin_error"] = float(np.abs(result["w"] - (0.0, spin / RADIUS, 0.0)).max())
     return values
+
+
+def grips(simulate: Simulate, friction: float) -> bool:
+    """Whether the ball leaves the floor rolling: speed along and r ω are alike after the first blow."""
+    observe = {"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))}
+    result = simulate(scene(friction), time_step=TIME_STEP, duration=FLIGHT, observe=observe)
+    return result.completed and abs(float(result["v"][0]) - RADIUS * float(result["w"][1])) < 1e-9 * ALONG
+
+
+def smoothest(simulate: Simulate) -> BreakPoint:
+    """The smallest friction with which the first blow grips."""
+    return break_point(functools.partial(grips, simulate), 1.0, 0.01, resolution=1e-3, walk=5)
 
 
 def _draw(simulate: Simulate) -> Drawing:
@@ -145,4 +169,18 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=scene(0.05), time_step=TIME_STEP, duration=1.5),
     figures=(Figure(name="speed", title="Speed along the walls", draw=_draw),),
+    stability=(
+        StabilityStudy(
+            name="smoothest",
+            title="Smallest friction with which the first blow grips",
+            configuration="plain",
+            definition="after the first blow the speed along is r ω, to 1e-9",
+            study=smoothest,
+            unit="1",
+            better="smaller",
+            expected=(GRIP, 1.001 * GRIP),
+            expected_source="gripping takes v/3.5 of speed, friction can take µ (1 + e) u: µ = 3/28 at 3 m/s along and 4 m/s "
+            "across; to the resolution of the search",
+        ),
+    ),
 )

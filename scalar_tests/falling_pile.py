@@ -12,6 +12,7 @@ from spook_tracker.engine import (
     AngularVelocity,
     Box,
     Energy,
+    Final,
     Material,
     Maximum,
     Method,
@@ -24,7 +25,9 @@ from spook_tracker.engine import (
     Trace,
 )
 from spook_tracker.engine.method import PLAIN
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Curve,
     Drawing,
@@ -35,6 +38,7 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.pile import energy_rise
 
@@ -52,6 +56,7 @@ RESTITUTIONS = (0.0, 0.1)
 SWEEPS = Method(solver="iterative", iterations=200)
 TALLEST = 3  # seed of the ladder's pile
 LADDER_DURATION = 2.0  # s
+FASTEST = 1e4  # m/s, where the search ends: 167 m in a step
 REACH = 0.5 * float(np.linalg.norm(EDGES))  # m, of a box's corners
 
 
@@ -140,6 +145,52 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
 def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     """The same with nothing observed."""
     return simulate(scene(TALLEST, 0.0), time_step=time_step, duration=LADDER_DURATION, method=method)
+
+
+def column(places: tuple[tuple[float, float, float], ...], speed: float) -> Scene:
+    """Boxes at rest but for `speed` [m/s] downwards, their centres at places [m] over the floor; plastic, frictional."""
+    material = Material(friction=FRICTIONS[0])
+    floor = RigidBody(
+        name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=material
+    )
+    boxes = (
+        RigidBody(
+            name=f"b{k}",
+            mass=1.0,
+            shape=Box(EDGES),
+            position=place,
+            velocity=(0.0, 0.0, -speed),
+            material=material,
+        )
+        for k, place in enumerate(places)
+    )
+    return Scene(bodies=(floor, *boxes), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def stays_on(simulate: Simulate, aside: float) -> bool:
+    """Whether a box that falls onto another, so far aside [m], lies there: nothing has turned after half a second."""
+    built = column(((0.0, 0.0, 0.5 * EDGES[2]), (aside, 0.0, 0.5 * EDGES[2] + APART)), 0.0)
+    observe = {"w": Final(quantity=AngularVelocity())}
+    result = simulate(built, time_step=TIME_STEP, duration=0.5, observe=observe)
+    return result.completed and float(np.abs(result["w"]).max()) < 1e-9
+
+
+def stays_apart(simulate: Simulate, speed: float) -> bool:
+    """Whether three boxes thrown down one above the other [m/s] overlap no more than the gate allows, in ten steps."""
+    built = column(tuple((0.0, 0.0, 0.6 + APART * k) for k in range(3)), speed)
+    observe = {"depth": Maximum(quantity=Penetration())}
+    result = simulate(built, time_step=TIME_STEP, steps=10, observe=observe)
+    return result.completed and float(result["depth"].max()) < 1e-7
+
+
+def farthest(simulate: Simulate) -> BreakPoint:
+    """How far aside [m] a box may fall onto another."""
+    return break_point(functools.partial(stays_on, simulate), 0.1, 0.5, resolution=1e-3, walk=5)
+
+
+def fastest(simulate: Simulate) -> BreakPoint:
+    """The fastest fall [m/s] on which nothing overlaps."""
+    return break_point(functools.partial(stays_apart, simulate), 1.0, FASTEST, walk=5)
 
 
 def _draw(simulate: Simulate) -> Drawing:
@@ -246,6 +297,29 @@ TEST = ScalarTest(
             run=ladder_run,
             target_error=1e-6,
             target_seconds=0.1,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="farthest-aside",
+            title="How far aside a box may fall onto another",
+            configuration="plain",
+            definition="nothing has turned by 1e-9 rad/s half a second later",
+            study=farthest,
+            unit="m",
+            expected=(0.999 * 0.5 * EDGES[0], 0.5 * EDGES[0]),
+            expected_source="a plastic blow stops a box whose centre lies over the one below, whose edge is 0.3 m aside; to the "
+            "resolution of the search",
+        ),
+        StabilityStudy(
+            name="fastest",
+            title="Fastest fall of three boxes that stay apart at h = 1/60 s",
+            configuration="plain",
+            definition="no overlap beyond 1e-7 m in ten steps",
+            study=fastest,
+            unit="m/s",
+            expected=(FASTEST, FASTEST),
+            expected_source="what will meet is foreseen for the whole way of a step, however long; the search ends at 1e4 m/s",
         ),
     ),
 )

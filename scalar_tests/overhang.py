@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from spook_tracker.engine import (
@@ -21,7 +23,9 @@ from spook_tracker.engine import (
     Trace,
 )
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests.bracket import break_count, break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Curve,
     Drawing,
@@ -32,6 +36,7 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
 
@@ -46,6 +51,8 @@ INSIDE, OUTSIDE = 0.99, 1.01  # of the limit
 STANDING = 0.5  # s: what tips at 1.01 has moved by a centimetre then
 FALLING = 4.0  # s
 LADDER_DURATION = 2.0  # s
+STILL = 1e-9  # m
+TALL = (2, 5, 10, 20, 40)  # plates that are tried
 
 
 def scene(count: int, share: float) -> Scene:
@@ -95,6 +102,23 @@ def _measure_heap(simulate: Simulate) -> dict[str, float]:
         "heap_overlap": float(result["depth"]),
         "heap_energy_rise": float(np.diff(energy).max() / energy[0]),
     }
+
+
+def stands(simulate: Simulate, count: int, share: float) -> bool:
+    """Whether no plate of a stack has moved by STILL in a quarter of a second."""
+    observe = {"moved": Final(quantity=Position(), from_start=True)}
+    result = simulate(scene(count, share), time_step=TIME_STEP, duration=0.25, observe=observe)
+    return result.completed and float(np.abs(result["moved"]).max()) < STILL
+
+
+def farthest(simulate: Simulate) -> BreakPoint:
+    """The largest overhang, over its limit, at which five plates stand."""
+    return break_point(functools.partial(stands, simulate, 5), 0.6, 2.0, resolution=5e-4, walk=5)
+
+
+def tallest(simulate: Simulate) -> BreakPoint:
+    """The most plates that stand inside the limit."""
+    return break_count(lambda count: stands(simulate, count, INSIDE), TALL)
 
 
 def _draw(simulate: Simulate) -> Drawing:
@@ -234,6 +258,29 @@ TEST = ScalarTest(
             ),
             error=ladder_error,
             run=ladder_run,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="farthest",
+            title="Largest overhang of five plates, over its limit",
+            configuration="plain",
+            definition="no plate has moved by 1e-9 m in a quarter of a second",
+            study=farthest,
+            unit="1",
+            expected=(0.9995, 1.0),
+            expected_source="the plates above an edge have their centre on it at L/(2 k), and fall beyond; to the resolution of "
+            "the search",
+        ),
+        StabilityStudy(
+            name="tallest",
+            title="Most plates that stand at 0.99 of the limit",
+            configuration="plain",
+            definition="no plate has moved by 1e-9 m in a quarter of a second",
+            study=tallest,
+            unit="1",
+            expected=(TALL[-1], TALL[-1]),
+            expected_source="every edge has its load on its own side, however many lie above; the search ends at 40 plates",
         ),
     ),
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ from spook_tracker.engine import (
     PLAIN,
     ContactForce,
     Energy,
+    Final,
     Method,
     Momentum,
     Penetration,
@@ -21,9 +23,12 @@ from spook_tracker.engine import (
     Scene,
     Sphere,
     Trace,
+    Velocity,
 )
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Curve,
     Drawing,
@@ -34,6 +39,7 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 
 COUNT = 1000
@@ -52,6 +58,10 @@ MISSING_LOAD = -0.006  # 1, of the last second: the pile still sinks, and is slo
 SPREAD = 0.0012  # 1, of it from start to start
 STARTS = 4.0  # spreads that a start may be off
 LADDER_COUNT = 300
+LEAN = math.asin(
+    SPACING / math.sqrt(3.0) / (2.0 * RADIUS)
+)  # of the line from a lower centre to the upper one
+LEAST_FRICTION = math.tan(0.5 * LEAN)  # .358, of a pile of four
 LADDER_MISSING_LOAD, LADDER_SPREAD = -0.0025, 0.0012  # 1, of so many
 
 
@@ -183,6 +193,34 @@ def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     return simulate(scene(LADDER_COUNT), time_step=time_step, duration=STEPS * TIME_STEP, method=method)
 
 
+def pyramid(friction: float) -> Scene:
+    """The least pile: three spheres on the floor, SPACING apart, and one on all of them."""
+    rough = Material(friction=friction)
+    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
+    aside = SPACING / math.sqrt(3.0)  # of the lower centres from the middle
+    turns = [2.0 * math.pi * k / 3.0 for k in range(3)]
+    places = [(aside * math.cos(turn), aside * math.sin(turn), RADIUS) for turn in turns]
+    places.append((0.0, 0.0, RADIUS + math.sqrt(4.0 * RADIUS**2 - aside**2)))
+    spheres = (
+        RigidBody(name=f"s{k}", mass=MASS, shape=Sphere(RADIUS), position=place, material=rough)
+        for k, place in enumerate(places)
+    )
+    return Scene(bodies=(floor, *spheres), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def holds_together(simulate: Simulate, method: Method, friction: float) -> bool:
+    """Whether four spheres stand on each other: slower than 1e-6 m/s after half a second."""
+    observe = {"v": Final(quantity=Velocity())}
+    result = simulate(pyramid(friction), time_step=TIME_STEP, steps=30, method=method, observe=observe)
+    return result.completed and float(np.abs(result["v"]).max()) < 1e-6
+
+
+def smoothest(simulate: Simulate, method: Method) -> BreakPoint:
+    """The least friction with which four spheres stand."""
+    holds = functools.partial(holds_together, simulate, method)
+    return break_point(holds, 1.0, 0.1, resolution=1e-3, walk=5)
+
+
 def _by_sweeps(sweeps: int, substeps: int = 1) -> Configuration:
     name = f"{sweeps} sweeps" + (f", {substeps} substeps" if substeps > 1 else "")
     method = Method(solver="iterative", iterations=sweeps, substeps=substeps)
@@ -305,5 +343,20 @@ TEST = ScalarTest(
             "1",
             ladder_load,
         ),
+    ),
+    stability=tuple(
+        StabilityStudy(
+            name=f"smoothest-{name}",
+            title="Least friction with which a pile of four spheres stands",
+            configuration=name,
+            definition="three on the floor 0.55 m apart and one on top: slower than 1e-6 m/s after half a second",
+            study=functools.partial(smoothest, method=method),
+            unit="1",
+            better="smaller",
+            expected=(LEAST_FRICTION, 1.001 * LEAST_FRICTION),
+            expected_source="moments about a lower centre make friction above and below alike, and level forces balance with "
+            "T (1 + cos φ) = N sin φ: µ = tan(φ/2), φ from the vertical to the upper centre; to the resolution of the search",
+        )
+        for name, method in (("direct", PLAIN), ("iterative", SWEEPS))
     ),
 )

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+import functools
+import math
+from dataclasses import replace
+
 from spook_tracker.engine import PLAIN, Box, Final, Method, Plane, Position, Result, RigidBody, Scene
 from spook_tracker.engine.bodies import Material
 from spook_tracker.engine.shapes import Shape
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Example,
     Ladder,
@@ -13,12 +19,17 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 
 EDGE = 0.5  # m
 MASS = 1.0  # kg
 GRAVITY = 9.81  # m/s²
 TIME_STEP = 1.0 / 500.0  # s
+DEEP = 1e-9  # m
+STEPS, LONGEST = 10, 1e4  # steps of the search for the longest, and where it ends, s
+# The speed that a step leaves is a few roundings of g h, and a few of h times it are what the box sinks
+ROUNDED = math.sqrt(DEEP / (4.0 * STEPS * 2.0**-53 * GRAVITY))  # s, 151: no shorter step sinks it by DEEP
 DURATION = 2.0  # s, long after whatever gives has come to rest
 FLOORS: dict[str, Shape] = {"plane": Plane(), "box": Box((EDGE, EDGE, EDGE))}
 
@@ -55,6 +66,33 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
 def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     """The same with nothing observed."""
     return simulate(scene("box"), time_step=time_step, duration=DURATION, method=method)
+
+
+def stays(simulate: Simulate, aside: float) -> bool:
+    """Whether the box, set down so far aside [m] of the one below, has not moved after a quarter of a second."""
+    built = scene("box")
+    under, box = built.bodies
+    moved = replace(built, bodies=(under, replace(box, position=(aside, 0.0, EDGE))))
+    observe = {"moved": Final(quantity=Position("box"), from_start=True)}
+    result = simulate(moved, time_step=TIME_STEP, duration=0.25, observe=observe)
+    return result.completed and max(map(abs, map(float, result["moved"]))) < DEEP
+
+
+def lies(simulate: Simulate, time_step: float) -> bool:
+    """Whether the box lies no deeper than DEEP after ten steps so long [s]."""
+    observe = {"moved": Final(quantity=Position("box"), from_start=True)}
+    result = simulate(scene("box"), time_step=time_step, steps=STEPS, observe=observe)
+    return result.completed and abs(float(result["moved"][2])) < DEEP
+
+
+def farthest(simulate: Simulate) -> BreakPoint:
+    """How far aside [m] a box may be set down."""
+    return break_point(functools.partial(stays, simulate), 0.1, 0.4, resolution=5e-4, walk=5)
+
+
+def longest_step(simulate: Simulate) -> BreakPoint:
+    """The longest step [s] in which the box does not sink."""
+    return break_point(functools.partial(lies, simulate), TIME_STEP, LONGEST, resolution=0.05, walk=7)
 
 
 def _on(floor: str) -> Measurement:
@@ -112,6 +150,30 @@ TEST = ScalarTest(
             run=ladder_run,
             target_error=1e-3,
             target_seconds=0.1,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="farthest-aside",
+            title="How far aside a box may be set down on an equal one",
+            configuration="direct",
+            definition="it has not moved by 1e-9 m after a quarter of a second",
+            study=farthest,
+            unit="m",
+            expected=(0.9995 * 0.5 * EDGE, 0.5 * EDGE),
+            expected_source="its centre over the edge of the box below, half an edge aside, and it falls; to the resolution of "
+            "the search",
+        ),
+        StabilityStudy(
+            name="longest-step",
+            title="Longest step in which a box does not sink into another",
+            configuration="direct",
+            definition="no deeper than 1e-9 m after ten steps",
+            study=longest_step,
+            unit="s",
+            expected=(ROUNDED, LONGEST),
+            expected_source="contact takes g h to rounding, four of them a step; ten times h of that is 1e-9 m at 151 s at the "
+            "earliest, and the search ends at 10 000 s",
         ),
     ),
 )

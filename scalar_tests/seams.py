@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import functools
 import math
+from dataclasses import replace
 
 import numpy as np
 
 from spook_tracker.engine import (
     PLAIN,
+    AngularVelocity,
     Box,
     Final,
     HeightField,
@@ -22,7 +24,9 @@ from spook_tracker.engine import (
     Trace,
     Velocity,
 )
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -30,6 +34,7 @@ from spook_tracker.scalar_tests.case import (
     Ladder,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.sweep import line
@@ -43,6 +48,7 @@ SPEED = (2.1, 0.9)  # m/s, of the box
 RADIUS = 0.1  # m, of the ball
 SLOPE = 0.2  # tan θ: the ball rolls, as tan θ < 3.5 µ
 TILT = math.atan(SLOPE)
+LONGEST = 1.2  # s, where the search for the longest step ends: 11 cells further is the end of the floor
 PLACE = (0.5, 0.4)  # m, of both at the start
 
 
@@ -114,6 +120,36 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
 def run(simulate: Simulate, time_step: float, method: Method) -> Result:
     """The same second with nothing observed."""
     return simulate(rolling(), time_step=time_step, duration=1.0, method=method)
+
+
+def rolls(simulate: Simulate, slope: float) -> bool:
+    """Whether the ball rolls down triangles so steep (tan θ) without slip, for half a second."""
+    tilt = math.atan(slope)
+    place = (PLACE[0] + RADIUS * math.sin(tilt), PLACE[1], -slope * PLACE[0] + RADIUS * math.cos(tilt))
+    ball = replace(rolling().bodies[1], position=place)
+    built = replace(rolling(), bodies=(floor(FRICTION, slope), ball))
+    observe = {"v": Final(quantity=Velocity("body")), "w": Final(quantity=AngularVelocity("body"))}
+    result = simulate(built, time_step=TIME_STEP, duration=0.5, observe=observe)
+    speed = math.hypot(*map(float, result["v"]))
+    return result.completed and abs(speed - RADIUS * float(result["w"][1])) < 1e-9 * speed
+
+
+def crosses(simulate: Simulate, time_step: float) -> bool:
+    """Whether the box keeps its velocity on the smooth floor in steps so long [s], as far as the floor reaches."""
+    observe = {"v": Final(quantity=Velocity("body"))}
+    steps = math.floor(LONGEST / time_step)
+    result = simulate(sliding(0.0), time_step=time_step, steps=steps, observe=observe)
+    return result.completed and float(np.abs(result["v"] - (*SPEED, 0.0)).max()) < 1e-12 * math.hypot(*SPEED)
+
+
+def steepest(simulate: Simulate) -> BreakPoint:
+    """The steepest slope (its tangent) of triangles down which the ball rolls."""
+    return break_point(functools.partial(rolls, simulate), 0.2, 3.0, resolution=1e-3, walk=5)
+
+
+def longest_step(simulate: Simulate) -> BreakPoint:
+    """The longest step [s] in which the box feels no seam."""
+    return break_point(functools.partial(crosses, simulate), TIME_STEP, LONGEST, walk=5)
 
 
 def draw(simulate: Simulate) -> Drawing:
@@ -193,6 +229,30 @@ TEST = ScalarTest(
             ),
             error=ladder_error,
             run=run,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="steepest",
+            title="Steepest slope of triangles down which the ball rolls",
+            configuration="plain",
+            definition="no slip after half a second, to 1e-9 of the speed",
+            study=steepest,
+            unit="1",
+            expected=(0.999 * 3.5 * FRICTION, 3.5 * FRICTION),
+            expected_source="rolling takes 2/7 of m g sin θ from friction, at most µ m g cos θ: tan θ = 7/2 µ, as on a plane; to "
+            "the resolution of the search",
+        ),
+        StabilityStudy(
+            name="longest-step",
+            title="Longest step in which the box feels no seam",
+            configuration="plain",
+            definition="its velocity on the smooth floor stays, to 1e-12",
+            study=longest_step,
+            unit="s",
+            expected=(LONGEST, LONGEST),
+            expected_source="in one plane a seam is nothing, whatever the number of them in a step; the search ends at 1.2 s, "
+            "eleven cells further, before the floor does",
         ),
     ),
 )

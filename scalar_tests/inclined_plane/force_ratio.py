@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 from spook_tracker.engine import PLAIN, ContactForce, Final, Method, Result
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Curve,
     Drawing,
@@ -16,12 +19,16 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.inclined_plane.scene import FRICTION, TIME_STEP, force_ratio, scene, slide
 from spook_tracker.scalar_tests.sweep import told
 
 LADDER_SLOPE = 0.3
 MASSES = (1.0, 10.0, 1e2, 1e3, 1e4)  # kg
+RIGHT = 1e-9  # of a ratio, the gate's limit
+ROUGH = 2.0  # friction with which a cube tips and does not slide
+HEAVIEST = 1e12  # kg, where the search ends
 SLOPES = tuple(0.05 * i for i in range(1, 15))
 
 
@@ -66,6 +73,26 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
 def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     """The same second with nothing observed."""
     return simulate(scene(LADDER_SLOPE), time_step=time_step, duration=1.0, method=method)
+
+
+def tells_both(simulate: Simulate, mass: float) -> bool:
+    """Whether a box so heavy [kg] has the right ratio where it stands and where it slides."""
+    return max(abs(_error(simulate, slope, mass)) for slope in (0.3, 0.7)) < RIGHT
+
+
+def held(simulate: Simulate, slope: float) -> bool:
+    """Whether a box too rough to slide has F_t/F_n = tan θ after ten steps."""
+    return abs(force_ratio(slide(simulate, slope, steps=10, friction=ROUGH)) - slope) < RIGHT
+
+
+def heaviest(simulate: Simulate) -> BreakPoint:
+    """The heaviest box [kg] whose ratio is right."""
+    return break_point(functools.partial(tells_both, simulate), 1.0, HEAVIEST, walk=5)
+
+
+def steepest(simulate: Simulate) -> BreakPoint:
+    """The steepest slope (its tangent) that the ratio follows when nothing slides."""
+    return break_point(functools.partial(held, simulate), 0.1, 1.9, resolution=5e-4, walk=6)
 
 
 TEST = ScalarTest(
@@ -124,6 +151,29 @@ TEST = ScalarTest(
             run=ladder_run,
             target_error=1e-9,
             target_seconds=0.01,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="steepest",
+            title="Steepest slope that the ratio of a box too rough to slide follows",
+            configuration="cone",
+            definition="F_t/F_n = tan θ to 1e-9 after ten steps, µ = 2",
+            study=steepest,
+            unit="1",
+            expected=(0.9995, 1.0),
+            expected_source="the weight of a cube points beyond its lower edge at tan θ > 1, and it tips; to the resolution of "
+            "the search",
+        ),
+        StabilityStudy(
+            name="heaviest",
+            title="Heaviest box whose ratio is right",
+            configuration="cone",
+            definition="F_t/F_n = min(tan θ, µ) to 1e-9 at tan θ = 0.3 and 0.7",
+            study=heaviest,
+            unit="kg",
+            expected=(HEAVIEST, HEAVIEST),
+            expected_source="one body on the ground: its mass scales out of all its rows; the search ends at 1e12 kg",
         ),
     ),
 )

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
-from spook_tracker.engine import PLAIN, Final, Method, Result, Velocity
+from spook_tracker.engine import PLAIN, AngularVelocity, Final, Method, Result, Velocity
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Curve,
     Drawing,
@@ -16,10 +19,12 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.inclined_plane.scene import (
     FRICTION,
     GRAVITY,
+    SLIP_SPEED,
     TIME_STEP,
     scene,
     slip_slope,
@@ -28,6 +33,8 @@ from spook_tracker.scalar_tests.inclined_plane.scene import (
 from spook_tracker.scalar_tests.sweep import apart
 
 LADDER_SLOPE = 0.51
+STEEPER = 1.1  # times µ: the slope that the box is to slide down
+LONGEST = 1e3  # s, where the search for the longest step ends
 COEFFICIENTS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 
 
@@ -71,6 +78,40 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
 def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     """The same second with nothing observed."""
     return simulate(scene(LADDER_SLOPE), time_step=time_step, duration=1.0, method=method)
+
+
+def slides_flat(simulate: Simulate, friction: float) -> bool:
+    """Whether the box slides down a slope a tenth steeper than it stands on, without turning, for a quarter of a second."""
+    observe = {"v": Final(quantity=Velocity("box")), "w": Final(quantity=AngularVelocity("box"))}
+    slope = STEEPER * friction
+    result = simulate(scene(slope, friction=friction), time_step=TIME_STEP, steps=15, observe=observe)
+    tilt = math.atan(slope)
+    speed = GRAVITY * (math.sin(tilt) - friction * math.cos(tilt)) * 15 * TIME_STEP
+    off = math.hypot(float(result["v"][0]) + speed, *map(float, result["v"][1:]), *map(float, result["w"]))
+    return result.completed and off < 1e-9
+
+
+def tells_apart(simulate: Simulate, time_step: float) -> bool:
+    """Whether the box stands at tan θ = µ − 1e-4 and slides at µ + 1e-4, in steps so long; four seconds, two steps at least."""
+    observe = {"v": Final(quantity=Velocity("box"))}
+    steps = max(2, round(4.0 / time_step))
+    speeds = (
+        math.hypot(
+            *map(float, simulate(scene(slope), time_step=time_step, steps=steps, observe=observe)["v"])
+        )
+        for slope in (FRICTION - 1e-4, FRICTION + 1e-4)
+    )
+    return [speed > SLIP_SPEED for speed in speeds] == [False, True]
+
+
+def roughest(simulate: Simulate) -> BreakPoint:
+    """The largest friction coefficient with which the box slides and does not tip."""
+    return break_point(functools.partial(slides_flat, simulate), 0.15, 10.0, resolution=1e-3, walk=7)
+
+
+def longest_step(simulate: Simulate) -> BreakPoint:
+    """The longest step [s] in which the box knows its angle."""
+    return break_point(functools.partial(tells_apart, simulate), 1.0 / 60.0, LONGEST, walk=6)
 
 
 TEST = ScalarTest(
@@ -156,6 +197,30 @@ TEST = ScalarTest(
             run=ladder_run,
             target_error=1e-3,
             target_seconds=0.01,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="roughest",
+            title="Roughest box that slides before it tips",
+            configuration="cone",
+            definition="down a slope of 1.1 µ it goes by g (sin θ − µ cos θ) t and does not turn, to 1e-9",
+            study=roughest,
+            unit="1",
+            expected=(0.999, 1.0),
+            expected_source="friction µ N half an edge below the centre turns a cube over when N at its front edge, half an edge "
+            "ahead, cannot balance it: µ > 1, on any slope; to the resolution of the search",
+        ),
+        StabilityStudy(
+            name="longest-step",
+            title="Longest step in which the box knows its angle",
+            configuration="cone",
+            definition="it stands at tan θ = 0.4999 and slides at 0.5001, faster than 1e-3 m/s",
+            study=longest_step,
+            unit="s",
+            expected=(LONGEST, LONGEST),
+            expected_source="gravity and the impulses that answer it have the factor h alike: Coulomb's bound knows no step; the "
+            "search ends at 1000 s",
         ),
     ),
 )

@@ -1,0 +1,152 @@
+"""Where boxes, plates, balls and piles must slide, tip or fall: each band found again without the engine."""
+
+from __future__ import annotations
+
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+from scipy.optimize import linprog
+
+from spook_tracker.scalar_tests import between_walls, falling_pile, overhang, pile, resting_box, seams
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.scalar_tests.inclined_plane import force_ratio, slip_angle
+from spook_tracker.scalar_tests.inclined_plane.scene import EDGE, FRICTION
+
+
+def band(test: str, study: str) -> tuple[float, float]:
+    found = next(one.expected for one in CATALOGUE[test].stability if one.name == study)
+    assert found is not None
+    return found
+
+
+def rear_share(drag: float) -> float:
+    """Part of its load that the rear edge of a cube bears which friction drags by that part of its load, half an edge below
+    its centre: N_r + N_f = 1 and (N_f − N_r) b/2 = drag b/2."""
+    rear, front = np.linalg.solve([[1.0, 1.0], [-0.5 * EDGE, 0.5 * EDGE]], [1.0, 0.5 * EDGE * drag])
+    assert rear + front == pytest.approx(1.0)
+    return float(rear)
+
+
+def test_a_cube_slides_flat_while_its_rear_edge_bears() -> None:
+    low, high = band("slip_angle", "roughest")
+    assert rear_share(low) > 0.0 >= rear_share(high) - 1e-12 and rear_share(1.001 * high) < 0.0
+    assert slip_angle.STEEPER > 1.0, "on all slopes it slides, or tips"
+
+
+def test_a_rough_cube_stands_while_its_weight_points_between_its_edges() -> None:
+    low, high = band("force_ratio", "steepest")
+    assert high < force_ratio.ROUGH
+    assert rear_share(low) > 0.0 >= rear_share(high) - 1e-12 and rear_share(1.001 * high) < 0.0
+
+
+@pytest.mark.parametrize("time_step", [Fraction(1, 60), Fraction(slip_angle.LONGEST)])
+@pytest.mark.parametrize("mass", [Fraction(1), Fraction(force_ratio.HEAVIEST)])
+def test_coulombs_law_knows_neither_step_nor_mass(time_step: Fraction, mass: Fraction) -> None:
+    """A step in fractions: what friction may take, µ N h/m, over what gravity gives, g h sin θ."""
+    assert band("slip_angle", "longest-step") == (slip_angle.LONGEST,) * 2
+    assert band("force_ratio", "heaviest") == (force_ratio.HEAVIEST,) * 2
+    for slope in (Fraction(3, 10), Fraction(7, 10)):
+        normal, along = time_step * mass, time_step * mass * slope  # N s, in g cos θ
+        friction = min(along, Fraction(FRICTION) * normal)
+        assert friction / normal == min(slope, Fraction(FRICTION))
+        assert (along == friction) == (slope < FRICTION)
+
+
+def test_a_blow_grips_where_friction_may_stop_the_slip() -> None:
+    """The contact point stops for an impulse along, J (1/m + r²/I) = v, of at most µ (1 + e) m u."""
+    w = between_walls
+    low, high = band("between_walls", "smoothest")
+    needed = w.ALONG / (1.0 + 1.0 / 0.4)  # per kg, I = 2/5 m r²
+    assert low * 2.0 * w.UP == pytest.approx(needed) and high * 2.0 * w.UP > needed
+
+
+def test_plates_stand_while_those_above_have_their_centre_inside_every_edge() -> None:
+    low, high = band("overhang", "farthest")
+    assert band("overhang", "tallest") == (overhang.TALL[-1],) * 2
+
+    def inside(count: int, share: Fraction) -> bool:
+        places = [Fraction(0)]
+        for level in range(1, count):
+            places.append(places[-1] + share * Fraction(overhang.LENGTH) / (2 * (count - level)))
+        above = (sum(places[k + 1 :]) / (count - 1 - k) - places[k] for k in range(count - 1))
+        return all(centre <= Fraction(overhang.LENGTH) / 2 for centre in above)
+
+    for count in overhang.TALL:
+        assert inside(count, Fraction(low)) and inside(count, Fraction(high))
+        assert inside(count, Fraction(overhang.INSIDE)) and not inside(count, Fraction(1001, 1000))
+
+
+def shared(aside: float, width: float) -> np.ndarray:
+    """What both ends of the face two boxes share bear of the upper one's load, or of its blow; one is aside, both as wide."""
+    ends = np.array([aside - 0.5 * width, 0.5 * width])  # the upper one's end, the lower one's
+    return np.linalg.solve([[1.0, 1.0], ends - aside], [1.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("test", "width"), [("resting_box", resting_box.EDGE), ("falling_pile", falling_pile.EDGES[0])]
+)
+def test_a_box_stays_on_another_while_both_ends_of_their_face_press(test: str, width: float) -> None:
+    low, high = band(test, "farthest-aside")
+    assert shared(low, width).min() > 0.0 > shared(1.001 * high, width).min()
+    assert shared(high, width).min() == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_box_sinks_by_roundings_of_the_speed_that_contact_takes() -> None:
+    """One row in floating point: no more than four units of g h are left of it in a step, h times that is the way."""
+    r = resting_box
+    low, high = band("resting_box", "longest-step")
+    assert high == r.LONGEST
+    for h in np.geomspace(r.TIME_STEP, low, 200):
+        for mass in (r.MASS, 3.0, 0.7):
+            speed = place = 0.0
+            for _ in range(r.STEPS):
+                speed -= float(h) * r.GRAVITY
+                speed += (-mass * speed) / mass
+                place += float(h) * speed
+            assert abs(place) <= r.DEEP
+    assert 4.0 * r.STEPS * 2.0**-53 * r.GRAVITY * low**2 == pytest.approx(r.DEEP)
+
+
+def stands(friction: float) -> bool:
+    """Whether loads in their cones hold a pile of four: of a lower sphere, N and T above, N and F below."""
+    sine, cosine = math.sin(pile.LEAN), math.cos(pile.LEAN)
+    balance = [
+        [-sine, cosine, 0.0, 1.0],  # outward, per weight: pushed out above, held there and below
+        [-cosine, -sine, 1.0, 0.0],  # upward
+        [0.0, 1.0, 0.0, -1.0],  # about its centre
+        [3.0 * cosine, 3.0 * sine, 0.0, 0.0],  # the upper one, upward
+    ]
+    cones = [
+        [-friction, 1.0, 0.0, 0.0],
+        [-friction, -1.0, 0.0, 0.0],
+        [0.0, 0.0, -friction, 1.0],
+        [0.0, 0.0, -friction, -1.0],
+    ]
+    free = [(0.0, None), (None, None), (0.0, None), (None, None)]
+    found = linprog(np.zeros(4), cones, np.zeros(4), balance, [0.0, 1.0, 0.0, 1.0], free)
+    return bool(found.status == 0)
+
+
+@pytest.mark.parametrize("study", ["smoothest-direct", "smoothest-iterative"])
+def test_four_spheres_stand_with_the_friction_that_loads_in_their_cones_need(study: str) -> None:
+    low, high = band("pile", study)
+    assert stands(high) and not stands(0.999 * low)
+
+
+def test_a_ball_rolls_down_while_friction_can_turn_it() -> None:
+    low, high = band("seams", "steepest")
+    for slope, rolls in ((low, True), (1.001 * high, False)):
+        pull = math.sin(math.atan(slope))
+        needed = np.linalg.solve([[1.0, 1.0], [1.0, -2.5]], [pull, 0.0])[1]  # a + f = g sin θ, a = 5/2 f
+        assert (needed <= seams.FRICTION * math.cos(math.atan(slope))) == rolls
+
+
+def test_ends_of_searches_are_on_the_floor_and_beyond_all_sizes() -> None:
+    s, f = seams, falling_pile
+    assert band("seams", "longest-step") == (s.LONGEST, s.LONGEST)
+    assert all(a + v * s.LONGEST + 0.2 < s.CELL * s.CELLS for a, v in zip(s.PLACE, s.SPEED, strict=True))
+    assert math.hypot(*s.SPEED) * s.LONGEST > 10.0 * s.CELL
+    assert band("falling_pile", "fastest") == (f.FASTEST, f.FASTEST)
+    assert f.FASTEST * f.TIME_STEP > 50.0 * (0.6 + 3.0 * f.APART)
