@@ -9,7 +9,7 @@ import numpy as np
 
 from spook_tracker.engine import AngularVelocity, Final, Plane, RigidBody, Scene, Sphere, Trace, Velocity
 from spook_tracker.engine.bodies import Material
-from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.bracket import break_count, break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Curve,
@@ -28,6 +28,7 @@ ROOM = 1.0  # m, from floor to ceiling
 UP, ALONG = 4.0, 3.0  # m/s
 FLIGHT = (ROOM - 2.0 * RADIUS) / UP  # s, elastic
 BLOWS = 6
+COUNTS = (1, 2, 4, 8, 16, 32, 64)  # blows within a step that are tried
 GRIP = ALONG / (3.5 * 2.0 * UP)  # µ (1 + e) u = v/3.5: what turns sliding into rolling, at the bound
 CASES = {"sliding": (0.05, 0.0), "gripping": (5.0, 0.0), "returning": (5.0, 1.0)}  # friction, psi_t
 
@@ -90,9 +91,22 @@ def grips(simulate: Simulate, friction: float) -> bool:
     return result.completed and abs(float(result["v"][0]) - RADIUS * float(result["w"][1])) < 1e-9 * ALONG
 
 
+def bounces(simulate: Simulate, count: int) -> bool:
+    """Whether a smooth ball goes on as it came after so many blows between floor and ceiling, all within one step."""
+    observe = {"v": Final(quantity=Velocity("ball"))}
+    result = simulate(scene(0.0), time_step=count * FLIGHT, steps=1, observe=observe)
+    up = UP if count % 2 else -UP
+    return result.completed and float(np.abs(result["v"] - (ALONG, 0.0, up)).max()) < 1e-9 * UP
+
+
 def smoothest(simulate: Simulate) -> BreakPoint:
     """The smallest friction with which the first blow grips."""
     return break_point(functools.partial(grips, simulate), 1.0, 0.01, resolution=1e-3, walk=5)
+
+
+def most_blows(simulate: Simulate) -> BreakPoint:
+    """The most blows in one step."""
+    return break_count(functools.partial(bounces, simulate), COUNTS)
 
 
 def _draw(simulate: Simulate) -> Drawing:
@@ -181,6 +195,17 @@ TEST = ScalarTest(
             expected=(GRIP, 1.001 * GRIP),
             expected_source="gripping takes v/3.5 of speed, friction can take µ (1 + e) u: µ = 3/28 at 3 m/s along and 4 m/s "
             "across; to the resolution of the search",
+        ),
+        StabilityStudy(
+            name="most-blows",
+            title="Most blows between floor and ceiling within one step, without friction",
+            configuration="plain",
+            definition="velocity right to 1e-9 after one step of so many flights",
+            study=most_blows,
+            unit="1",
+            expected=(COUNTS[-1], COUNTS[-1]),
+            expected_source="an elastic blow turns the speed across and leaves the one along, however many follow each other in a "
+            "step; the search ends at 64",
         ),
     ),
 )

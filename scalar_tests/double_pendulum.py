@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +23,9 @@ from spook_tracker.engine import (
     Trace,
 )
 from spook_tracker.engine.bodies import Body
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -32,6 +35,7 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.sweep import line
 
@@ -41,6 +45,8 @@ ORDER_8 = Method(composition="order8")
 LENGTH, MASS, GRAVITY = 1.0, 1.0, 9.81  # m, kg, m/s²
 ACROSS, ALONG = MASS * LENGTH**2 / 12.0, 1e-3  # kg m²
 TIME_STEP, DURATION = 1e-3, 2.0  # s: before the motion is chaotic enough to hide the order
+HUNG_STEP, HUNG_STEPS, NUDGE = 1.0 / 60.0, 200, 1e-6  # s, rad/s: of the hanging pair that is nudged
+HEAVIEST = 1e6  # times the upper rod, where the search for the lower one ends
 FREE_STEP, FREE_STEPS = 1.0 / 60.0, 1200  # 20 s
 ABOUT = ((0.0, 0.0, 0.0), (3.0, -2.0, 5.0), (-40.0, 7.0, 0.5))  # m
 DRIFT = (0.3, -0.2, 0.5)  # m/s, of the free pair
@@ -88,6 +94,33 @@ def _hinge(first: str, second: str, x: float, time_step: float) -> Hinge:
         compliance=1e-13,
         damping=time_step,
     )
+
+
+def hanging(time_step: float, heavier: float) -> Scene:
+    """The pair hangs straight down; the lower rod, so many times as heavy, is nudged by NUDGE about its hinge."""
+    rods: list[Body] = [
+        RigidBody(
+            name=f"rod {k + 1}",
+            mass=mass * MASS,
+            inertia=(mass * ACROSS, mass * ACROSS, mass * ALONG),
+            position=(0.0, 0.0, -(k + 0.5) * LENGTH),
+            velocity=(-0.5 * LENGTH * turn, 0.0, 0.0),
+            angular_velocity=(0.0, turn, 0.0),
+        )
+        for k, (mass, turn) in enumerate(((1.0, 0.0), (heavier, NUDGE)))
+    ]
+    hinges = tuple(
+        replace(_hinge(first, second, 0.0, time_step), at=(0.0, 0.0, -k * LENGTH))
+        for k, (first, second) in enumerate(((WORLD, "rod 1"), ("rod 1", "rod 2")))
+    )
+    return Scene(bodies=tuple(rods), constraints=hinges, gravity=(0.0, 0.0, -GRAVITY), contacts=False)
+
+
+def fastest_rate(heavier: float) -> float:
+    """ω [rad/s] of the hanging pair's faster mode: M θ̈ = −K θ in the rods' angles from the vertical."""
+    mass = [[1.0 / 3.0 + heavier, 0.5 * heavier], [0.5 * heavier, heavier / 3.0]]
+    pull = GRAVITY / LENGTH * np.diag([0.5 + heavier, 0.5 * heavier])
+    return float(np.sqrt(np.linalg.eigvals(np.linalg.solve(mass, pull)).real.max()))
 
 
 @functools.cache
@@ -161,6 +194,24 @@ def keeps_turning(simulate: Simulate) -> dict[str, float]:
     return {"angular_momentum_drift": float(max(drifts))}
 
 
+def hangs(simulate: Simulate, time_step: float, heavier: float = 1.0) -> bool:
+    """Whether the nudged pair swings no wider than a hundred times what the nudge turns in a step, for HUNG_STEPS."""
+    observe = {"turn": MaximumAbsolute(quantity=JointCoordinate("rod 1 to rod 2"))}
+    result = simulate(hanging(time_step, heavier), time_step=time_step, steps=HUNG_STEPS, observe=observe)
+    return result.completed and float(result["turn"]) < 100.0 * time_step * NUDGE
+
+
+def longest_step(simulate: Simulate) -> BreakPoint:
+    """The longest step [s] in which the hanging pair stays."""
+    return break_point(functools.partial(hangs, simulate), 0.02, 2.0, resolution=2e-3, walk=5)
+
+
+def heaviest(simulate: Simulate) -> BreakPoint:
+    """The heaviest lower rod, over the upper one, that stays at HUNG_STEP."""
+    holds = functools.partial(hangs, simulate, HUNG_STEP)
+    return break_point(holds, 1.0, HEAVIEST, walk=7)
+
+
 def draw(simulate: Simulate) -> Drawing:
     """Both angles against time."""
     times, found = angles(simulate, TIME_STEP, PLAIN)
@@ -178,6 +229,7 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
+HANGS = "nudged by 1e-6 rad/s the lower rod turns by no more than a hundred times what that is in a step, in 200 steps"
 TEST = ScalarTest(
     title="Double pendulum of rods",
     question="Does a double pendulum of two rods follow its equations of motion?",
@@ -286,6 +338,30 @@ TEST = ScalarTest(
             run=run,
             target_error=1e-4,
             target_seconds=0.01,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="longest-step",
+            title="Longest step in which the hanging pair stays",
+            configuration="plain",
+            definition=HANGS,
+            study=longest_step,
+            unit="s",
+            expected=(0.996 * 2.0 / fastest_rate(1.0), 1.002 * 2.0 / fastest_rate(1.0)),
+            expected_source="gravity is taken where a step begins: stable while h ω < 2 for the faster mode; to the resolution of "
+            "the search, and what 200 steps tell",
+        ),
+        StabilityStudy(
+            name="heaviest-below",
+            title="Heaviest lower rod, over the upper one, that hangs still at h = 1/60 s",
+            configuration="plain",
+            definition=HANGS,
+            study=heaviest,
+            unit="1",
+            expected=(HEAVIEST, HEAVIEST),
+            expected_source="both modes stay slow however heavy the lower rod, h ω = 0.16 and less: the upper one is a string to it; "
+            "the search ends at a ratio of 1e6",
         ),
     ),
 )

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import functools
+import math
+from dataclasses import replace
 from typing import Any
 
 from spook_tracker.engine import (
@@ -17,7 +20,9 @@ from spook_tracker.engine import (
 )
 from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.theory import free_fall_error
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -27,6 +32,7 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.sweep import line, told
 
@@ -37,6 +43,10 @@ TIME_STEP = 1.0 / 60.0  # s
 TIME_STEPS = (0.1, 0.05, 0.025, 0.0125, 0.00625)  # s, those of Figs 3.12 and 3.13
 HALF_STEP = Method(half_step_velocities=True)
 EXPECTED = free_fall_error(GRAVITY, DURATION, TIME_STEP)  # m: ½ g t h, 1.635
+PRINTED = 4.904  # m, the thesis' limit
+LONGEST = 2.0 * PRINTED / (GRAVITY * DURATION)  # s, .04999: ½ g t h is the limit
+# Places from 2^k to 2^(k+1) m are 2^(k−52) m apart, and a step of g h² is lost if it is less than half of that
+HIGHEST = 2.0 ** (53 + math.floor(math.log2(GRAVITY * TIME_STEP**2)) + 1)  # m, 2^45
 ENDS = {"position": Final(quantity=Position("sphere")), "velocity": Final(quantity=Velocity("sphere"))}
 
 
@@ -80,6 +90,30 @@ def position_error(simulate: Simulate, time_step: float, method: Method) -> floa
 def run(simulate: Simulate, time_step: float, method: Method) -> Result:
     """The same fall with nothing observed."""
     return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
+
+
+def keeps_limit(simulate: Simulate, time_step: float) -> bool:
+    """Whether the fall of the whole steps nearest to 20 s keeps the printed limit."""
+    steps = round(DURATION / time_step)
+    place = simulate(scene(), time_step=time_step, steps=steps, observe=ENDS)["position"]
+    return abs(-float(place[2]) - float(fallen(steps * time_step))) < PRINTED
+
+
+def starts(simulate: Simulate, height: float) -> bool:
+    """Whether a sphere so high [m] is lower after the first step."""
+    (sphere,) = scene().bodies
+    high = replace(scene(), bodies=(replace(sphere, position=(0.0, 0.0, height)),))
+    return float(simulate(high, time_step=TIME_STEP, steps=1, observe=ENDS)["position"][2]) < height
+
+
+def longest_step(simulate: Simulate) -> BreakPoint:
+    """The longest step [s] that keeps the printed limit."""
+    return break_point(functools.partial(keeps_limit, simulate), TIME_STEP, 1.0, resolution=1e-3, walk=6)
+
+
+def highest(simulate: Simulate) -> BreakPoint:
+    """The greatest height [m] from which the sphere starts to fall."""
+    return break_point(functools.partial(starts, simulate), 1.0, 1e18, resolution=1e-3, walk=7)
 
 
 def _traced(simulate: Simulate, time_step: float) -> tuple[Any, Any, Any]:
@@ -319,6 +353,30 @@ TEST = ScalarTest(
             run=run,
             target_error=1.0,
             target_seconds=1e-3,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="longest-step",
+            title="Longest step that keeps the printed limit",
+            configuration="plain",
+            definition="at the whole step nearest to 20 s no more than 4.904 m off",
+            study=longest_step,
+            unit="s",
+            expected=(0.9965 * LONGEST, 1.0015 * LONGEST),
+            expected_source="½ g t h = 4.904 m at h = 0.04999 s; t is whole steps, half of one or 1.3e-3 of 20 s off, and a "
+            "thousandth is the search's",
+        ),
+        StabilityStudy(
+            name="highest",
+            title="Greatest height from which a sphere starts to fall",
+            configuration="plain",
+            definition="it is lower after the first step of 1/60 s",
+            study=highest,
+            unit="m",
+            expected=(0.998 * HIGHEST, HIGHEST),
+            expected_source="a place is a number of 53 bits: beyond 2^45 m the next one is 2^-7 m lower, and g h² = 2.7e-3 m is "
+            "less than half of that; to the resolution of the search",
         ),
     ),
 )

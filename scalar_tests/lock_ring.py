@@ -6,6 +6,7 @@ one box that is locked to the world.
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -15,6 +16,7 @@ from spook_tracker.engine import (
     WORLD,
     Box,
     ConstraintForce,
+    Final,
     Lock,
     MaximumAbsolute,
     Method,
@@ -24,7 +26,9 @@ from spook_tracker.engine import (
     Scene,
     Trace,
 )
+from spook_tracker.scalar_tests.bracket import break_count, break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Curve,
     Drawing,
@@ -35,6 +39,7 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.sweep import told
 
@@ -45,6 +50,8 @@ GRAVITY = 9.81  # m/s²
 TIME_STEP = 1.0 / 60.0  # s
 STEPS = 600
 LADDER_COUNT = 12
+SAGGED = 1e-3  # of the diameter: what a ring of soft locks may sink
+RINGS = (12, 25, 50, 100)  # boxes that are tried
 
 
 def radius(count: int) -> float:
@@ -146,6 +153,53 @@ def _metrics(role: str) -> tuple[Metric, ...]:
     )
 
 
+def sinks(count: int) -> float:
+    """How far the lowest box sinks, over the locks' compliance [N]: statics of rigid boxes and springs, in the ring's plane.
+
+    A lock of compliance ε gives way by ε F along and ε M in turn; box 1 is held. Coordinates are x, z and the turn about y.
+    """
+    size = radius(count)
+    corner = math.hypot(size, 0.5 * PIECE)
+    stiff, load = np.zeros((3 * count, 3 * count)), np.zeros(3 * count)
+    load[1::3] = -MASS * GRAVITY
+    for i in range(count):
+        angle = 2.0 * math.pi * (i + 0.5) / count
+        gap = np.zeros((3, 3 * count))
+        for sign, box in ((1.0, (i + 1) % count), (-1.0, i)):
+            centre = 2.0 * math.pi * box / count
+            x = corner * math.sin(angle) - size * math.sin(centre)
+            z = corner * math.cos(angle) - size * math.cos(centre)
+            gap[:, 3 * box : 3 * box + 3] = sign * np.array([[1.0, 0.0, z], [0.0, 1.0, -x], [0.0, 0.0, 1.0]])
+        stiff += gap.T @ gap
+    moved = np.linalg.solve(stiff[3:, 3:], load[3:])
+    return -float(moved[3 * (count // 2) - 2])
+
+
+def keeps_round(simulate: Simulate, compliance: float) -> bool:
+    """Whether the lowest box of a ring of soft locks has sunk by less than SAGGED when it rests."""
+    lowest = f"box {LADDER_COUNT // 2 + 1}"
+    observe = {"moved": Final(quantity=Position(lowest), from_start=True)}
+    result = simulate(scene(LADDER_COUNT, compliance), time_step=TIME_STEP, duration=2.0, observe=observe)
+    return result.completed and -float(result["moved"][2]) < SAGGED * 2.0 * radius(LADDER_COUNT)
+
+
+def closes(simulate: Simulate, count: int) -> bool:
+    """Whether a ring of so many rigid locks keeps its shape to 1e-6 % of its diameter, over a second."""
+    observe = {"place": MaximumAbsolute(quantity=Position(), from_start=True)}
+    result = simulate(scene(count), time_step=TIME_STEP, duration=1.0, observe=observe)
+    return result.completed and float(result["place"].max()) < 1e-8 * 2.0 * radius(count)
+
+
+def softest(simulate: Simulate) -> BreakPoint:
+    """The largest compliance [m/N, rad/(N m)] of locks with which the ring keeps its shape."""
+    return break_point(functools.partial(keeps_round, simulate), 1e-8, 1e-3, resolution=1e-3, walk=6)
+
+
+def most_boxes(simulate: Simulate) -> BreakPoint:
+    """The most boxes of a rigid ring that keeps its shape."""
+    return break_count(functools.partial(closes, simulate), RINGS)
+
+
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Largest displacement of any box over 1 s, of the ring's diameter [%]."""
     observe = {"place": MaximumAbsolute(quantity=Position(), from_start=True)}
@@ -158,6 +212,7 @@ def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     return simulate(scene(LADDER_COUNT), time_step=time_step, duration=1.0, method=method)
 
 
+SOFTEST = SAGGED * 2.0 * radius(LADDER_COUNT) / sinks(LADDER_COUNT)  # m/N, rad/(N m)
 TEST = ScalarTest(
     title="Closed ring of locks",
     question="Does a closed ring of locks keep its shape in every direction?",
@@ -212,6 +267,30 @@ TEST = ScalarTest(
             run=ladder_run,
             target_error=None,
             target_seconds=None,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="softest",
+            title="Softest locks with which a ring of 12 keeps its shape",
+            configuration="plain",
+            definition="the lowest box sinks by less than a thousandth of the diameter, at rest",
+            study=softest,
+            unit="m/N",
+            expected=(0.997 * SOFTEST, 1.003 * SOFTEST),
+            expected_source="at rest g = −ε F: statics of rigid boxes on springs, small displacements; a thousandth for what "
+            "bends with them, another for the search, one to spare",
+        ),
+        StabilityStudy(
+            name="most-boxes",
+            title="Most boxes of a rigid ring that keeps its shape",
+            configuration="plain",
+            definition="no box has moved by 1e-6 % of the diameter within a second",
+            study=most_boxes,
+            unit="1",
+            expected=(RINGS[-1], RINGS[-1]),
+            expected_source="rigid locks leave rounding, which the cube of the number makes 1e6 times as large at 100: 1e-10 of "
+            "the diameter; the search ends there",
         ),
     ),
 )

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,6 +15,7 @@ from spook_tracker.engine import (
     Final,
     Hinge,
     JointCoordinate,
+    Load,
     Method,
     Motor,
     Result,
@@ -21,7 +24,9 @@ from spook_tracker.engine import (
     Trace,
 )
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -31,6 +36,7 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.sweep import apart, line
 
@@ -41,6 +47,7 @@ TIME_STEP = 1.0 / 60.0  # s
 DURATION = 10.0  # s
 RISE = SPEED * INERTIA / TORQUE  # s, 5
 LEAD = 0.5 * TIME_STEP * SPEED  # rad
+HEAVIEST = 1e12  # kg m², where the search for the largest wheel ends
 OBSERVE: dict[str, Observable] = {
     "spin": Trace(quantity=AngularVelocity("wheel")),
     "turned": Trace(quantity=JointCoordinate("axle")),
@@ -87,6 +94,45 @@ def unbounded(simulate: Simulate) -> dict[str, float]:
     observe = {"spin": Final(quantity=AngularVelocity("wheel"))}
     result = simulate(scene(None), time_step=TIME_STEP, steps=1, observe=observe)
     return {"speed_error": float(result["spin"][2]) - SPEED}
+
+
+def wheel(inertia: float, spin: float) -> RigidBody:
+    """A wheel of that moment [kg m²] about its axle, spinning [rad/s]."""
+    return RigidBody(
+        name="wheel",
+        mass=5.0,
+        inertia=(inertia,) * 3,
+        position=(0.0, 0.0, 0.0),
+        angular_velocity=(0.0, 0.0, spin),
+    )
+
+
+def bears(simulate: Simulate, torque: float) -> bool:
+    """Whether the motor keeps its set speed for a second against a load of `torque` [N m]."""
+    turning = wheel(INERTIA, SPEED)
+    load = Load(name="load", body="wheel", torque=(0.0, 0.0, -torque))
+    observe = {"spin": Final(quantity=AngularVelocity("wheel"))}
+    built = replace(scene(), bodies=(turning,), forces=(load,))
+    spin = simulate(built, time_step=TIME_STEP, duration=1.0, observe=observe)["spin"]
+    return abs(float(spin[2]) - SPEED) < 1e-9
+
+
+def starts(simulate: Simulate, inertia: float) -> bool:
+    """Whether an unbounded motor has a wheel of `inertia` [kg m²] at its speed after one step."""
+    built = replace(scene(None), bodies=(wheel(inertia, 0.0),))
+    observe = {"spin": Final(quantity=AngularVelocity("wheel"))}
+    spin = simulate(built, time_step=TIME_STEP, steps=1, observe=observe)["spin"]
+    return abs(float(spin[2]) - SPEED) < 1e-9
+
+
+def heaviest_load(simulate: Simulate) -> BreakPoint:
+    """The largest load [N m] against which the motor keeps its speed."""
+    return break_point(functools.partial(bears, simulate), 1.0, 9.0, resolution=1e-3, walk=5)
+
+
+def largest_wheel(simulate: Simulate) -> BreakPoint:
+    """The largest wheel [kg m²] that an unbounded motor starts in one step."""
+    return break_point(functools.partial(starts, simulate), INERTIA, HEAVIEST, walk=5)
 
 
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
@@ -206,6 +252,28 @@ TEST = ScalarTest(
             run=ladder_run,
             target_error=0.1,
             target_seconds=0.1,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="heaviest-load",
+            title="Largest load against which the motor keeps its speed",
+            configuration="bounded",
+            definition="10 rad/s after a second, to 1e-9",
+            study=heaviest_load,
+            unit="N m",
+            expected=(0.999 * TORQUE, TORQUE),
+            expected_source="the torque it is allowed, 4 N m; to the resolution of the search",
+        ),
+        StabilityStudy(
+            name="largest-wheel",
+            title="Largest wheel that an unbounded motor starts in one step",
+            configuration="unbounded",
+            definition="10 rad/s after one step, to 1e-9",
+            study=largest_wheel,
+            unit="kg m²",
+            expected=(HEAVIEST, HEAVIEST),
+            expected_source="one row that asks for a speed: inertia scales out of it; the search ends at 1e12 kg m²",
         ),
     ),
 )

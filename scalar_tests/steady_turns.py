@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import functools
+import math
+from dataclasses import replace
+
 import numpy as np
 
 from spook_tracker.engine import (
@@ -22,7 +26,9 @@ from spook_tracker.engine import (
     Sphere,
     Trace,
 )
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Drawing,
     Example,
@@ -30,6 +36,7 @@ from spook_tracker.scalar_tests.case import (
     Ladder,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.sweep import line, told
@@ -42,6 +49,7 @@ RADIUS, SPEED = 0.1, 1.0  # m, m/s of the ball that rolls
 MOMENTS = (0.1, 0.15, 0.2)  # kg m²
 STEPS = (60, 120, 240, 480)  # a second
 Z = (0.0, 0.0, 1.0)
+NUDGE, GROWN = 1e-6, 10.0  # rad/s, and how many times as far off its momentum an axis is no longer steady
 
 
 def driven(rate: float = RATE) -> Scene:
@@ -123,6 +131,45 @@ def measure(simulate: Simulate) -> dict[str, float]:
     }
 
 
+def grows(moment: float) -> float:
+    """How many times as far an axis comes off its momentum in DURATION: cosh of √((B − C)(C − A)/(A B)) ω t, C the axis' moment."""
+    a, b, _ = MOMENTS
+    return math.cosh(math.sqrt(max(0.0, (b - moment) * (moment - a) / (a * b))) * RATE * DURATION)
+
+
+def tenfold() -> float:
+    """The moment [kg m²] below that of the next axis with which a nudge grows tenfold; halving."""
+    low, high = 0.5 * (MOMENTS[0] + MOMENTS[1]), MOMENTS[1]
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if grows(middle) > GROWN else (low, middle)
+    return low
+
+
+def steady(simulate: Simulate, moment: float) -> bool:
+    """Whether a body of that third moment [kg m²], nudged about its second axis, keeps its third one by its momentum."""
+    nudged = RigidBody(
+        name="body",
+        mass=1.0,
+        inertia=(*MOMENTS[:2], moment),
+        position=(0.0, 0.0, 0.0),
+        angular_velocity=(0.0, NUDGE, RATE),
+    )
+    observe = {"q": Trace(quantity=Orientation("body"))}
+    result = simulate(
+        replace(free(), bodies=(nudged,)), time_step=TIME_STEP, duration=DURATION, observe=observe
+    )
+    w, x, y, z = result["q"].T
+    start = MOMENTS[1] * NUDGE / (moment * RATE)  # rad, of the momentum from the axis, along y
+    off = np.hypot(2.0 * (x * z + w * y), 2.0 * (y * z - w * x) - start)
+    return result.completed and float(off.max()) < GROWN * start
+
+
+def smallest_moment(simulate: Simulate) -> BreakPoint:
+    """The smallest moment [kg m²] of an axis about which a body spins on."""
+    return break_point(functools.partial(steady, simulate), MOMENTS[2], 0.12, resolution=2e-4, walk=5)
+
+
 def draw(simulate: Simulate) -> Drawing:
     """Angle of the ball against the way it rolled."""
     observe = {"q": Trace(quantity=Orientation("ball")), "x": Trace(quantity=Position("ball"))}
@@ -193,6 +240,20 @@ TEST = ScalarTest(
             run=ladder_run,
             target_error=1e-3,
             target_seconds=0.01,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="smallest-moment",
+            title="Smallest third moment about which a free body spins on",
+            configuration="plain",
+            definition="nudged about the axis of 0.15 kg m², its third axis is never ten times as far from its momentum within 3 s",
+            study=smallest_moment,
+            unit="kg m²",
+            better="smaller",
+            expected=(tenfold(), MOMENTS[1]),
+            expected_source="Euler: steady unless the axis is that of the middle moment, below 0.15 kg m²; there a nudge grows by "
+            "cosh(√((B − C)(C − A)/(A B)) ω t), tenfold at 0.1493 kg m²",
         ),
     ),
 )

@@ -9,6 +9,7 @@ from __future__ import annotations
 from spook_tracker.scalar_tests.cantilever.figures import draw_against_count, draw_difference, draw_shape
 from spook_tracker.scalar_tests.cantilever.metrics import LADDERS, MEASUREMENTS
 from spook_tracker.scalar_tests.cantilever.scene import TIME_STEP, scene
+from spook_tracker.scalar_tests.cantilever.stability import STUDIES
 from spook_tracker.scalar_tests.case import Example, Figure, ScalarTest
 
 TEST = ScalarTest(
@@ -57,4 +58,5 @@ TEST = ScalarTest(
         Figure(name="error-against-count", title="Node error against elements", draw=draw_against_count),
     ),
     ladders=LADDERS,
+    stability=STUDIES,
 )

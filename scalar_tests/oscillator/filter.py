@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import functools
+import math
+
 import numpy as np
 
+from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Drawing,
     Example,
     Figure,
@@ -12,6 +17,7 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.oscillator.scene import (
     START,
@@ -30,6 +36,9 @@ STEPS = 10
 PERIODS = (100, 50, 20, 10, 7, 5, 2)  # steps
 DRAWN = (100.0, 50.0, 10.0, 5.0, 1.0, 0.1)  # steps a period, those of Fig 2.8
 DRAWN_STEPS = 50
+SHORTEST = 1e-6  # steps a period, where the search for the shortest ends: h ω = 6e6
+# ten steps leave a half where α = 1 − 8/9 ρ = 2^(−1/5); ρ = 1/(1 + 4/(9 (h ω)²))
+HALVED = 3.0 * math.pi * math.sqrt(1.0 / (9.0 / 8.0 * (1.0 - 2.0**-0.2)) - 1.0)  # steps a period, 23
 
 
 def left(simulate: Simulate, period: float) -> float:
@@ -46,6 +55,26 @@ def filtered(simulate: Simulate) -> dict[str, float]:
         worst = max(worst, abs(value / exact - 1.0))
         answers[f"left_at_{period}"] = value
     return answers | {"filter_error": worst}
+
+
+def halves(simulate: Simulate, period: float) -> bool:
+    """Whether ten steps leave less than a half of an oscillation of `period` steps."""
+    return left(simulate, period) < 0.5
+
+
+def filters(simulate: Simulate, period: float) -> bool:
+    """Whether what is left is √α¹⁰ to 1e-6."""
+    return abs(left(simulate, period) / decay(stiffness_of_period(period), DAMPING) ** STEPS - 1.0) < 1e-6
+
+
+def slowest(simulate: Simulate) -> BreakPoint:
+    """The longest period, in steps, that ten steps halve."""
+    return break_point(functools.partial(halves, simulate), 2.0, 200.0, resolution=1e-3, walk=5)
+
+
+def stiffest(simulate: Simulate) -> BreakPoint:
+    """The shortest period, in steps, that is filtered as theory says."""
+    return break_point(functools.partial(filters, simulate), 2.0, SHORTEST, walk=8)
 
 
 def draw(simulate: Simulate) -> Drawing:
@@ -147,5 +176,28 @@ TEST = ScalarTest(
     figures=(
         Figure(name="filter", title="Decay at six frequencies", draw=draw, thesis="Fig 2.8"),
         Figure(name="response", title="Left after ten steps against the period", draw=draw_response),
+    ),
+    stability=(
+        StabilityStudy(
+            name="slowest",
+            title="Longest period that ten steps halve",
+            configuration="plain",
+            definition="less than a half is left after ten steps, in steps a period",
+            study=slowest,
+            unit="1",
+            expected=(0.999 * HALVED, HALVED),
+            expected_source="√α¹⁰ = ½ with α = 1 − 8/9 ρ and ρ = 1/(1 + 4/(9 (h ω)²)); to the resolution of the search",
+        ),
+        StabilityStudy(
+            name="stiffest",
+            title="Shortest period that is filtered as theory says",
+            configuration="plain",
+            definition="what is left after ten steps is √α¹⁰ to 1e-6, in steps a period",
+            study=stiffest,
+            unit="1",
+            better="smaller",
+            expected=(SHORTEST, SHORTEST),
+            expected_source="a row is implicit: α goes to 1/9 and stays there however stiff; the search ends at h ω = 6e6",
+        ),
     ),
 )
