@@ -11,7 +11,7 @@ import pytest
 from click.testing import CliRunner
 
 from spook_tracker import engine
-from spook_tracker.scalar_tests.case import Part, Reason
+from spook_tracker.scalar_tests.case import Part, Reason, StabilityMap
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.oscillator.scene import decay, growth, run_map, stiffness_of_period
 from spook_tracker.tracker.cli.main import main
@@ -33,6 +33,29 @@ def test_reasons_are_few_and_stand_only_where_something_is_lacking() -> None:
         assert set(test.lacks.values()) <= set(get_args(Reason)), name
         assert not ("ladder" in test.lacks and test.ladders), name
         assert not ("stability" in test.lacks and test.stability), name
+
+
+def test_every_scene_has_a_ladder_and_a_break_point_or_map_or_its_reason() -> None:
+    rows = coverage_rows(CATALOGUE, None)
+
+    assert [row.test for row in rows if not all(row.cells[:2])] == []
+    assert (
+        coverage_table(rows)
+        .splitlines()[-1]
+        .startswith(f"{len(CATALOGUE)} scenes: 0 without error against run time, 0 without stability, ")
+    )
+
+
+def test_every_scene_that_breaks_has_one_band_from_theory_at_least() -> None:
+    """A map stands beside its prediction, or shows where break points with bands lie; a scene of "none: " alone has none."""
+    without = [
+        name
+        for name, test in CATALOGUE.items()
+        if test.stability
+        and not any(study.expected is not None for study in test.stability)
+        and not any(isinstance(study.study(engine.simulate), StabilityMap) for study in test.stability)
+    ]
+    assert without == []
 
 
 def test_a_cell_is_what_there_is_or_the_reason_or_empty() -> None:

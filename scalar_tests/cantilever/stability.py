@@ -1,4 +1,4 @@
-"""Where the beam stops to be a cantilever: pressed along, it buckles.
+"""Where the beam stops being a cantilever: pressed along, it buckles.
 
 Both forces act at the last box's centre, half a piece short of the tip: a column of L = l − d/2. Statics alone, so neither
 time step nor damping counts. The slowest mode creeps with τ/(1 − P/P_cr), 2.5 s at 0.80 of Euler's load.

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -21,7 +23,9 @@ from spook_tracker.engine import (
     Scene,
     Trace,
 )
+from spook_tracker.scalar_tests.bracket import break_count, break_point
 from spook_tracker.scalar_tests.case import (
+    BreakPoint,
     Configuration,
     Example,
     Ladder,
@@ -29,6 +33,7 @@ from spook_tracker.scalar_tests.case import (
     Metric,
     ScalarTest,
     Simulate,
+    StabilityStudy,
 )
 from spook_tracker.scalar_tests.multibody.library import (
     GRAVITY,
@@ -46,6 +51,8 @@ ACROSS = MASS * LENGTH**2 / 12.0  # kg m²
 COMPLIANCE = 1e-13  # m/N and rad/(N m): 1e-11 yields more than the high class allows
 EVERY = 0.05  # s: 20 outputs a second
 MANY, FEW = 40, 2
+NUDGE, HUNG_STEPS = 1e-6, 200  # of PUSH, and steps: linkages that hang
+COUNTS = (2, 5, 10, 20, 40)  # linkages that are tried
 FALLING_STEPS = tuple(1.0 / n for n in (12, 15, 18, 21, 30, 60, 90, 120))  # s
 BEFORE_LEVEL = 2.0 / 3.0  # s; two linkages are level at 0.714
 ORDER_RANGES: dict[Literal["order4", "order6", "order8"], tuple[float, float]] = {  # s
@@ -177,6 +184,41 @@ def falling_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     return simulate(scene(FEW, time_step), time_step=time_step, duration=BEFORE_LEVEL, method=method)
 
 
+def hangs(simulate: Simulate, count: int, time_step: float) -> bool:
+    """Whether linkages that hang, pushed a little, swing together, no wider than a hundred times what that is in a step."""
+    upright = scene(count, time_step)
+    bodies = tuple(
+        replace(
+            body,
+            velocity=(NUDGE * body.velocity[0], 0.0, 0.0),
+            angular_velocity=(0.0, 0.0, NUDGE * body.angular_velocity[2]),
+        )
+        for body in upright.bodies
+        if isinstance(body, RigidBody)
+    )
+    hanging = replace(upright, bodies=bodies, gravity=(0.0, GRAVITY, 0.0))
+    observe = {f"side {k}": Trace(quantity=Position(f"side {k}"), from_start=True) for k in (0, count)}
+    result = simulate(hanging, time_step=time_step, steps=HUNG_STEPS, observe=observe)
+    if not result.completed:
+        return False
+    first, last = (result[f"side {k}"][:, 0] for k in (0, count))
+    wide = 100.0 * time_step * NUDGE * PUSH
+    return float(np.abs(first).max()) < wide and float(np.abs(first - last).max()) < 1e-3 * wide
+
+
+def longest_step(simulate: Simulate) -> BreakPoint:
+    """The longest step [s] in which two hanging linkages swing."""
+    return break_point(functools.partial(hangs, simulate, FEW), 0.02, 3.0, resolution=2e-3, walk=6)
+
+
+def most_linkages(simulate: Simulate) -> BreakPoint:
+    """The most hanging linkages that swing as one at h = 1/60 s."""
+    return break_count(lambda count: hangs(simulate, count, 1 / 60), COUNTS)
+
+
+LONGEST = 2.0 / math.sqrt(_falls_over(FEW) * GRAVITY / LENGTH)  # s, .591: h ω = 2
+
+
 def _composed(order: Literal["order4", "order6", "order8"], *time_steps: float) -> Configuration:
     """A composition that meets a class at its first or second step: too few for a slope."""
     return Configuration(
@@ -193,6 +235,10 @@ ENERGY = Metric(
     relative_tolerance=1e-5,
 )
 
+HANGS = (
+    "under the ground, pushed by 1e-6 m/s, the first and the last rod swing together and no wider than a hundred times what "
+    "that is in a step, in 200 steps"
+)
 TEST = ScalarTest(
     title="Multibody library A02: N four-bar linkages",
     question="Do forty four-bar linkages in a row, pushed over at once, stay one motion?",
@@ -312,6 +358,30 @@ TEST = ScalarTest(
             run=falling_run,
             target_error=3e-3,
             target_seconds=0.01,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="longest-step",
+            title="Longest step in which two linkages hang",
+            configuration="plain",
+            definition=HANGS,
+            study=longest_step,
+            unit="s",
+            expected=(0.996 * LONGEST, 1.002 * LONGEST),
+            expected_source="hanging they are one swing, ω² = c g/l with c = ((3 N + 1)/2)/((4 N + 1)/3), gravity taken where a "
+            "step begins: stable while h ω < 2; to the resolution of the search",
+        ),
+        StabilityStudy(
+            name="most-linkages",
+            title="Most hanging linkages that swing as one at h = 1/60 s",
+            configuration="plain",
+            definition=HANGS,
+            study=most_linkages,
+            unit="1",
+            expected=(COUNTS[-1], COUNTS[-1]),
+            expected_source="off the level place rows fix all but one freedom, whose ω² goes to 9/8 g/l with their number; the "
+            "search ends at the library's 40",
         ),
     ),
 )

@@ -14,6 +14,7 @@ from spook_tracker.engine import (
     AngularVelocity,
     Distance,
     Hinge,
+    Maximum,
     MaximumAbsolute,
     Method,
     Position,
@@ -23,7 +24,17 @@ from spook_tracker.engine import (
     Scene,
     Trace,
 )
-from spook_tracker.scalar_tests.case import Configuration, Example, Measurement, Metric, ScalarTest, Simulate
+from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.case import (
+    BreakPoint,
+    Configuration,
+    Example,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
 from spook_tracker.scalar_tests.multibody.library import (
     FIRST_ORDER,
     GRAVITY,
@@ -52,6 +63,9 @@ EXACT = {  # s: height of the slider in m
 }
 END_RATE = 5.5482036227  # rad/s, of the shaft after 10 s
 TURN = 53.86899866  # kg m²/s, L_z
+CEILING = 0.9  # m, where a slider is too high
+FINE = 1 / 2000  # s, of both searches
+STIFFEST = 1e15  # N/m, where the search for the stiffest spring ends
 
 
 def scene(time_step: float) -> Scene:
@@ -155,6 +169,83 @@ def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     return simulate(scene(time_step), time_step=time_step, duration=10.0, method=method)
 
 
+def spun(simulate: Simulate, spin: float, stiffness: float = STIFFNESS) -> float:
+    """The slider's highest place [m] in the first 0.6 s at FINE, the shaft starting with `spin` [rad/s]."""
+    built = scene(FINE)
+    bodies = (
+        replace(
+            body,
+            velocity=(0.0, spin / SPIN * body.velocity[1], 0.0),
+            angular_velocity=(0.0, 0.0, spin),
+        )
+        for body in built.bodies
+        if isinstance(body, RigidBody)
+    )
+    joints = (
+        replace(joint, compliance=1.0 / stiffness) if isinstance(joint, Distance) else joint
+        for joint in built.constraints
+    )
+    built = replace(built, bodies=tuple(bodies), constraints=tuple(joints))
+    observe = {"slider": Maximum(quantity=Position("slider"))}
+    result = simulate(built, time_step=FINE, duration=0.6, observe=observe)
+    return float(result["slider"][2]) if result.completed else math.inf
+
+
+def lift(spin: float, height: float) -> float:
+    """Energy [J] that is left for rising when the slider, from rest at MIDDLE with the shaft at `spin`, is at `height`.
+
+    The springs' length is kept: the slider is as far below TOP as sin φ, φ the rods' lean. L_z is kept, too.
+    """
+    mass, centre = ROD + BALL, (0.5 * ROD + BALL) / (ROD + BALL)
+    own = ACROSS + ROD * (centre - 0.5) ** 2 + BALL * (1.0 - centre) ** 2
+
+    def inertia(sine: float) -> float:
+        cosine = math.sqrt(1.0 - sine * sine)
+        rods = mass * (OUT + centre * cosine) ** 2 + own * cosine**2 + ALONG * sine**2
+        return ALONG + CUBE + 2.0 * rods
+
+    first, last = TOP - MIDDLE, TOP - height
+    turn = inertia(first) * spin
+    weight = GRAVITY * (2.0 * mass * centre + SLIDER) * (first - last)
+    return 0.5 * turn**2 * (1.0 / inertia(first) - 1.0 / inertia(last)) - weight
+
+
+def fastest_below(height: float) -> float:
+    """The spin [rad/s] at which the slider's first rise ends at `height` [m]; halving."""
+    low, high = 1.0, 100.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if lift(middle, height) < 0.0 else (low, middle)
+    return low
+
+
+def fastest(simulate: Simulate) -> BreakPoint:
+    """The fastest spin [rad/s] at which the slider stays below CEILING."""
+    return break_point(
+        lambda spin: spun(simulate, spin) < CEILING, 0.8 * SPIN, 4.0 * SPIN, resolution=2e-3, walk=6
+    )
+
+
+def stiffest(simulate: Simulate) -> BreakPoint:
+    """The stiffest springs [N/m] with which the slider rises as high as with a link, to a centimetre."""
+
+    def holds(stiffness: float) -> bool:
+        return abs(spun(simulate, SPIN, stiffness) - HIGHEST) < 0.01
+
+    return break_point(holds, STIFFNESS, STIFFEST, walk=6)
+
+
+def highest() -> float:
+    """Where the first rise ends at SPIN [m]; halving."""
+    low, high = MIDDLE + 0.01, TOP
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if lift(SPIN, middle) > 0.0 else (low, middle)
+    return low
+
+
+HIGHEST = highest()  # m
+FASTEST = fastest_below(CEILING)  # rad/s
 HALF_STEP_CURVED = Method(half_step_velocities=True, corrections=2)
 OUTPUTS = "the slider's height at 0.1, 0.5, 1, 2, 5 and 10 s"
 KEPT = (
@@ -248,5 +339,30 @@ TEST = ScalarTest(
         },
         ladder_error,
         ladder_run,
+    ),
+    stability=(
+        StabilityStudy(
+            name="fastest",
+            title="Fastest spin at which the slider stays below 0.9 m at h = 1/2000 s",
+            configuration="plain",
+            definition="its highest place within 0.6 s",
+            study=fastest,
+            unit="rad/s",
+            expected=(0.99 * FASTEST, 1.01 * FASTEST),
+            expected_source="energy and L_z from rest to the end of the first rise, springs as links. Their dashpots take a few "
+            "tenths of a per cent, and the bend of a step for a motion: a speed of ½ h v²/r, 0.3 % at this step (2.4 % at "
+            "1/240 s); 0.2 % is the search's",
+        ),
+        StabilityStudy(
+            name="stiffest-springs",
+            title="Stiffest springs with which the slider rises as high as with links",
+            configuration="plain",
+            definition="its highest place within 0.6 s is that of rigid links to 0.01 m, h = 1/2000 s",
+            study=stiffest,
+            unit="N/m",
+            expected=(STIFFEST, STIFFEST),
+            expected_source="a spring is a row with its compliance: none is too stiff, and the limit is the link; the search ends "
+            "at 1e15 N/m",
+        ),
     ),
 )

@@ -2,15 +2,31 @@
 
 from __future__ import annotations
 
+import functools
+import math
+from dataclasses import replace
+
 import numpy as np
 
-from spook_tracker.engine import Method, Position, Result, Trace
-from spook_tracker.scalar_tests.case import Configuration, Example, Measurement, ScalarTest, Simulate
+from spook_tracker.engine import MaximumAbsolute, Method, Position, Result, Trace
+from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.case import (
+    BreakPoint,
+    Configuration,
+    Example,
+    Measurement,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
 from spook_tracker.scalar_tests.multibody.library import HIGH, LOW, error_metric, ladders, library_error
-from spook_tracker.scalar_tests.pendulum.scene import angle, scene
+from spook_tracker.scalar_tests.pendulum.scene import GRAVITY, LENGTH, angle, scene
 
 DURATION, EVERY = 2000.0, 0.5  # s: 4000 outputs
 LADDER_DURATION = 100.0  # s
+NUDGE, WIDER, SWINGS = 1e-6, 100.0, 200  # rad; times as wide; steps of the pendulum that hangs
+RATE = math.sqrt(GRAVITY / LENGTH)  # rad/s
+LONGEST = 10.0  # s, where the search for a composition's longest step ends
 HALF_STEP_CURVED = Method(half_step_velocities=True, corrections=2)
 OUTPUTS = "4000 outputs of (x, y) in 2000 s"
 ORDER_4, ORDER_8 = Method(composition="order4"), Method(composition="order8")
@@ -45,6 +61,22 @@ def order_8(simulate: Simulate) -> dict[str, float]:
     return {"library_error": path_error(simulate, 1 / 20, ORDER_8)}
 
 
+def hangs(simulate: Simulate, method: Method, time_step: float) -> bool:
+    """Whether a pendulum let go NUDGE from hanging stays within WIDER times that, for SWINGS steps so long [s]."""
+    level = scene(time_step)
+    place = (LENGTH * math.sin(NUDGE), 0.0, -LENGTH * math.cos(NUDGE))
+    hung = replace(level, bodies=(replace(level.bodies[0], position=place),))
+    observe = {"bob": MaximumAbsolute(quantity=Position("bob"))}
+    result = simulate(hung, time_step=time_step, steps=SWINGS, method=method, observe=observe)
+    return result.completed and float(result["bob"][0]) < WIDER * NUDGE
+
+
+def longest_step(simulate: Simulate, method: Method, hard: float) -> BreakPoint:
+    """The longest step [s] in which it hangs still, up to `hard`."""
+    return break_point(functools.partial(hangs, simulate, method), 0.05, hard, resolution=2e-3, walk=6)
+
+
+HANGS = "let go 1e-6 rad aside it never swings a hundred times as wide, in 200 steps"
 TEST = ScalarTest(
     title="Multibody library A01: simple pendulum",
     question="Is a pendulum still where it belongs after 2000 s?",
@@ -102,5 +134,29 @@ TEST = ScalarTest(
         },
         ladder_error,
         ladder_run,
+    ),
+    stability=(
+        StabilityStudy(
+            name="longest-step-curved",
+            title="Longest step in which the pendulum hangs still",
+            configuration="half-step, curved twice",
+            definition=HANGS,
+            study=functools.partial(longest_step, method=HALF_STEP_CURVED, hard=3.0 / RATE),
+            unit="s",
+            expected=(0.996 * 2.0 / RATE, 1.002 * 2.0 / RATE),
+            expected_source="gravity is taken where a step begins, rows take none of a small swing: stable while h √(g/l) < 2; to "
+            "the resolution of the search, and what 200 steps tell",
+        ),
+        StabilityStudy(
+            name="longest-step-order8",
+            title="Longest step in which the pendulum hangs still, by a composition",
+            configuration="order 8",
+            definition=HANGS,
+            study=functools.partial(longest_step, method=ORDER_8, hard=LONGEST),
+            unit="s",
+            expected=(LONGEST, LONGEST),
+            expected_source="a stage that gravity draws 0.3 of l off the circle is halved: ½ g (γ h)² stays below 0.14 l, so h ω below "
+            "0.9, and the leapfrogs of a small swing leave the unit circle at h ω = 3.1; the search ends at 10 s",
+        ),
     ),
 )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any
 
@@ -21,7 +22,16 @@ from spook_tracker.engine import (
     Trace,
 )
 from spook_tracker.engine.observe import Observable
-from spook_tracker.scalar_tests.case import Example, Measurement, Metric, ScalarTest, Simulate
+from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.case import (
+    BreakPoint,
+    Example,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
 from spook_tracker.scalar_tests.multibody.library import (
     HIGH,
     LOW,
@@ -32,6 +42,7 @@ from spook_tracker.scalar_tests.multibody.library import (
 )
 
 DURATION = 0.03  # s
+LONGEST = DURATION / 212.5  # s, between 213 steps and 212
 COMPLIANCE = 1e-13  # m/N and rad/(N m): 1e-8 is a part in a hundred of what these millimetres bear
 TORQUE, STIFFNESS, REST = 0.033, 4530.0, 0.07785  # N m, N/m, m
 A, B, C = np.array([-0.06934, -0.00227]), np.array([-0.03635, 0.03273]), np.array([0.014, 0.072])  # m
@@ -157,6 +168,16 @@ def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     return simulate(scene(time_step), time_step=time_step, duration=DURATION, method=method)
 
 
+def in_class(simulate: Simulate, time_step: float) -> bool:
+    """Whether the low class is kept, 0.03 s being divided into the number of steps nearest to that one [s]."""
+    return answers(simulate, DURATION / round(DURATION / time_step))["library_error"] < LOW
+
+
+def longest_step(simulate: Simulate) -> BreakPoint:
+    """The longest step [s] that keeps the low class."""
+    return break_point(functools.partial(in_class, simulate), 5e-5, 5e-4, resolution=2e-3, walk=6)
+
+
 OUTPUTS = "the angles of crank, triangle and both rockers after 0.03 s"
 
 TEST = ScalarTest(
@@ -214,5 +235,18 @@ TEST = ScalarTest(
         },
         ladder_error,
         ladder_run,
+    ),
+    stability=(
+        StabilityStudy(
+            name="longest-step",
+            title="Longest step that keeps the low precision class",
+            configuration="plain",
+            definition="the library's error of the four angles below 0.1 after 0.03 s",
+            study=longest_step,
+            unit="s",
+            expected=(0.997 * LONGEST, LONGEST),
+            expected_source="213 steps keep it and 212 do not: the same rows in the mechanism's plane, stepped by the prototype "
+            "tests/oracle_squeezer.py; to the resolution of the search",
+        ),
     ),
 )
