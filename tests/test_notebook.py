@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import json
 import re
 import sys
 from collections.abc import Iterator
@@ -33,6 +32,7 @@ from spook_tracker.engine import (
 from spook_tracker.engine.shapes import Box, Plane
 from spook_tracker.tracker.document.errors import TrackerError, UnknownName
 from tests.browser import MISSING, arrive, browser, programs, wait_for
+from tests.site_scripts import handed_over
 
 BOX = RigidBody(
     name="box", mass=1.0, shape=Box(size=(1.0, 1.0, 1.0)), position=(0.0, 0.0, 2.0),
@@ -173,10 +173,8 @@ def test_a_history_is_drawn_with_the_traces_of_the_website(database: str, tmp_pa
         tracker.publish(history, tmp_path / "public")
         ladder = history.plot("falling_object", ladder=True)
         trend = history.plot("falling_object")
-    scripts = "".join(path.read_text() for path in (tmp_path / "public" / "charts").glob("*.js"))
-    told = re.search(r'^charted\("falling_object/l-[\w-]+-seconds",(.*)\);$', scripts, re.MULTILINE)
-    assert told
-    site = json.loads(told[1])
+    charts = handed_over((tmp_path / "public" / "charts").glob("*.js"), "charted")
+    (site,) = (data for key, data in charts.items() if re.fullmatch(r"falling_object/l-[\w-]+-seconds", key))
 
     assert isinstance(ladder, go.Figure)
     assert [(t.name, list(t.x), list(t.y)) for t in ladder.data] == [

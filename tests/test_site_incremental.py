@@ -19,6 +19,7 @@ from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.remove import remove
 from spook_tracker.tracker.website.options import SiteOptions
 from spook_tracker.tracker.website.publish import publish
+from tests.site_scripts import handed_over
 from tests.synthetic_history import DocumentHistory, document, engine, of_test, rival
 from tests.test_tracker_one_judge import night, one
 
@@ -217,13 +218,14 @@ def test_a_damaged_file_is_written_again(damage: Callable[[Path], object], tmp_p
 
 
 def test_the_first_bad_run_imported_late_is_blamed_on_the_page_of_comparisons(tmp_path: Path) -> None:
-    blamed = NIGHTS[LATE].engine.git_hash[:12].encode()
+    blamed = NIGHTS[LATE].engine.git_hash[:12]
+    compared = tmp_path / "site" / "compare" / "newest.js"
     publish(DocumentHistory(WITHOUT_IT), tmp_path / "site")
-    assert blamed not in files(tmp_path / "site")["compare/newest.js"]
+    assert blamed not in str(handed_over(compared, "compared")["newest"])
 
     publish(DocumentHistory(NIGHTS), tmp_path / "site")
 
-    assert blamed in files(tmp_path / "site")["compare/newest.js"]
+    assert blamed in str(handed_over(compared, "compared")["newest"])
 
 
 def test_other_rules_of_the_judge_write_every_page_again(

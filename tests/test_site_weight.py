@@ -10,6 +10,7 @@ import pytest
 from spook_tracker.tracker.website.publish import publish
 from tests.browser import LIVE
 from tests.page_weights import FIRST, OTHERS, SENT, WHOLE_HISTORY, too_heavy
+from tests.site_scripts import handed_over
 from tests.synthetic_history import SEVEN, DocumentHistory, document
 
 COPIES = 4  # of the seven tests: 28 in all, with 16 series each
@@ -91,7 +92,7 @@ def test_the_data_of_charts_are_in_files(site):
         assert '<div class="static">' not in text, "no picture stands beside what the script draws"
         for key, address in charts:
             file = (page.parent / address).resolve()
-            assert f'charted("{key}",{{' in file.read_text()
+            assert {"data", "layout"} <= handed_over(file, "charted")[key].keys()
             named.setdefault(file, set()).add(page.name)
 
     assert {*named, site / "charts" / "nights.js"} == set(site.glob("charts/*.js"))

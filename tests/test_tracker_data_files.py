@@ -6,13 +6,14 @@ import csv
 import io
 import json
 import math
+import re
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from spook_tracker.tracker.website.data_files import inert, records, table
-from spook_tracker.tracker.website.templates import embedded, environment
+from spook_tracker.tracker.website.templates import css_text, embedded, environment
 from tests.synthetic_history import HOSTILE
 
 
@@ -56,6 +57,13 @@ def test_data_in_a_page_cannot_end_its_element() -> None:
 
     assert not set("<>&\u2028") & set(text)
     assert json.loads(text)["name"] == HOSTILE
+
+
+def test_a_name_in_a_style_sheet_ends_nothing() -> None:
+    text = str(css_text(f'a"}}</style>\\{HOSTILE}'))
+
+    assert re.fullmatch(r'"[^"<>{}\n]*"', text)
+    assert not re.search(r"\\[^0-9a-f]", text), "an escape is of a number"
 
 
 def test_a_template_escapes_and_never_forgets_a_name() -> None:

@@ -1,11 +1,7 @@
-// Nights as the files of compare/ hold them, in blocks: loaded when asked for, decoded, handed to judge.js.
+// Nights as the files of compare/ hold them, in blocks: decoded, handed to judge.js. No page: also for Node.
 "use strict";
 
 const NIGHT_OUTCOMES = ["value", "out_of_limit", "not_finite", "diverged", "crashed", "timed_out", "missing", "not_supported", "unsettled"];
-const nightBlocks = new Map();
-
-// Called by each file of compare/.
-function comparedNights(name, block) { nightBlocks.set(name, block); }
 
 // The fields of all definitions stand once; those of one are put together when it is first asked for.
 function definitionAt(block, place) {

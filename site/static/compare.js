@@ -7,11 +7,21 @@
   if (!source) { return; }
   const choices = JSON.parse(source.textContent), own = choices.engines[0][1];
   const versions = choices.nights.map(([id, label, hash]) => ({ id, label, hash }));
-  let newest = null;  // pairs, texts, words of the series, accepted levels: compare/newest.js
-  window.comparedNewest = (told) => {
-    newest = told;
+  const files = new Handed();
+  window.compared = (name, packed) => files.set(name, packed);  // called by each file of compare/
+  async function fileOf(name) {
+    await script(`compare/${name}.js`);
+    return files.read(name);
+  }
+
+  let newest = null;  // pairs, texts, words of the series, accepted levels
+  async function theNewest() {
+    if (newest) { return; }
+    const told = await fileOf("newest");
     for (const level of told.accepted) { level.keys = new Set(level.keys); level.low = numberOf(level.low); level.high = numberOf(level.high); }
-  };
+    newest = told;
+  }
+
   const before = document.getElementById("before"), after = document.getElementById("after");
   const what = document.getElementById("what"), told = document.getElementById("told");
   const HEADLINES = {
@@ -59,9 +69,7 @@
 
   async function nightAt(place) {
     const { which, left } = engineOf(place);
-    const name = `${choices.engines[which][0]}-${Math.floor(left / choices.block)}`;
-    await script(`compare/${name}.js`);
-    return nightOf(nightBlocks.get(name), left % choices.block);
+    return nightOf(await fileOf(`${choices.engines[which][0]}-${Math.floor(left / choices.block)}`), left % choices.block);
   }
 
   // Two nights judged here, in the form of a stored pair with texts in place of places.
@@ -100,7 +108,7 @@
   }
 
   async function enginesOf(i, j) {
-    await script("compare/newest.js");
+    await theNewest();
     const nights = [await nightAt(i), await nightAt(j)], which = [i, j].map((place) => engineOf(place).which);
     const names = [i, j].map((place) => (place < own ? choices.engines[0][2] + " " : "") + versions[place].label.split(" · ")[0]), kept = [0, 0], answered = [0, 0], lines = [];
     for (const [title, what, page, limit, keys] of newest.gates) {
@@ -150,7 +158,7 @@
   }
 
   async function pairOf(i, j) {
-    await script("compare/newest.js");
+    await theNewest();
     const stored = newest.pairs[i + "," + j], plain = (lines) => lines.map((line) => line.map((place) => newest.texts[place]));
     return stored ? { ...stored, changes: plain(stored.changes), frontiers: plain(stored.frontiers) } : judged(i, j);
   }

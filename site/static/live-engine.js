@@ -362,7 +362,7 @@ function observedOrder(engine, name, parameters) {
 // In a worker: answers questions one after the other. The page ends the worker when it no longer wants the answer.
 async function serve({ data }) {
   if (data.packed || data.module) {
-    serve.engine = await LiveEngine.from(data.module || (await unpacked(data.packed)));
+    serve.engine = await LiveEngine.from(data.module || (await inflated(data.packed).arrayBuffer()));
     postMessage({ ready: true, module: serve.engine.module });
     return;
   }
@@ -377,12 +377,6 @@ async function serve({ data }) {
 }
 
 const buffersOf = (thing) => (ArrayBuffer.isView(thing) ? [thing.buffer] : thing && typeof thing === "object" && !Array.isArray(thing) ? Object.values(thing).flatMap(buffersOf) : []);
-
-// The module stands in a script as base64 of its deflated bytes: a page opened from a file may not fetch.
-async function unpacked(packed) {
-  const bytes = Uint8Array.from(atob(packed), (letter) => letter.charCodeAt(0));
-  return new Response(new Blob([bytes]).stream().pipeThrough(new DecompressionStream("deflate"))).arrayBuffer();
-}
 
 if (typeof WorkerGlobalScope !== "undefined") { onmessage = serve; }
 if (typeof module !== "undefined") { module.exports = { LiveEngine, LIVE_SCENES, simulateLive, observedOrder, defaults, energyOf }; }

@@ -8,9 +8,7 @@ function recorded(key, data) { recordings.set(key, data); }
 
 // Sixteen-bit differences over samples, the low bytes of all before the high ones, deflated. 65535 is no value.
 async function unpacked(channel, count) {
-  const packed = Uint8Array.from(atob(channel.data), (letter) => letter.charCodeAt(0));
-  const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
-  const bytes = new Uint8Array(await new Response(stream).arrayBuffer());
+  const bytes = new Uint8Array(await inflated(channel.data).arrayBuffer());
   const n = bytes.length / 2, width = n / count, out = new Float32Array(n);
   const last = new Uint16Array(width);
   for (let i = 0; i < n; i += 1) {

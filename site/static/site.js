@@ -35,13 +35,11 @@ function script(address) {
 }
 
 // --- charts ---
-const chartData = new Map();  // by key, as the files of charts/ hand them over
+const chartData = new Handed();
+const charted = (key, packed) => chartData.set(key, packed);  // called by the files of charts/
 
-// Called by each file of charts/.
-function charted(key, data) { chartData.set(key, data); }
-
-const parts = new Map();  // by test, what its page says of tonight's run times
-function told(test, text) { parts.set(test, text); }
+const parts = new Handed();  // by test, what its page says of tonight's run times
+const told = (test, packed) => parts.set(test, packed);
 
 let nights = [];  // day and commit of each
 function nightsAre(all) {
@@ -243,7 +241,7 @@ function charts() {
   const show = async (box) => {
     try {
       await script(box.dataset.file);
-      if (chartData.get(box.dataset.key).over) { await script(box.dataset.file.replace(/[^/]*$/, "nights.js")); }
+      if ((await chartData.read(box.dataset.key)).over) { await script(box.dataset.file.replace(/[^/]*$/, "nights.js")); }
     } catch { return missing(box); }
     seen.add(box);
     drawChart(box);
@@ -285,8 +283,11 @@ async function tonight() {
     measured.hidden = false;
   }
   if (!times) { return; }
-  try { await script(times.dataset.file); } catch { return; }
-  const text = parts.get(times.dataset.test);  // made by the templates, as the page itself
+  let text;  // made by the templates, as the page itself
+  try {
+    await script(times.dataset.file);
+    text = await parts.read(times.dataset.test);
+  } catch { return; }
   if (text) { times.innerHTML = text; }
   folds(times);
   scrollers();

@@ -479,7 +479,9 @@ def _red(document: RunDocument) -> bool:
 def _say_published(report: Report, out: Path) -> None:
     from spook_tracker.tracker.cli.console import say
 
-    say(f"published {out / 'index.html'}: {report.pages} files, {report.written} of them new or changed")
+    say(
+        f"published {out / 'index.html'}: {report.pages} files, {report.bytes / 1e6:.1f} MB, {report.written} of them new or changed"
+    )
     for sentence in report.failed:
         say(f"not made: {sentence}", err=True)
 

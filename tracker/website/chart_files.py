@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import json
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
 from spook_tracker.tracker.website.diagrams import View
 from spook_tracker.tracker.website.folder import digest
+from spook_tracker.tracker.website.scripts import as_json, call
 
 NIGHTLY = 16  # files of run times, which are others every night
 
@@ -27,37 +27,34 @@ class ChartFiles:
     writes again. Scripts, because a page opened from a file may not fetch.
     """
 
-    nightly: dict[str, set[str]] = field(default_factory=dict)  # address to what it calls
+    nightly: dict[str, set[bytes]] = field(default_factory=dict)  # address to what it calls
 
     def add(self, context: Mapping[str, object]) -> dict[str, bytes]:
         """Address and content of the script of each chart of a page; the charts are told where theirs is."""
         files = {}
         for view in _views(list(context.values())):
-            data = _json(view.figure)
+            data = as_json(view.figure)
             view.figure = None  # a page is made from where its numbers are, not from the numbers
             if view.nightly:
                 view.key = f"{view.nightly}/{view.name.removeprefix(view.nightly + '-')}"
                 view.file = nightly_file(view.nightly)
-                self._hand_over(view.file, f"charted({_json(view.key)},{data});\n")
+                self._hand_over(view.file, call("charted", view.key, data))
                 continue
             view.key = digest(data.encode("utf-8", "replace"))
             view.file = f"charts/{view.key}.js"
-            files[view.file] = f'charted("{view.key}",{data});\n'.encode("utf-8", "replace")
+            files[view.file] = call("charted", view.key, data)
         return files
 
     def add_part(self, test: str, text: str) -> None:
         """What the page of a test says of run times in words."""
-        self._hand_over(nightly_file(test), f"told({_json(test)},{_json(text)});\n")
+        self._hand_over(nightly_file(test), call("told", test, as_json(text)))
 
-    def _hand_over(self, address: str, call: str) -> None:
-        self.nightly.setdefault(address, set()).add(call)
+    def _hand_over(self, address: str, line: bytes) -> None:
+        self.nightly.setdefault(address, set()).add(line)
 
     def nightly_files(self) -> dict[str, bytes]:
         """Address and content of the scripts of run times."""
-        return {
-            address: "".join(sorted(calls)).encode("utf-8", "replace")
-            for address, calls in sorted(self.nightly.items())
-        }
+        return {address: b"".join(sorted(calls)) for address, calls in sorted(self.nightly.items())}
 
 
 def _views(things: Iterable[object]) -> Iterator[View]:
@@ -66,9 +63,3 @@ def _views(things: Iterable[object]) -> Iterator[View]:
             yield thing
         elif isinstance(thing, list | tuple):
             yield from _views(thing)
-
-
-def _json(value: object) -> str:
-    """Nothing in it ends a script of its own file, but for two line ends that older browsers know."""
-    text = json.dumps(value, ensure_ascii=False, separators=(",", ":"), allow_nan=False)
-    return text.replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")

@@ -36,6 +36,7 @@ from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.website.folder import digest
 from spook_tracker.tracker.website.judged_nights import accepted_fields, described, gates_of_engines
 from spook_tracker.tracker.website.nights import Book, Night, Records
+from spook_tracker.tracker.website.scripts import as_json, call
 
 NEWEST = 10  # versions to choose from
 RELEASES = 6  # and the newest releases before them
@@ -180,7 +181,7 @@ def page_files(told: Comparisons, book: Book, accepted: Sequence[Accepted]) -> b
     levels = accepted_fields(accepted, [key for _, _, words in series.values() for key in words])
     gates = gates_of_engines(book)
     whole = {"pairs": pairs, "texts": list(texts), "series": series, "accepted": levels, "gates": gates}
-    return f"comparedNewest({json.dumps(whole, separators=(',', ':'), allow_nan=False)});\n".encode()
+    return call("compared", "newest", as_json(whole))
 
 
 def choice(night: Night) -> dict[str, str]:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from itertools import groupby
@@ -76,13 +77,6 @@ def records(columns: Sequence[str], lines: Iterable[Sequence[Cell]]) -> bytes:
     return json.dumps(found, ensure_ascii=True, allow_nan=False, separators=(",", ":")).encode()
 
 
-def columnar(columns: Sequence[str], lines: Iterable[Sequence[object]]) -> bytes:
-    """The same table as JSON: names once, then a list for each line; non-finite numbers as strings."""
-    rows = [[boxed(cell) if isinstance(cell, float) else cell for cell in line] for line in lines]
-    whole = {"columns": list(columns), "rows": rows}
-    return json.dumps(whole, ensure_ascii=True, allow_nan=False, separators=(",", ":")).encode()
-
-
 Table = tuple[Sequence[str], list[list[Cell]]]  # names of the columns, lines
 
 
@@ -97,22 +91,28 @@ def newest(book: Book, tests: Sequence[TestHistory]) -> Table:
 
 
 def work(book: Book) -> Table:
-    """Operations and iterations counted, of every configuration of every test: a line for the first night, and one
-    for each that changed it."""
-    columns = ("test", "configuration", "work", "count", "since")
-    return columns, [
-        [
-            t.definition.test, t.definition.configuration, t.definition.metric.removeprefix("work:"), _whole(t.values[i]),
-            book.nights[t.nights[i]].started,
-        ]
-        for test in book.tests
-        for t in test.trends
-        if t.definition.kind == "work"
-        for i in changed(t)
-    ]  # fmt: skip
+    """Operations and iterations counted, of every configuration of every test and each part of a night (values, ladders,
+    stability): a line for the first night, and one for each that changed any of them; a column for each kind."""
+    groups: dict[tuple[str, str, str], dict[str, Trend]] = {}
+    for test in book.tests:
+        for t in test.trends:
+            if t.definition.kind == "work":
+                _, part, kind = t.definition.metric.split(":")
+                groups.setdefault((test.name, t.definition.configuration, part), {})[kind] = t
+    kinds = sorted({kind for counted in groups.values() for kind in counted})
+    lines: list[list[Cell]] = []
+    for group, counted in groups.items():
+        for night in sorted({t.nights[i] for t in counted.values() for i in changed(t)}):
+            counts = {kind: _counted(t, night) for kind, t in counted.items()}
+            lines.append([*group, book.nights[night].started, *map(counts.get, kinds)])
+    return ("test", "configuration", "part", "since", *kinds), lines
 
 
-def _whole(value: float) -> float | int:
+def _counted(trend: Trend, night: int) -> Cell:
+    place = bisect_left(trend.nights, night)
+    if trend.nights[place : place + 1] != [night]:
+        return None
+    value = trend.values[place]
     return int(value) if value.is_integer() else value
 
 
@@ -245,17 +245,17 @@ def _night_line(night: Night) -> list[Cell]:
 
 
 def test_json(book: Book, test: TestHistory) -> bytes:
-    """Everything about one test but run times and work: its card, definitions, and each series with the place of its
-    definition, what it says beside, and what it was on the nights that changed it."""
+    """Everything about one test but run times, work and the drawing of its scene: its card, definitions, and each series
+    with the place of its definition, what it says beside, and what it was on the nights that changed it."""
     definitions: dict[str, int] = {}
     nights: dict[str, dict[str, str]] = {}
     series = [_series(t, definitions, nights, book.nights) for t in steady(test)]
+    card = {
+        name: value for name, value in structs.asdict(test.card).items() if name not in ("scene", "saving")
+    }
+    card["stages"] = [{"stage": s.stage, "kept": s.kept, "reason": s.reason} for s in test.card.stages]
     whole: Writable = {
-        "test": structs.replace(
-            test.card,
-            stages=tuple(structs.replace(s, saved_seconds_per_step=None) for s in test.card.stages),
-            saving=None,
-        ),
+        "test": card,
         "nights": nights,
         "definitions": [json.loads(text) for text in definitions],
         "series": series,

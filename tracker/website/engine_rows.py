@@ -55,6 +55,8 @@ class GateRow(TypedDict):
     limit: str
     seven: bool
     cells: list[Cell]
+    mine: list[Cell]  # of them
+    others: bool  # whether any other engine can be asked
 
 
 class RankRow(TypedDict):
@@ -65,6 +67,7 @@ class RankRow(TypedDict):
     what: str
     unit: str
     columns: list[list[Cell]]
+    others: list[bool]  # for each column, whether any other engine has a number there
 
 
 class BehindRow(TypedDict):

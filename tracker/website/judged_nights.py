@@ -25,6 +25,7 @@ from spook_tracker.tracker.judge.series_history import Told
 from spook_tracker.tracker.judge.work import Samples, is_read_off, with_work
 from spook_tracker.tracker.website.folder import digest
 from spook_tracker.tracker.website.nights import Book, Chapter, Night, Records
+from spook_tracker.tracker.website.scripts import as_json, call
 
 BLOCK = 32  # nights in a file
 OUTCOMES = (
@@ -224,7 +225,7 @@ def _block(history: Records, name: str, nights: Sequence[Night], marks: Mapping[
         "texts": list(texts.texts), "fields": fields, "definitions": [list(d.values()) for d in definitions],
         "nights": sides, "rows": rows,
     }  # fmt: skip
-    return f"comparedNights({_json(name)},{_json(whole)});\n".encode()
+    return call("compared", name, as_json(whole))
 
 
 def described(book: Book) -> dict[str, tuple[str, str, dict[str, str]]]:
@@ -264,7 +265,3 @@ def gates_of_engines(book: Book) -> list[list[Writable]]:
         for test in book.tests
         for gate in test.gates()
     ]  # fmt: skip
-
-
-def _json(value: Writable) -> str:
-    return json.dumps(value, ensure_ascii=True, separators=(",", ":"), allow_nan=False)

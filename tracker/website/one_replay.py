@@ -13,7 +13,7 @@ from spook_tracker.tracker.website.motions import motion_script
 from spook_tracker.tracker.website.scenery import scenery
 from spook_tracker.tracker.website.templates import Markup, environment, inside_script
 
-SCRIPTS = ("scene-poses.js", "scene-marks.js", "scene-view.js", "player.js", "replay.js")
+SCRIPTS = ("packed.js", "scene-poses.js", "scene-marks.js", "scene-view.js", "player.js", "replay.js")
 LIBRARY = "three-scene.min.js"
 KEY = "run"
 

@@ -119,6 +119,11 @@ def engines(book: Book, recorded: Recorded | None = None, path: str = ENGINES, b
         },
         {test.name: test.card.title for test in book.tests},
     )
+    own = [chapter.name == book.name for chapter in chapters]
+    lines = [
+        _line(test, definition, of_gate, own)
+        for (test, _), (definition, of_gate) in zip(gates, told, strict=True)
+    ]
     context = {
         "engines": [
             _card(title, chapter, address, told, found)
@@ -128,11 +133,10 @@ def engines(book: Book, recorded: Recorded | None = None, path: str = ENGINES, b
         "beside": beside,
         "uses": chosen,
         "use_charts": [use.chart for use in chosen if use.chart is not None],
-        "matrix": [
-            _line(test, definition, of_gate)
-            for (test, _), (definition, of_gate) in zip(gates, told, strict=True)
-        ],
-        "ranks": list(_ranks(found, book, apart)),
+        "matrix": [line for line in lines if line["others"]],
+        "alone": [line for line in lines if not line["others"]],
+        "mine": [title for title, mine in zip(titles, own, strict=True) if mine],
+        "ranks": list(_ranks(found, book, apart, own)),
         "ours": ours,
         "behind": None if ours in apart else _behind(found, ours, book),
         "apart": apart,
@@ -187,14 +191,21 @@ def _card(
     }
 
 
-def _line(test: TestHistory, gate: SeriesDefinition, told: Sequence[Answer]) -> GateRow:
+def _line(test: TestHistory, gate: SeriesDefinition, told: Sequence[Answer], own: Sequence[bool]) -> GateRow:
+    cells = [_answered(answer) for answer in told]
     return {
         "title": test.card.title,
         "address": page_of(test.name),
         "what": named(gate)[0],
         "limit": limit(gate),
         "seven": test.card.seven,
-        "cells": [_answered(answer) for answer in told],
+        "cells": cells,
+        "mine": [cell for cell, mine in zip(cells, own, strict=True) if mine],
+        "others": any(
+            answer.sample is not None and answer.sample.outcome != "not_supported"
+            for answer, mine in zip(told, own, strict=True)
+            if not mine
+        ),
     }
 
 
@@ -215,9 +226,11 @@ def _told(definition: SeriesDefinition, sample: Sample) -> str:
     return clean(f"{conditions(definition)}{': ' + sample.failure if sample.failure else ''}")[:300]
 
 
-def _ranks(found: Sequence[Standing], book: Book, apart: Mapping[str, str]) -> Iterator[RankRow]:
+def _ranks(
+    found: Sequence[Standing], book: Book, apart: Mapping[str, str], own: Sequence[bool]
+) -> Iterator[RankRow]:
     """A line for every scene: its errors at h = 1/60, and the run times to each error; `apart` says whose do not compare,
-    and why."""
+    and why; which engines are `own`."""
     titles = {test.name: test.card.title for test in book.tests}
     for group in scenes(found):
         first = group[0]
@@ -236,6 +249,14 @@ def _ranks(found: Sequence[Standing], book: Book, apart: Mapping[str, str]) -> I
                 "what": first.ladder.replace("_", " "),
                 "unit": "" if first.unit == "1" else first.unit,
                 "columns": columns,
+                "others": [
+                    any(
+                        cell.stands != "none" or cell.text in apart.values()
+                        for cell, mine in zip(column, own, strict=True)
+                        if not mine
+                    )
+                    for column in columns
+                ],
             }
 
 
@@ -246,14 +267,15 @@ def _error(unit: str, value: float) -> str:
 def _cells(
     values: Sequence[float | None], lacks: Sequence[str], say: Callable[[float], str], tie: float = 0.0
 ) -> list[Cell]:
-    """The best of a line stand out, all within `tie` of it; the others say how many times as much they take."""
+    """The best of a line stand out, all within `tie` of it; the others say how many times as much they take, unless the
+    best is rounding itself."""
     best = min((v for v in values if v is not None), default=math.nan)
     cells = []
     for value, lack in zip(values, lacks, strict=True):
         if value is None:
             cells.append(Cell(lack, "none"))
         else:
-            times = value / best if best > 0.0 and value - best > tie else math.nan
+            times = value / best if best > tie and value - best > tie else math.nan
             behind = f"{number(times, 2)} times the best" if times > 1.0 else ""
             cells.append(Cell(say(value), "pass", behind, value - best <= tie))
     return cells

@@ -58,6 +58,7 @@ __all__ = ["FolderError", "Report", "publish"]
 ASSETS = {  # name in templates: file under site/static
     "css": "site.css",
     "theme": "theme.js",
+    "packed": "packed.js",
     "site": "site.js",
     "judge": "judge.js",
     "nights": "compare-nights.js",
@@ -96,6 +97,11 @@ class Report:
         """All files of the website."""
         return self.written + self.skipped
 
+    @property
+    def bytes(self) -> int:
+        """Of all files."""
+        return sum(path.stat().st_size for path in self.out.rglob("*") if path.is_file())
+
 
 @no_collection()
 def publish(
@@ -132,7 +138,7 @@ def publish(
             folder.add(f"assets/{names[name]}", digest(content), partial(bytes, content))
         module, navigation = "", tuple(entry for entry in NAVIGATION if entry[0] != "live.html")
         if (engine := built_module(static)) is not None:
-            worker = contents["live_engine"]
+            worker = contents["packed"] + contents["live_engine"]
             module = f"assets/{_hashed('live-module.js', engine + worker)}"
             folder.add(module, digest(making.encode(), engine), partial(module_script, engine, worker))
             navigation = NAVIGATION
@@ -245,8 +251,8 @@ def _data(told: Book, events: Sequence[Event], causes: Sequence[Cause], author: 
             {"lines": [[repr(c) if isinstance(c, float) else c for c in line] for line in lines]}
         )
         yield f"data/{name}.csv", source, partial(data_files.table, columns, lines)
-        as_json = data_files.columnar if name == "tonight" else data_files.records
-        yield f"data/{name}.json", source, partial(as_json, columns, lines)
+        if name != "tonight":  # the same numbers stand in the JSON of each test
+            yield f"data/{name}.json", source, partial(data_files.records, columns, lines)
     counted = data_files.table(*data_files.work(told))
     yield "data/work.csv", counted, partial(bytes, counted)
     news = feed.atom(told, causes, author)

@@ -37,6 +37,12 @@ def inside_script(text: str) -> Markup:
     return Markup(text.replace("</", "<\\/"))
 
 
+def css_text(text: str) -> Markup:
+    """A text for a style sheet: but for letters, digits and a few signs all is escaped, so nothing in it ends anything."""
+    plain = (sign if sign.isalnum() or sign in " .,-+" else f"\\{ord(sign):x} " for sign in text)
+    return Markup('"' + "".join(plain) + '"')
+
+
 def said(name: Class) -> str:
     """The word of a class of nights: PASS, FAIL …"""
     return CLASSES[name][1]
@@ -62,6 +68,7 @@ def environment(folder: Path | None = None) -> jinja2.Environment:
     )
     made.filters |= {
         "data": embedded,
+        "css_text": css_text,
         "said": said,
         "clean": wording.clean,
         "clock": wording.clock,
