@@ -166,6 +166,21 @@ def fastest(simulate: Simulate) -> BreakPoint:
     return break_point(bounces, 1.0, 1e6, resolution=0.1, walk=7)
 
 
+GRIP = SLIDE / (3.5 * (1.0 + RESTITUTION) * FALL)  # .238: friction that takes 2/7 of the slide
+
+
+def smoothest(simulate: Simulate) -> BreakPoint:
+    """The least friction with which the ball leaves the floor rolling."""
+
+    def rolls(friction: float) -> bool:
+        off, _, spin_off = bounce_errors(simulate, friction)
+        right = expected_slide(friction)
+        turning = 2.5 * (SLIDE - right) + RADIUS * spin_off  # r ω, m/s
+        return abs(right + off - turning) < 1e-9
+
+    return break_point(rolls, 2.0, 0.02, resolution=1e-3, walk=6)
+
+
 def _draw_friction(simulate: Simulate) -> Drawing:
     coefficients = tuple(0.05 * k for k in range(1, 13))
     after = tuple(bounce_errors(simulate, mu)[0] + expected_slide(mu) for mu in coefficients)
@@ -302,6 +317,18 @@ TEST = ScalarTest(
             unit="1",
             expected=(1e6, 1e6),
             expected_source="the time of the blow decides, whatever the way in a step; the search ends at 1e6",
+        ),
+        StabilityStudy(
+            name="smoothest",
+            title="Least friction with which a ball leaves the floor rolling",
+            configuration="plain",
+            definition="speed along the floor and r ω alike after the blow, to 1e-9 m/s",
+            study=smoothest,
+            unit="1",
+            better="smaller",
+            expected=(GRIP, 1.001 * GRIP),
+            expected_source="a blow takes at most µ (1 + e) u of the slide, and rolling needs 2/7 of it; to the resolution of the "
+            "search",
         ),
     ),
 )

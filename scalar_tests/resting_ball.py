@@ -36,6 +36,7 @@ GRAVITY = 9.81  # m/s²
 TIME_STEP = 1.0 / 60.0  # s
 DURATION = 2.0  # s, long after whatever gives has come to rest
 WEIGHT = MASS * GRAVITY  # N
+LONGEST = 1e4  # s, where the search for the longest step ends
 
 
 def scene() -> Scene:
@@ -77,6 +78,17 @@ def heaviest(simulate: Simulate) -> BreakPoint:
         return abs(float(result["force"][2]) / (mass * GRAVITY) - 1.0) < 1e-9
 
     return break_point(carries, MASS, 1e12, walk=13)
+
+
+def longest_step(simulate: Simulate) -> BreakPoint:
+    """The longest step [s] after ten of which the plane is told to carry the weight."""
+
+    def carries(time_step: float) -> bool:
+        observe = {"force": Final(quantity=ContactForce("ball", "floor"))}
+        result = simulate(scene(), time_step=time_step, steps=10, observe=observe)
+        return result.completed and abs(float(result["force"][2]) / WEIGHT - 1.0) < 1e-9
+
+    return break_point(carries, TIME_STEP, LONGEST, walk=8)
 
 
 TEST = ScalarTest(
@@ -154,6 +166,16 @@ TEST = ScalarTest(
             unit="kg",
             expected=(1e12, 1e12),
             expected_source="one contact, one row: mass scales out of it; the search ends at 1e12 kg",
+        ),
+        StabilityStudy(
+            name="longest-step",
+            title="Longest step after which the weight is told",
+            configuration="direct",
+            definition="the force is the weight to 1e-9 of it after ten steps",
+            study=longest_step,
+            unit="s",
+            expected=(LONGEST, LONGEST),
+            expected_source="an impulse of h m g over h: the step scales out of it; the search ends at 10 000 s",
         ),
     ),
 )

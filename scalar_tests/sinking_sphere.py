@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -158,6 +160,19 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
+def sinks(simulate: Simulate, density: float) -> bool:
+    """Whether a sphere of that density [kg/m³] goes down."""
+    stone = replace(sinking().bodies[0], mass=density * VOLUME)
+    observe = {"v": Final(quantity=Velocity("stone"))}
+    result = simulate(replace(sinking(), bodies=(stone,)), time_step=TIME_STEP, steps=10, observe=observe)
+    return result.completed and float(result["v"][2]) < 0.0
+
+
+def lightest(simulate: Simulate) -> BreakPoint:
+    """The lightest sphere [kg/m³] that sinks."""
+    return break_point(functools.partial(sinks, simulate), STONE, 0.1 * WATER, resolution=1e-4, walk=6)
+
+
 TEST = ScalarTest(
     title="Sinking sphere",
     question="Does a stone sink at its terminal speed, and swing under water as its lost weight says?",
@@ -250,6 +265,17 @@ TEST = ScalarTest(
             unit="s",
             expected=(0.98 * RISE, 1.02 * RISE),
             expected_source="the slope of the map of one step at v_t is 1 − 2 h/τ: stable for h < τ = 0.491 s",
+        ),
+        StabilityStudy(
+            name="lightest",
+            title="Lightest sphere that sinks",
+            configuration="plain",
+            definition="it goes down from rest",
+            study=lightest,
+            unit="kg/m³",
+            better="smaller",
+            expected=(WATER, 1.0001 * WATER),
+            expected_source="Archimedes: one as dense as the water stays; to the resolution of the search",
         ),
     ),
     figures=(Figure(name="speed", title="Speed against time", draw=draw),),

@@ -9,7 +9,17 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
-from spook_tracker.scalar_tests import between_walls, falling_pile, overhang, pile, resting_box, seams
+from spook_tracker.scalar_tests import (
+    between_walls,
+    blow,
+    falling_pile,
+    overhang,
+    pile,
+    resting_ball,
+    resting_box,
+    seams,
+    sinking_sphere,
+)
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.inclined_plane import force_ratio, slip_angle
 from spook_tracker.scalar_tests.inclined_plane.scene import EDGE, FRICTION
@@ -60,6 +70,30 @@ def test_a_blow_grips_where_friction_may_stop_the_slip() -> None:
     low, high = band("between_walls", "smoothest")
     needed = w.ALONG / (1.0 + 1.0 / 0.4)  # per kg, I = 2/5 m r²
     assert low * 2.0 * w.UP == pytest.approx(needed) and high * 2.0 * w.UP > needed
+
+
+def test_a_ball_leaves_the_floor_rolling_where_the_bound_lets_its_slip_end() -> None:
+    """Impulses up N = (1 + e) u and along F ≤ µ N, per kg: v − F against r ω = 5/2 F."""
+    low, high = band("blow", "smoothest")
+    for friction, rolls in ((0.999 * low, False), (high, True)):
+        bound = friction * (1.0 + blow.RESTITUTION) * blow.FALL
+        assert (blow.SLIDE - bound <= 2.5 * bound) == rolls
+
+
+def test_a_sphere_sinks_while_it_is_heavier_than_what_it_displaces() -> None:
+    low, high = band("sinking_sphere", "lightest")
+    r = sinking_sphere.RADIUS
+    slices = np.linspace(-r, r, 200_001)
+    displaced = sinking_sphere.WATER * float(np.trapezoid(math.pi * (r * r - slices**2), slices))
+    volume = 4.0 / 3.0 * math.pi * r**3
+    assert high * volume > displaced > 0.9999 * low * volume
+
+
+def test_the_force_under_a_ball_knows_no_step() -> None:
+    r = resting_ball
+    assert band("resting_ball", "longest-step") == (r.LONGEST, r.LONGEST)
+    for h in np.geomspace(r.TIME_STEP, r.LONGEST, 50).tolist():
+        assert h * r.GRAVITY * r.MASS / h == pytest.approx(r.WEIGHT, rel=1e-15)
 
 
 def test_plates_stand_while_those_above_have_their_centre_inside_every_edge() -> None:

@@ -18,9 +18,12 @@ from spook_tracker.scalar_tests import (
     steady_turns,
 )
 from spook_tracker.scalar_tests.cantilever import stability as column
+from spook_tracker.scalar_tests.cantilever.scene import DENSITY, deflection
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.scalar_tests.measured import bar_pendulum, seconds_pendulum
 from spook_tracker.scalar_tests.oscillator import filter as low_pass
 from spook_tracker.scalar_tests.oscillator.scene import MASS, TIME_STEP, stiffness_of_period
+from spook_tracker.scalar_tests.planetarium import measure as planetarium
 
 
 def band(test: str, study: str) -> tuple[float, float]:
@@ -85,6 +88,97 @@ def test_a_body_spins_on_about_all_but_its_middle_axis() -> None:
     low, high = band("steady_turns", "smallest-moment")
     assert farthest(0.9999 * low) > steady_turns.GROWN > farthest(1.0002 * low)
     assert farthest(high) < 1.1 and farthest(steady_turns.MOMENTS[2]) < 1.1
+
+
+def test_a_spin_is_told_to_a_ten_thousandth_however_fast_it_is() -> None:
+    """A step's turn rounded in binary, and 180 of them added as angles: in units of 2^-53 of their size."""
+    s = steady_turns
+    assert band("steady_turns", "fastest") == (s.FASTEST, s.FASTEST)
+    steps = round(s.DURATION / s.TIME_STEP)
+    assert 4.0 * steps * 2.0**-53 * s.FASTEST * s.TIME_STEP < 0.1 * s.RIGHT
+
+
+def over_the_top(rate: float, speed: float) -> bool:
+    """Whether a pendulum of that small rate [rad/s], hanging and pushed [rad/s], goes over: φ'' = −ω² sin φ, integrated."""
+
+    def upright(_: float, state: np.ndarray) -> float:
+        return float(state[0] - math.pi)
+
+    upright.terminal = True  # type: ignore[attr-defined]
+    found = solve_ivp(
+        lambda _, state: (state[1], -(rate**2) * math.sin(state[0])),
+        (0.0, 40.0 / rate),
+        (0.0, speed),
+        "DOP853",
+        events=upright,
+        rtol=1e-10,
+        atol=1e-12,
+    )
+    return len(found.t_events[0]) > 0
+
+
+@pytest.mark.parametrize(
+    ("test", "rate", "lever"),
+    [
+        ("bar_pendulum", bar_pendulum.RATE, 1.0),
+        (
+            "seconds_pendulum",
+            math.sqrt(seconds_pendulum.GRAVITY / seconds_pendulum.LENGTH),
+            seconds_pendulum.LENGTH,
+        ),
+    ],
+)
+def test_a_pushed_pendulum_goes_over_where_its_energy_is_that_of_standing(
+    test: str, rate: float, lever: float
+) -> None:
+    low, high = band(test, "hardest-push")
+    assert not over_the_top(rate, low / lever) and over_the_top(rate, 1.0001 * high / lever)
+
+
+def test_a_planet_turns_back_as_kepler_has_it() -> None:
+    p = planetarium
+    low, high = band("planetarium", "fastest")
+
+    def leaving(times: float) -> bool:
+        """Whether it is still on its way out after ten rounds of the circle: r'' = −k²/r² + L²/r³, integrated."""
+        end = p.YEARS * 2.0 * math.pi  # in units of 1/k and 1 m
+        found = solve_ivp(
+            lambda _, y: (y[1], -1.0 / y[0] ** 2 + times**2 / y[0] ** 3),
+            (0.0, end),
+            (1.0, 0.0),
+            "DOP853",
+            rtol=1e-11,
+            atol=1e-12,
+        )
+        return bool(found.y[1, -1] > 0.0)
+
+    assert not leaving(low) and leaving(high) and high < math.sqrt(2.0)
+
+
+def test_a_beam_rings_in_steps_beyond_its_damping_time() -> None:
+    """Ten pieces as lumps on the beam's stiffness: every mode by the map of its own row, from the static shape."""
+    c = column
+    low, high = band("cantilever", "longest-step")
+    x = (np.arange(c.COUNT) + 0.5) * c.PIECE
+    near, far = np.minimum.outer(x, x), np.maximum.outer(x, x)
+    gives = near**2 * (3.0 * far - near) / (6.0 * c.STIFFNESS)  # m/N, Euler and Bernoulli
+    mass = DENSITY * c.PIECE
+    rates, shapes = np.linalg.eigh(np.linalg.inv(gives) / mass)
+    still = deflection(x)
+    parts = shapes.T @ still
+
+    def left(h: float) -> float:
+        found = []
+        for n in range(c.STEPS - 4, c.STEPS + 1):
+            kept = [
+                np.linalg.matrix_power(one_row_matrix(1.0, 1.0 / rate, c.DAMPING, h), n)[0, 0]
+                for rate in rates.tolist()
+            ]
+            found.append(abs(float(shapes[-1] @ (parts * kept)) / still[-1]))
+        return max(found)
+
+    assert math.sqrt(rates[0]) == pytest.approx(c.FIRST_RATE, rel=0.01)
+    assert left(low) < c.LEFT < left(high)
 
 
 def test_a_motor_bears_the_torque_that_it_is_allowed() -> None:

@@ -123,12 +123,17 @@ def ladder(
 
 
 def breaks_at(
-    right: float, searched: float, study: Callable[[Simulate], BreakPoint], source: str, **rest: Any
+    right: float,
+    searched: float,
+    study: Callable[[Simulate], BreakPoint],
+    source: str,
+    configuration: str = "plain",
+    **rest: Any,
 ) -> tuple[StabilityStudy, ...]:
-    """A break point of plain SPOOK at `right`, by theory; a search to a relative `searched` ends that far short of it."""
+    """A break point at `right`, by theory; a search to a relative `searched` ends that far short of it."""
     return (
         StabilityStudy(
-            configuration="plain",
+            configuration=configuration,
             study=study,
             expected=((1.0 - 1.1 * searched) * right, right),
             expected_source=f"{source}; the search ends {100.0 * searched:.1g} % short of it at most",

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -38,6 +40,9 @@ from spook_tracker.scalar_tests.planetarium.scene import (
 )
 
 PERIOD_STEPS = round(PERIOD / TIME_STEP)
+YEARS = 10.0  # rounds of the circle at 1 m, within which a fast planet is to turn back
+# Half a round of a = 1/(2 − s²) takes them: ½ a^(3/2) = YEARS
+FASTEST = math.sqrt(2.0 - (2.0 * YEARS) ** (-2.0 / 3.0))  # times the circle's speed, 1.365; √2 never does
 
 ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")
 
@@ -140,3 +145,19 @@ def largest_step(simulate: Simulate) -> BreakPoint:
         return float(distance.min()) >= 0.5 and float(distance.max()) <= 2.0 and swing <= 0.1
 
     return break_point(holds, 0.5, 200.0, resolution=0.005)
+
+
+def turns_back(simulate: Simulate, times: float) -> bool:
+    """Whether a planet that starts across its radius, so many times as fast as on a circle, is past its farthest place after
+    YEARS rounds of that circle."""
+    planet = replace(scene().bodies[0], velocity=(0.0, times * GAUSS, 0.0))
+    observe = {"planet": Trace(quantity=Position("planet"))}
+    steps = round(YEARS * 2.0 * math.pi / GAUSS)
+    result = simulate(replace(scene(), bodies=(planet,)), time_step=1.0, steps=steps, observe=observe)
+    distance = np.linalg.norm(result["planet"], axis=1)
+    return result.completed and float(distance[-1]) < float(distance.max())
+
+
+def fastest(simulate: Simulate) -> BreakPoint:
+    """The fastest planet, over the circle's speed, that turns back in time."""
+    return break_point(functools.partial(turns_back, simulate), 1.05, 1.6, resolution=5e-4, walk=6)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from spook_tracker.scalar_tests.case import Example, ScalarTest, StabilityStudy
 from spook_tracker.scalar_tests.planetarium.figures import FIGURES
-from spook_tracker.scalar_tests.planetarium.measure import OBSERVE, largest_step
+from spook_tracker.scalar_tests.planetarium.measure import FASTEST, OBSERVE, fastest, largest_step
 from spook_tracker.scalar_tests.planetarium.metrics import LADDERS, MEASUREMENTS
 from spook_tracker.scalar_tests.planetarium.scene import TIME_STEP, scene
 
@@ -53,6 +53,17 @@ TEST = ScalarTest(
             unit="s",
             expected=(15.8, 19.0),
             expected_source="the start, half a step off, adds h k/2 to the eccentricity ξ, so the energy swings by 2 h k (ξ + h k/2): 10 % at h = 17.4 s; the next order is (h k)² = 9 % of it",
+        ),
+        StabilityStudy(
+            name="fastest",
+            title="Fastest planet, over a circle's speed, that turns back within ten years",
+            configuration="plain",
+            definition="it starts across its radius, and after ten rounds of the circle it has been farther; h = 1 s",
+            study=fastest,
+            unit="1",
+            expected=(0.999 * FASTEST, 1.0002 * FASTEST),
+            expected_source="Kepler: half a round of a = 1/(2 − s²) takes ½ a^(3/2) years, ten at s = 1.365; (h k)² = 3e-4 moves a "
+            "start, the search ends 5e-4 short",
         ),
     ),
 )
