@@ -20,6 +20,7 @@ from spook_tracker.engine import (
     Method,
     Momentum,
     Plane,
+    Position,
     RigidBody,
     Scene,
     Sphere,
@@ -282,3 +283,51 @@ def test_successive_impacts_come_in_the_order_of_their_times(seed: int, ends: in
     assert np.abs(run["v"][:, 0] - after).max() < 1e-6 * np.abs(speeds).max()
     assert np.abs(run["p"] - run["p"][0]).max() < 1e-12 * (masses @ np.abs(speeds))
     assert np.ptp(run["energy"]) < 1e-12 * run["energy"][0]
+
+
+@pytest.mark.parametrize("solver", ["direct", "iterative", "hybrid"])
+@pytest.mark.parametrize("shape", [Plane(), Box((50.0, 50.0, 1.0))], ids=["planes", "boxes"])
+@pytest.mark.parametrize("blows", [1, 2, 3, 6, 12])
+def test_friction_turns_what_rebounds_about_its_own_surface_wherever_the_step_began(
+    blows: int, shape: Plane | Box, solver: str
+) -> None:
+    """A gripping ball flies from the middle of a room to its middle: so many walls within one step, and the same speeds and
+    place as by impulses. The lever is its radius, not the half gap of the step's start more."""
+    rubber, deep = Material(friction=5.0, restitution=1.0), 0.5 if isinstance(shape, Box) else 0.0
+    walls = [
+        RigidBody(
+            name=name,
+            motion="static",
+            shape=Plane((0.0, 0.0, up)) if isinstance(shape, Plane) else shape,
+            position=(0.0, 0.0, z - up * deep),
+            material=rubber,
+        )
+        for name, up, z in (("floor", 1.0, 0.0), ("ceiling", -1.0, 1.0))
+    ]
+    thrown = RigidBody(
+        name="ball",
+        mass=1.0,
+        shape=Sphere(0.1),
+        position=(0.0, 0.0, 0.5),
+        velocity=(3.0, 0.0, -4.0),
+        material=rubber,
+    )
+    result = simulate(
+        Scene(bodies=(*walls, thrown)),
+        time_step=0.2 * blows,
+        steps=1,
+        method=Method(solver=solver),  # type: ignore[arg-type]
+        observe={
+            "v": Final(quantity=Velocity("ball")),
+            "w": Final(quantity=AngularVelocity("ball")),
+            "x": Final(quantity=Position("ball")),
+        },
+    )
+    along, way = 3.0, 0.3  # m/s, and half a flight of 0.2 s, m
+    for blow in range(blows):
+        along *= 5.0 / 7.0 if blow == 0 else 3.0 / 7.0
+        way += 0.2 * along * (0.5 if blow == blows - 1 else 1.0)
+    side = 1.0 if blows % 2 else -1.0
+    assert result["v"] == pytest.approx([along, 0.0, 4.0 * side], abs=1e-12)
+    assert result["w"] == pytest.approx([0.0, side * along / 0.1, 0.0], abs=1e-11)
+    assert result["x"] == pytest.approx([way, 0.0, 0.5], abs=1e-12)

@@ -15,6 +15,16 @@ namespace {
 
 using namespace tolerances::impact_search;
 
+/// An open point lies midway between both surfaces. Beside a body that does not move it will be closed on the surface of the one
+/// that does: a rebound's friction turns it about that arm, and no angular momentum of a pair has to be kept.
+void put_on_mover(StepContact& point, bool first_moves, bool second_moves) noexcept {
+    if (first_moves == second_moves) return;
+    const Vec3 aside = (first_moves ? 0.5 : -0.5) * point.contact.point.gap * point.contact.point.normal;
+    point.contact.point.position += aside;
+    point.first_arm += aside;
+    point.second_arm += aside;
+}
+
 }  // namespace
 
 /// When an open pair that does not surely pass meets along `velocity`, s; negative if it does not in this step.
@@ -237,6 +247,9 @@ void ContactStage::move_impacts_to_start(std::size_t from, const std::vector<Vec
             scratch_.clear();
         for (const Contact& contact : scratch_) {
             add_point(contact, poses_[contact.first], poses_[contact.second], toi);
+            if (material(contact).restitution > 0.0)
+                put_on_mover(points_.back(), solver_index_[contact.first] >= 0,
+                             solver_index_[contact.second] >= 0);
             stops =
                 stops ||
                 contact.point.gap + h * relative(points_.back(), contact.point.normal, velocity, false) < 0.0;
