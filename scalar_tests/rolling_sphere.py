@@ -40,6 +40,7 @@ MASS = 1.0  # kg
 GRAVITY = 10.0  # m/s²
 FRICTION = 0.2
 TIME_STEP = 1.0 / 60.0  # s
+LONGEST = 100.0  # s, where the search for the longest step ends
 STEPS = 120
 LADDER_DURATION = 2.0  # s
 ROLLING, SLIDING = 0.4, 1.0  # tan θ; a solid sphere rolls up to 3.5 µ = 0.7
@@ -97,6 +98,21 @@ def steepest_rolled(simulate: Simulate) -> BreakPoint:
         return abs(speed - RADIUS * float(result["w"][1])) <= 1e-9 * speed
 
     return break_point(rolls, 0.1, 2.0, resolution=0.002, walk=8)
+
+
+def longest_step(simulate: Simulate) -> BreakPoint:
+    """The longest step [s] in which the sphere rolls and slides as it should."""
+
+    def right(time_step: float) -> bool:
+        off = []
+        for slope in (ROLLING, SLIDING):
+            observe = {"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))}
+            result = simulate(scene(slope), time_step=time_step, steps=10, observe=observe)
+            linear, angular = (10.0 * time_step * rate for rate in accelerations(slope))
+            off += [float(result["v"][0]) / linear - 1.0, float(result["w"][1]) / angular - 1.0]
+        return max(map(abs, off)) < 1e-9
+
+    return break_point(right, TIME_STEP, LONGEST, walk=6)
 
 
 def _draw(simulate: Simulate) -> Drawing:
@@ -219,6 +235,17 @@ TEST = ScalarTest(
             unit="1",
             expected=(0.998 * 3.5 * FRICTION, 3.5 * FRICTION),
             expected_source="7/2 µ, to the resolution of the search",
+        ),
+        StabilityStudy(
+            name="longest-step",
+            title="Longest step in which a sphere rolls and slides as it should",
+            configuration="cone",
+            definition="speed and spin after ten steps right to 1e-9, at tan θ = 0.4 and 1",
+            study=longest_step,
+            unit="s",
+            expected=(LONGEST, LONGEST),
+            expected_source="accelerations are constant, and the speeds of steps that add them exact, however far it turns in one; "
+            "the search ends at 100 s",
         ),
     ),
 )

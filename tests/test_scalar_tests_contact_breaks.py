@@ -17,12 +17,15 @@ from spook_tracker.scalar_tests import (
     pile,
     resting_ball,
     resting_box,
+    rolling_sphere,
     seams,
     sinking_sphere,
 )
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.inclined_plane import force_ratio, slip_angle
+from spook_tracker.scalar_tests.inclined_plane import friction as plane
 from spook_tracker.scalar_tests.inclined_plane.scene import EDGE, FRICTION
+from spook_tracker.scalar_tests.measured import oblique_impact
 
 
 def band(test: str, study: str) -> tuple[float, float]:
@@ -56,12 +59,43 @@ def test_a_rough_cube_stands_while_its_weight_points_between_its_edges() -> None
 def test_coulombs_law_knows_neither_step_nor_mass(time_step: Fraction, mass: Fraction) -> None:
     """A step in fractions: what friction may take, µ N h/m, over what gravity gives, g h sin θ."""
     assert band("slip_angle", "longest-step") == (slip_angle.LONGEST,) * 2
+    assert band("friction", "longest-step") == (plane.LONGEST,) * 2
     assert band("force_ratio", "heaviest") == (force_ratio.HEAVIEST,) * 2
     for slope in (Fraction(3, 10), Fraction(7, 10)):
         normal, along = time_step * mass, time_step * mass * slope  # N s, in g cos θ
-        friction = min(along, Fraction(FRICTION) * normal)
-        assert friction / normal == min(slope, Fraction(FRICTION))
-        assert (along == friction) == (slope < FRICTION)
+        taken = min(along, Fraction(FRICTION) * normal)
+        assert taken / normal == min(slope, Fraction(FRICTION))
+        assert (along == taken) == (slope < FRICTION)
+
+
+@pytest.mark.parametrize("time_step", [Fraction(1, 60), Fraction(rolling_sphere.LONGEST)])
+def test_a_sphere_rolls_and_slides_alike_in_steps_of_any_length(time_step: Fraction) -> None:
+    """Ten steps in fractions, in g cos θ: friction stops the slip that it can, h (tan θ − f (1 + 5/2)) = 0, f at most µ."""
+    r = rolling_sphere
+    assert band("rolling_sphere", "longest-step") == (r.LONGEST, r.LONGEST)
+    for slope in (Fraction(r.ROLLING), Fraction(r.SLIDING)):
+        speed = turning = Fraction(0)  # of the centre, and r ω
+        for _ in range(10):
+            wanted = (speed + time_step * slope - turning) / (time_step * Fraction(7, 2))
+            friction = min(wanted, Fraction(r.FRICTION))
+            speed += time_step * (slope - friction)
+            turning += time_step * friction * Fraction(5, 2)
+        linear, angular = r.accelerations(float(slope))
+        scale = r.GRAVITY * math.cos(math.atan(float(slope))) * float(10 * time_step)
+        found = (float(speed / (10 * time_step)), float(turning / (10 * time_step)))
+        for one, right in zip(found, (linear, angular * r.RADIUS), strict=True):
+            assert one * scale == pytest.approx(right * float(10 * time_step), rel=1e-12)
+
+
+def test_a_ball_leaves_at_an_angle_that_knows_no_speed() -> None:
+    o = oblique_impact
+    low, high = band("oblique_impact", "fastest")
+    assert high == o.FASTEST and low < high
+    turn = math.radians(o.ANGLES[0])
+    for times in np.geomspace(1.0, o.FASTEST, 13).tolist():
+        along, up = times * o.SPEED * math.sin(turn), times * o.SPEED * math.cos(turn)
+        left = math.atan2(along - o.FRICTION * (1.0 + o.RESTITUTION) * up, o.RESTITUTION * up)
+        assert math.degrees(left) == pytest.approx(o.sliding(o.ANGLES[0])[0], rel=1e-13)
 
 
 def test_a_blow_grips_where_friction_may_stop_the_slip() -> None:

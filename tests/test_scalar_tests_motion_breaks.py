@@ -22,7 +22,7 @@ from spook_tracker.scalar_tests.cantilever.scene import DENSITY, deflection
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.measured import bar_pendulum, seconds_pendulum
 from spook_tracker.scalar_tests.oscillator import filter as low_pass
-from spook_tracker.scalar_tests.oscillator.scene import MASS, TIME_STEP, stiffness_of_period
+from spook_tracker.scalar_tests.oscillator.scene import MASS, START, TIME_STEP, stiffness_of_period
 from spook_tracker.scalar_tests.planetarium import measure as planetarium
 
 
@@ -68,6 +68,21 @@ def test_ten_steps_halve_the_period_that_the_map_of_a_row_says() -> None:
     end, _ = band("oscillator_filter", "stiffest")
     assert end == low_pass.SHORTEST
     assert remains(end) == pytest.approx(3.0**-low_pass.STEPS, rel=1e-6), "as stiff as can be"
+
+
+@pytest.mark.parametrize(
+    ("test", "study"), [("oscillator_spring", "softest-spring"), ("oscillator_row", "softest-row")]
+)
+def test_a_soft_spring_moves_a_mass_where_places_are_near_enough(test: str, study: str) -> None:
+    """One step of the spring's law and of the row's own map, added to a place of 53 bits."""
+    low, high = band(test, study)
+    for turn, moves in ((high, True), (1.0001 * low, True), (0.9999 * low, False)):
+        stiffness = MASS * (turn / TIME_STEP) ** 2
+        step = one_row_matrix(MASS, 1.0 / stiffness, 0.0, TIME_STEP)
+        speed = (
+            -TIME_STEP * stiffness / MASS * START if test.endswith("spring") else float(step[1, 0]) * START
+        )
+        assert (START + TIME_STEP * speed < START) == moves
 
 
 def farthest(moment: float) -> float:

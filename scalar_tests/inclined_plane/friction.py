@@ -42,6 +42,7 @@ from spook_tracker.scalar_tests.sweep import told
 DIRECTIONS = tuple(2.0 * math.pi * i / 36.0 for i in range(36))
 LADDER_DIRECTIONS = DIRECTIONS[:9:3] + DIRECTIONS[1:9:3]
 STILL = 1e-9  # m/s
+LONGEST = 1e3  # s, where the search for the longest step ends
 SLIDING = 0.6  # tan θ, above the friction coefficient
 STEEP, PRESSED = 0.8, 0.2  # tan θ; the share of the weight that goes as the last step begins
 
@@ -83,6 +84,21 @@ def steepest(simulate: Simulate) -> BreakPoint:
         return all(math.hypot(*map(float, run["velocity"])) < STILL for run in runs)
 
     return break_point(stands, 0.1, 2.0, resolution=0.0005, walk=8)
+
+
+def longest_step(simulate: Simulate) -> BreakPoint:
+    """The longest step [s] in which the box stands just below its angle and slides just above it, as Coulomb's law has it."""
+
+    def right(time_step: float) -> bool:
+        off = []
+        for slope in (0.99 * FRICTION, SLIDING):
+            observe = {"force": Final(quantity=ContactForce("box"))}
+            result = simulate(scene(slope), time_step=time_step, steps=10, method=CONE, observe=observe)
+            x, y, z = map(float, result["force"])
+            off.append(abs(math.hypot(x, y) / abs(z) - min(slope, FRICTION)))
+        return max(off) < 1e-9
+
+    return break_point(right, TIME_STEP, LONGEST, walk=6)
 
 
 def _draw_polar(slope: float) -> object:
@@ -316,6 +332,16 @@ TEST = ScalarTest(
             unit="1",
             expected=(0.9995 * FRICTION, FRICTION),
             expected_source="tan θ = µ, to the resolution of the search",
+        ),
+        StabilityStudy(
+            name="longest-step",
+            title="Longest step in which friction is Coulomb's",
+            configuration="cone",
+            definition="F_t/F_n = min(tan θ, µ) to 1e-9 after ten steps, at tan θ = 0.495 and 0.6",
+            study=longest_step,
+            unit="s",
+            expected=(LONGEST, LONGEST),
+            expected_source="gravity's impulse and those of the contact have the factor h alike; the search ends at 1000 s",
         ),
     ),
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from spook_tracker.engine import AngularVelocity, Final, Plane, RigidBody, Scene, Sphere, Velocity
 from spook_tracker.engine.bodies import Material
@@ -25,6 +26,7 @@ SECOND = ((30.29, 21.67), (39.535, 32.613), (49.747, 45.125), (60.208, 57.474)) 
 SIGMA = 0.1  # degrees: what the two, brought to the same angle, differ by
 STEEPEST_GRIP = math.degrees(math.atan(3.5 * (1.0 + RESTITUTION) * FRICTION / (1.0 + TURNED)))
 SEARCHED = 1e-3
+FASTEST = 1e6  # times the photographed speed, where the search ends
 ANGLES = tuple(0.5 * (a[0] + b[0]) for a, b in zip(FIRST, SECOND, strict=True))
 READINGS = tuple(
     Reading(at=f"rebound at {angle:.2f}°", value=0.5 * (a[1] + b[1]), sigma=SIGMA)
@@ -88,6 +90,24 @@ def steepest_grip(simulate: Simulate) -> BreakPoint:
     return break_point(grips, 10.0, 60.0, resolution=SEARCHED, walk=4)
 
 
+def fastest(simulate: Simulate) -> BreakPoint:
+    """How many times as fast the ball may come and still leave at the right angle."""
+
+    def right(times: float) -> bool:
+        angle = ANGLES[0]
+        built = scene(angle)
+        quick = tuple(
+            replace(body, velocity=(times * body.velocity[0], 0.0, times * body.velocity[2]))
+            for body in built.bodies
+        )
+        observe = {"v": Final(quantity=Velocity("ball"))}
+        result = simulate(replace(built, bodies=quick), time_step=TIME_STEP, steps=1, observe=observe)
+        found = math.degrees(math.atan2(float(result["v"][0]), float(result["v"][2])))
+        return result.completed and abs(found / sliding(angle)[0] - 1.0) < 1e-12
+
+    return break_point(right, 1.0, FASTEST, resolution=SEARCHED, walk=7)
+
+
 def _draw(simulate: Simulate) -> Drawing:
     angles = tuple(float(a) for a in range(2, 66, 3))
     return Drawing(
@@ -140,14 +160,26 @@ TEST = readings.measured_test(
     example=lambda: Example(scene=scene(ANGLES[0]), time_step=TIME_STEP, duration=0.01),
     figures=(Figure(name="rebound", title="Angle of rebound, simulated and measured", draw=_draw),),
     lacks={"ladder": "exact at every step"},
-    stability=readings.breaks_at(
-        STEEPEST_GRIP,
-        SEARCHED,
-        steepest_grip,
-        "tan α = ⁷⁄₂ (1 + e) µ/(1 + e_grip), Coulomb's bound",
-        name="steepest-grip",
-        title="Steepest impact at which the ball grips",
-        definition="its slip turns round by 0.41 to 1e-9",
-        unit="degrees",
+    stability=(
+        *readings.breaks_at(
+            STEEPEST_GRIP,
+            SEARCHED,
+            steepest_grip,
+            "tan α = ⁷⁄₂ (1 + e) µ/(1 + e_grip), Coulomb's bound",
+            name="steepest-grip",
+            title="Steepest impact at which the ball grips",
+            definition="its slip turns round by 0.41 to 1e-9",
+            unit="degrees",
+        ),
+        *readings.breaks_at(
+            FASTEST,
+            SEARCHED,
+            fastest,
+            "Coulomb's law and restitution know no speed: the angle stays as far as it is looked for, 3900 km/s",
+            name="fastest",
+            title="How many times as fast the ball may come",
+            definition="it leaves at the angle of sliding to 1e-12, 30.3° from the normal",
+            unit="1",
+        ),
     ),
 )

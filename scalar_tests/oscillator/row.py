@@ -31,7 +31,7 @@ from spook_tracker.scalar_tests.oscillator.scene import (
     traced,
 )
 from spook_tracker.scalar_tests.oscillator.spring import verlet
-from spook_tracker.scalar_tests.oscillator.stability import ROW_STUDY
+from spook_tracker.scalar_tests.oscillator.stability import ROW_STUDY, SOFT_ROW_STUDY
 from spook_tracker.scalar_tests.sweep import apart, line, told
 
 FAST_STIFFNESS = 400.0 / TIME_STEP**2  # N/m: (h ω)² = 400, a hundred times beyond Verlet's bound
@@ -276,7 +276,7 @@ TEST = ScalarTest(
         ),
         Figure(name="fast", title="Far beyond h ω = 2", draw=draw_fast, thesis="Fig 2.6"),
     ),
-    stability=(ROW_STUDY,),
+    stability=(ROW_STUDY, SOFT_ROW_STUDY),
     ladders=(
         Ladder(
             name="position",

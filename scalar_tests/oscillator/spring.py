@@ -26,7 +26,7 @@ from spook_tracker.scalar_tests.oscillator.scene import (
     spring_scene,
     traced,
 )
-from spook_tracker.scalar_tests.oscillator.stability import SPRING_STUDY
+from spook_tracker.scalar_tests.oscillator.stability import SOFT_SPRING_STUDY, SPRING_STUDY
 from spook_tracker.scalar_tests.sweep import apart, line
 
 ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")
@@ -131,7 +131,7 @@ TEST = ScalarTest(
     ),
     example=lambda: Example(scene=spring_scene(), time_step=TIME_STEP),
     figures=(Figure(name="position", title="Position against time", draw=draw, thesis="Fig 2.4"),),
-    stability=(SPRING_STUDY,),
+    stability=(SPRING_STUDY, SOFT_SPRING_STUDY),
     ladders=(
         Ladder(
             name="position",

@@ -28,6 +28,7 @@ MAP_STEPS = 8  # for growth rates
 CELL_STEPS = 200
 LONG_STEPS = 20_000
 AT_REST = 1e-6  # of the start
+SOFTEST = 2.0**-27  # h ω: (h ω)² START is half of what places below START are apart
 
 
 def stiffness_of(speed: float) -> float:
@@ -113,6 +114,27 @@ def largest_row(simulate: Simulate) -> BreakPoint:
     return _largest(simulate, False)
 
 
+def _softest(simulate: Simulate, spring: bool) -> BreakPoint:
+    observe: dict[str, Observable] = {"x": Trace(quantity=Position("mass"))}
+
+    def moves(speed: float) -> bool:
+        scene = spring_scene(stiffness_of(speed)) if spring else row_scene(stiffness_of(speed), 0.0)
+        result = simulate(scene, time_step=TIME_STEP, steps=1, observe=observe)
+        return result.completed and float(result["x"][1, 2]) < START
+
+    return break_point(moves, 0.1, 1e-12, resolution=1e-3, walk=5)
+
+
+def softest_spring(simulate: Simulate) -> BreakPoint:
+    """Smallest h ω of a spring force that moves the mass in its first step."""
+    return _softest(simulate, True)
+
+
+def softest_row(simulate: Simulate) -> BreakPoint:
+    """Smallest h ω of an undamped row that does."""
+    return _softest(simulate, False)
+
+
 BOUNDED = (
     "finite, and never beyond a hundred times the amplitude that the start holds by the method's invariant, in "
     "20 000 steps"
@@ -136,6 +158,24 @@ ROW_STUDY = StabilityStudy(
     unit="1",
     expected=(1e6, 1e8),
     expected_source="the undamped row is neutral at every h ω; the search ends at 1e8",
+)
+SOFT_SPRING_STUDY, SOFT_ROW_STUDY = (
+    StabilityStudy(
+        name=f"softest-{name}",
+        title=f"Smallest h ω of {told} that moves the mass in its first step",
+        configuration="plain",
+        definition="after a step from 2 m it is nearer to rest",
+        study=study,
+        unit="1",
+        better="smaller",
+        expected=(SOFTEST, 1.001 * SOFTEST),
+        expected_source="the first step moves it by (h ω)² x; places just below 2 m are 2^-52 m apart, and half of that is lost: "
+        "2^-53 = (h ω)² · 2 m at h ω = 2^-27; to the resolution of the search",
+    )
+    for name, told, study in (
+        ("spring", "a spring that is a plain force", softest_spring),
+        ("row", "an undamped distance row", softest_row),
+    )
 )
 MAP_STUDY = StabilityStudy(
     name="growth-map",
