@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import numpy as np
 
 from spook_tracker.engine import Final, Method, RigidBody, Scene, Sphere, Trace, Velocity
@@ -25,6 +27,7 @@ SPEED = 1.0  # m/s
 WAY = 0.1037  # m, to the first blow
 DURATION = 0.5  # s
 COUNT = 5
+CLOSED = 1e-9 * RADIUS  # m: gaps up to a billionth of the larger radius count as closed
 SUCCESSIVE = Method(impacts="successive")
 
 
@@ -107,6 +110,17 @@ def most_unequal(simulate: Simulate) -> BreakPoint:
     return break_point(passes, 1.5, 1e6, resolution=0.1, walk=7)
 
 
+def tells_gaps(simulate: Simulate, gap: float) -> bool:
+    """Whether balls `gap` [m] apart pass a blow on one after the other, though touching ones meet at once."""
+    found = speeds(simulate, scene(1, gap=gap), Method())
+    return float(np.abs(found - passed_on(1, 1.0)).max()) < 1e-9
+
+
+def narrowest(simulate: Simulate) -> BreakPoint:
+    """The narrowest gap [m] that is told from none."""
+    return break_point(functools.partial(tells_gaps, simulate), 1e-3, 1e-14, resolution=1e-2, walk=12)
+
+
 def _draw(simulate: Simulate) -> Drawing:
     curves = []
     for name, method in (("successive", SUCCESSIVE), ("simultaneous", Method())):
@@ -179,6 +193,18 @@ TEST = ScalarTest(
             unit="1",
             expected=(1e6, 1e6),
             expected_source="a blow of two bodies is one row: rounding does not grow with the ratio; the search ends at 1e6",
+        ),
+        StabilityStudy(
+            name="narrowest",
+            title="Narrowest gap between balls that is told from none",
+            configuration="simultaneous",
+            definition="speeds of one blow after the other, right to 1e-9 m/s",
+            study=narrowest,
+            unit="m",
+            better="smaller",
+            expected=(CLOSED, 1.02 * CLOSED),
+            expected_source="the method's own: gaps up to 1e-9 of a radius count as closed, and closed ones meet at once; to the "
+            "resolution of the search",
         ),
     ),
 )

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
+import re
 from fractions import Fraction
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,6 +14,7 @@ from scipy.optimize import linprog
 from spook_tracker.scalar_tests import (
     between_walls,
     blow,
+    cradle,
     falling_pile,
     overhang,
     pile,
@@ -26,6 +29,8 @@ from spook_tracker.scalar_tests.inclined_plane import force_ratio, slip_angle
 from spook_tracker.scalar_tests.inclined_plane import friction as plane
 from spook_tracker.scalar_tests.inclined_plane.scene import EDGE, FRICTION
 from spook_tracker.scalar_tests.measured import oblique_impact
+
+TOLERANCES = Path(__file__).parent.parent / "engine/native/src/contacts/tolerances.hpp"
 
 
 def band(test: str, study: str) -> tuple[float, float]:
@@ -112,6 +117,14 @@ def test_a_ball_leaves_the_floor_rolling_where_the_bound_lets_its_slip_end() -> 
     for friction, rolls in ((0.999 * low, False), (high, True)):
         bound = friction * (1.0 + blow.RESTITUTION) * blow.FALL
         assert (blow.SLIDE - bound <= 2.5 * bound) == rolls
+
+
+def test_balls_touch_up_to_the_gap_that_the_core_calls_closed() -> None:
+    low, high = band("cradle", "narrowest")
+    (closed,) = re.findall(r"inline constexpr double closed = (\S+);", TOLERANCES.read_text())
+    assert low < 1.001 * float(closed) * cradle.RADIUS < high
+    apart = np.abs(cradle.passed_on(1, 1.0) - cradle.all_at_once(1)).max()
+    assert apart > 0.1, "the two answers are far from each other"
 
 
 def test_a_sphere_sinks_while_it_is_heavier_than_what_it_displaces() -> None:

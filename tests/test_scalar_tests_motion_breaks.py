@@ -15,6 +15,7 @@ from spook_tracker.scalar_tests import (
     falling_object,
     lock_ring,
     motor,
+    rotating_box,
     steady_turns,
 )
 from spook_tracker.scalar_tests.cantilever import stability as column
@@ -194,6 +195,25 @@ def test_a_beam_rings_in_steps_beyond_its_damping_time() -> None:
 
     assert math.sqrt(rates[0]) == pytest.approx(c.FIRST_RATE, rel=0.01)
     assert left(low) < c.LEFT < left(high)
+
+
+def turned_over(nudge: float) -> bool:
+    """Whether the spin about the middle axis is none within the time of the study: Euler's equations, integrated."""
+    inertia = np.array(rotating_box.INERTIA)
+    found = solve_ivp(
+        lambda _, w: -np.cross(w, inertia * w) / inertia,
+        (0.0, rotating_box.PATIENCE),
+        (nudge, 1.0, 0.0),
+        "DOP853",
+        rtol=1e-12,
+        atol=1e-16,
+    )
+    return bool(found.y[1].min() < 0.0)
+
+
+def test_a_nudge_turns_a_spin_about_the_middle_axis_over_when_jacobi_says() -> None:
+    low, high = band("rotating_box", "gentlest")
+    assert turned_over(high) and not turned_over(low)
 
 
 def test_a_motor_bears_the_torque_that_it_is_allowed() -> None:
