@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 
@@ -51,6 +52,7 @@ INERTIA = {"sun": 0.02, "carrier": 0.4, "planet": 0.05}  # kg m²
 PLANET_MASS = 0.5  # kg
 ORBIT = 0.5 * MODULE * (SUN + PLANET)  # m, from the sun's axle to the planet's
 TORQUE = 2.0  # N m on the sun
+HEAVIEST = 1e12  # kg m², where the search for the heaviest carrier ends
 TIME_STEP = 1.0 / 60.0  # s
 DURATION = 10.0  # s
 SPEED = 6.0  # rad/s of the driven sun
@@ -157,6 +159,26 @@ def fastest(simulate: Simulate) -> BreakPoint:
     return break_point(
         functools.partial(follows, simulate), 0.3 / TIME_STEP, 30.0 / TIME_STEP, resolution=1e-3
     )
+
+
+def starts_right(simulate: Simulate, carrier: float) -> bool:
+    """Whether a set with so heavy a carrier [kg m²] starts with the acceleration of its reduced inertia, to 1e-9."""
+    built = planetary(TORQUE)
+    bodies = tuple(
+        replace(body, inertia=(carrier,) * 3)
+        if body.name == "carrier" and isinstance(body, RigidBody)
+        else body
+        for body in built.bodies
+    )
+    observe = {"w": Final(quantity=AngularVelocity("carrier"))}
+    result = simulate(replace(built, bodies=bodies), time_step=TIME_STEP, steps=1, observe=observe)
+    right = TIME_STEP * TORQUE * RATIO / (reduced_inertia() - INERTIA["carrier"] + carrier)
+    return result.completed and abs(float(result["w"][2]) / right - 1.0) < 1e-9
+
+
+def heaviest_carrier(simulate: Simulate) -> BreakPoint:
+    """The heaviest carrier [kg m²] with which the set starts as it should."""
+    return break_point(functools.partial(starts_right, simulate), INERTIA["carrier"], HEAVIEST, walk=8)
 
 
 def start_up(simulate: Simulate) -> dict[str, float]:
@@ -306,6 +328,17 @@ TEST = ScalarTest(
             expected=(0.999 * RATIO / TIME_STEP, RATIO / TIME_STEP),
             expected_source="wheels turn exactly; a planet's way is along its tangent, and its joint takes it back to the "
             "orbit up to h ω = 1 of the carrier",
+        ),
+        StabilityStudy(
+            name="heaviest-carrier",
+            title="Heaviest carrier with which the set starts as it should",
+            configuration="plain",
+            definition="angular acceleration of the first step T i/J to 1e-9, J reduced to the carrier",
+            study=heaviest_carrier,
+            unit="kg m²",
+            expected=(HEAVIEST, HEAVIEST),
+            expected_source="what meshes with a heavy carrier is held to it by light wheels' rows, none of which becomes small; the "
+            "search ends at 1e12 kg m²",
         ),
     ),
     ladders=(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -41,6 +42,7 @@ FRICTION = 0.5
 ROLLING, TORSIONAL = 0.004, 0.002  # m
 RADIUS, MASS = 0.1, 2.0  # m, kg
 SPEED, SPIN = 0.5, 6.0  # m/s, rad/s
+LONGEST = 1e3  # s, where the search for the longest step ends
 TIME_STEP = 1.0 / 60.0  # s
 AWAY = math.radians(35.0)  # direction of the ball's way
 BRAKE = 5.0 / 7.0 * ROLLING / RADIUS * GRAVITY  # m/s²
@@ -116,6 +118,21 @@ def steepest(simulate: Simulate) -> BreakPoint:
     """The steepest slope it stands on."""
     top = ROLLING / RADIUS
     return break_point(lambda slope: stands(simulate, slope), 0.2 * top, 5.0 * top, resolution=1e-3)
+
+
+def slows(simulate: Simulate, time_step: float) -> bool:
+    """Whether a ball loses its speed by (5/7) ρ g t/r, and spins no more, in three steps so long [s]."""
+    observe = {"v": Trace(quantity=Velocity("ball")), "w": Trace(quantity=AngularVelocity("ball"))}
+    result = simulate(scene(spin=SPIN), time_step=time_step, steps=3, observe=observe)
+    times = time_step * np.arange(4)
+    slow = np.hypot(result["v"][:, 0], result["v"][:, 1]) - np.maximum(0.0, SPEED - BRAKE * times)
+    spun = RADIUS * (result["w"][:, 2] - np.maximum(0.0, SPIN - SLOWING * times))
+    return result.completed and float(np.abs((slow, spun)).max()) < 1e-9
+
+
+def longest_step(simulate: Simulate) -> BreakPoint:
+    """The longest step [s] in which it slows down as it should."""
+    return break_point(functools.partial(slows, simulate), TIME_STEP, LONGEST, walk=6)
 
 
 def draw(simulate: Simulate) -> Drawing:
@@ -200,6 +217,16 @@ TEST = ScalarTest(
             unit="1",
             expected=(0.998 * ROLLING / RADIUS, 1.002 * ROLLING / RADIUS),
             expected_source="tan θ = ρ/r = 0.04, to the resolution of the search",
+        ),
+        StabilityStudy(
+            name="longest-step",
+            title="Longest step in which a ball is slowed by rolling and torsional friction",
+            configuration="plain",
+            definition="speed and r ω about the normal as by constant torques until they are none, to 1e-9 m/s, in three steps",
+            study=longest_step,
+            unit="s",
+            expected=(LONGEST, LONGEST),
+            expected_source="a torque's impulse has the factor h, and no more is taken than there is; the search ends at 1000 s",
         ),
     ),
     figures=(Figure(name="speed", title="Speed against time", draw=draw),),

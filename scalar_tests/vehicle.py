@@ -51,6 +51,7 @@ FRICTION = 0.7
 COMPLIANCE = 1e-10  # m/N a point: with none the loads of eight points on four wheels are not unique
 SLOPE = 0.1  # tan θ
 SPEED = 10.0  # m/s, before braking
+LONGEST = 10.0  # s, where the search for the longest step ends
 TIME_STEP = 1.0 / 60.0  # s
 DURATION = 1.0  # s
 MASS = CHASSIS + 4.0 * WHEEL
@@ -187,6 +188,20 @@ def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
 TIPPING = (
     (CHASSIS * FRONT + 2.0 * WHEEL * (FRONT + REAR)) / FRICTION - 4.0 * WHEEL * RADIUS
 ) / CHASSIS - RADIUS  # m
+
+
+def rolls(simulate: Simulate, time_step: float) -> bool:
+    """Whether the vehicle rolls down the slope by a t, to a millionth, after ten steps so long [s]."""
+    observe = {"v": Final(quantity=Velocity("chassis")), "w": Final(quantity=AngularVelocity("front left"))}
+    result = simulate(scene(SLOPE), time_step=time_step, steps=10, observe=observe)
+    speed = 10.0 * time_step * ROLLING
+    off = (float(result["v"][0]) / speed, RADIUS * float(result["w"][1]) / speed)
+    return result.completed and max(abs(one - 1.0) for one in off) < 1e-6
+
+
+def longest_step(simulate: Simulate) -> BreakPoint:
+    """The longest step [s] in which the vehicle rolls as it should."""
+    return break_point(functools.partial(rolls, simulate), TIME_STEP, LONGEST, walk=5)
 
 
 def stays_down(simulate: Simulate, rise: float) -> bool:
@@ -341,6 +356,17 @@ TEST = ScalarTest(
             expected=(0.99 * TIPPING, 1.005 * TIPPING),
             expected_source="the front wheels carry all at a rise of 1.577 m over the axles; a millionth of a metre is "
             "lifted in a quarter of a second by half a per cent more",
+        ),
+        StabilityStudy(
+            name="longest-step",
+            title="Longest step in which the vehicle rolls as it should",
+            configuration="plain",
+            definition="speed of chassis and wheels a t after ten steps, to a millionth",
+            study=longest_step,
+            unit="s",
+            expected=(LONGEST, LONGEST),
+            expected_source="a constant acceleration is exact in every step, and a wheel turns by h ω about its axle however far; the "
+            "search ends at 10 s",
         ),
     ),
     figures=(Figure(name="speed", title="Speed against time", draw=draw),),

@@ -16,13 +16,16 @@ from spook_tracker.scalar_tests import (
     blow,
     cradle,
     falling_pile,
+    gears,
     overhang,
     pile,
     resting_ball,
     resting_box,
+    rolling_friction,
     rolling_sphere,
     seams,
     sinking_sphere,
+    vehicle,
 )
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.inclined_plane import force_ratio, slip_angle
@@ -231,3 +234,36 @@ def test_ends_of_searches_are_on_the_floor_and_beyond_all_sizes() -> None:
     assert math.hypot(*s.SPEED) * s.LONGEST > 10.0 * s.CELL
     assert band("falling_pile", "fastest") == (f.FASTEST, f.FASTEST)
     assert f.FASTEST * f.TIME_STEP > 50.0 * (0.6 + 3.0 * f.APART)
+
+
+@pytest.mark.parametrize("time_step", [vehicle.TIME_STEP, vehicle.LONGEST])
+def test_a_vehicle_rolls_by_its_energy_whatever_the_step(time_step: float) -> None:
+    """What ten steps of a constant pull give, and by the work done: ½ (M + 4 J/r²) v² = M g sin θ · way of a fall in between."""
+    assert band("vehicle", "longest-step") == (vehicle.LONGEST, vehicle.LONGEST)
+    pull = vehicle.MASS * vehicle.GRAVITY * math.sin(math.atan(vehicle.SLOPE))
+    moving = vehicle.MASS + 4.0 * vehicle.INERTIA / vehicle.RADIUS**2
+    speed = 10.0 * time_step * vehicle.ROLLING
+    way = 0.5 * speed * 10.0 * time_step
+    assert 0.5 * moving * speed**2 == pytest.approx(pull * way, rel=1e-12)
+
+
+def test_friction_at_rolling_takes_no_more_than_there_is_in_any_step() -> None:
+    """Three steps in fractions: the ball's law is m v' = −F, ⅖ m r² ω' = F r − ρ N while it rolls, so v' = −(5/7) ρ g/r."""
+    r = rolling_friction
+    assert band("rolling_friction", "longest-step") == (r.LONGEST, r.LONGEST)
+    ratio = Fraction(r.ROLLING) / Fraction(r.RADIUS)
+    for h in (Fraction(1, 60), Fraction(r.LONGEST)):
+        speed = Fraction(r.SPEED)
+        for _ in range(3):
+            speed = max(Fraction(0), speed - h * Fraction(5, 7) * ratio * Fraction(r.GRAVITY))
+        assert float(speed) == pytest.approx(max(0.0, r.SPEED - 3.0 * float(h) * r.BRAKE), abs=1e-12)
+
+
+def test_a_heavy_carrier_starts_by_the_energy_of_all_its_wheels() -> None:
+    """Speeds of sun and planet by Willis for one of the carrier; twice the energy is the inertia at the carrier."""
+    g = gears
+    assert band("gears", "heaviest-carrier") == (g.HEAVIEST, g.HEAVIEST)
+    sun, planet = 1.0 + g.RING / g.SUN, 1.0 - g.RING / g.PLANET
+    inertia = g.INERTIA["sun"] * sun**2 + g.INERTIA["planet"] * planet**2 + g.PLANET_MASS * g.ORBIT**2
+    assert g.reduced_inertia() == pytest.approx(inertia + g.INERTIA["carrier"], rel=1e-14)
+    assert inertia / g.HEAVIEST > 2.0**-52, "the light wheels are still there in a sum of doubles"
