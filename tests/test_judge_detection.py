@@ -47,6 +47,50 @@ def test_a_machine_that_moves_is_silent_once_the_calibration_kernel_sees_it_move
     assert alarms <= 2  # of 2000 values; without the kernel there are more
 
 
+def test_a_level_that_wanders_raises_no_more_alarms_than_the_judge_ever_did() -> None:
+    """Twenty in 10 000 values; thirty-one where a rise is held to the noise of one night to the next alone."""
+    walks = [battery.machine("a walk of .3 % a night", series, 560)[0] for series in range(20)]
+
+    assert sum(battery.starts(red(seconds)) for seconds in walks) <= 20
+
+
+def test_a_step_on_a_level_that_wanders_is_found() -> None:
+    """5 % after two hundred nights, told within twenty."""
+    found = 0
+    for series in range(40):
+        seconds = battery.machine("a walk of .3 % a night", 500 + series, 220)[0]
+        seconds[200:] *= 1.05
+        found += any(red(seconds)[200:])
+
+    assert found >= 30
+
+
+@pytest.mark.parametrize(("ramp", "nights", "flat"), [(-0.2, 200, 60), (-0.05, 100, 30)])
+def test_a_series_that_became_faster_little_by_little_is_no_blinder(
+    ramp: float, nights: int, flat: int
+) -> None:
+    """Then flat for a month or two, then 3 % slower, at 1 % noise."""
+    found = 0
+    for series in range(20):
+        faster = 1.0 + ramp * np.arange(nights) / nights
+        levels = np.concatenate([faster, np.full(flat, 1.0 + ramp), np.full(20, 1.03 * (1.0 + ramp))])
+        told = red(levels * (1.0 + 0.01 * np.random.default_rng(series).standard_normal(len(levels))))
+        found += any(told[-20:])
+
+    assert found >= 17
+
+
+def test_steps_that_were_told_make_a_series_no_blinder_to_the_next() -> None:
+    """Three of 10 % for the worse, mended each, thirty nights apart; sixty flat nights; then 3 %, at 1 % noise."""
+    found = 0
+    for series in range(10):
+        levels = np.repeat([1.0, 1.1, 1.0, 1.1, 1.0, 1.1, 1.0, 1.0, 1.03], 30)
+        told = red(levels * (1.0 + 0.01 * np.random.default_rng(series).standard_normal(len(levels))))
+        found += any(told[240:250])
+
+    assert found >= 9
+
+
 @pytest.mark.parametrize("draw", ["visits", "vis2", "vis3", "d"])
 def test_a_level_that_the_machine_visits_for_ten_nights_is_known_from_the_third_visit_on(draw: str) -> None:
     """Also where a night of a visit strays, where visits were never red, and where one begins in its noise."""

@@ -1,7 +1,8 @@
 """The present level of a noisy series: what is usual there, and what stands clear of it.
 
 Noise is that of nights about the level of their own segment. Where the segment is young, the last nights before it
-help out, about theirs. What nights that hold have reached is learnt, so that two clusters and spikes raise no alarm.
+help out, about theirs. What nights that hold have reached is learnt, so that two clusters and spikes raise no alarm;
+so is by how much twenty of them usually lie off the twenty before, so that a level that wanders raises few.
 """
 
 from __future__ import annotations
@@ -9,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.document.middle import median, median_of_sorted
@@ -18,7 +20,7 @@ from spook_tracker.tracker.judge.shifts import BASE, CLIP, FEWEST_BASE, clusters
 from spook_tracker.tracker.judge.slower import LEAST, worse_by
 
 if TYPE_CHECKING:
-    from spook_tracker.tracker.judge.shifts import Values
+    from spook_tracker.tracker.judge.shifts import Shift, Values
 
 WINDOW = 30  # nights that say what is usual, and that are remembered of the segments before
 FEWEST = 5  # of them before noise can be told; until then only a gross change counts
@@ -34,6 +36,7 @@ SECOND = 2.5  # standard deviations that the second largest of two hundred night
 ROOM = 400  # powers of two about one: squares of so large values, summed, are doubles
 CREEP = 5  # nights in each median that is compared for drift
 APART_BY_CHANCE = 1.25  # times the distance of two clusters that medians of their nights may be apart
+FEWEST_MOVES = 10  # for the worse, before they tell how nights move
 RANGES = 2.0  # times what nights of a segment range over: none that remember each other go so far
 
 
@@ -74,6 +77,9 @@ class PresentLevel:
     reached: list[float] = field(
         default_factory=list
     )  # the same of its own when they joined it; worse is positive
+    runs: list[list[float]] = field(
+        default_factory=lambda: [[]]
+    )  # values since each segment was told to begin
     until: int = 0  # nights seen
     start: int = 0  # the first night there is, or the last that was accepted
     _told: tuple[float, float, float] | None = None  # what `_level` said, until a night joins or leaves
@@ -161,6 +167,34 @@ class PresentLevel:
             del self.reached[:-REACHED]
         self.now.places += places
         self._told = None
+        self.runs[-1] += [self.values[i] for i in places]
+
+    def _moves(self) -> list[float]:
+        """How far the sum of twenty nights lay above that of the twenty before, relatively, on the last nights."""
+        moves: list[float] = []
+        for run in reversed(self.runs):
+            sums, last = [0.0, *accumulate(run)], len(run) - 2 * ENOUGH + 1
+            for i in range(max(0, last - REACHED + len(moves)), last):
+                middle = sums[i + ENOUGH]
+                moves.append(self._worse_by(middle - sums[i], sums[i + 2 * ENOUGH] - middle))
+            if len(moves) >= REACHED:
+                break
+        return moves
+
+    def _moves_by(self, found: Shift) -> float:
+        """The relative change that is no step: what is tolerated, and what stands clear of how nights usually move.
+
+        Nights that wander move by more than their noise from one to the next tells (the variance of their means does
+        not fall as one over their number), which no short segment shows. By medians, so that the few steps that no rule
+        told apart blind to no other, and by those for the worse alone where they are smaller: a series that became
+        faster little by little did not wander. What lies off two clusters is no move between them.
+        """
+        moves = [] if found.apart else self._moves()
+        worse = [move for move in moves if move > 0.0]
+        if len(moves) < WINDOW or len(worse) < FEWEST_MOVES:
+            return self._tolerated(self._level()[0])
+        usual = NORMAL * min(median(worse), median([abs(move) for move in moves]))
+        return max(SIGMAS * usual, self._tolerated(self._level()[0]))
 
     def _split_inside(self) -> None:
         """Nights of an older level leave the segment: they say nothing of its noise."""

@@ -157,7 +157,7 @@ class _Walk(DriftingLevel):
         """A history that begins here."""
         self.now, self.anchor, self.start = Growing([place]), [place], place
         self.off, self.reference, self.first, self.crept = [], None, None, 0.0
-        self.remembers, self.reached, self._told, self._outer = [], [], None, None
+        self.remembers, self.reached, self._told, self._outer, self.runs = [], [], None, None, [[]]
 
     def _no_value(self, place: int, accepted: bool) -> Noisy:
         level = self._level()[0]
@@ -209,7 +209,7 @@ class _Walk(DriftingLevel):
         nights = [*self.now.places[-BASE - LONGEST_SPAN :], *self.off]
         age = self.ages[nights[-1]] - self.ages[self.start]
         found = shift(self._costs(nights), mean < self._level()[1], age)
-        return (found.span, found) if found is not None and found.change > self._tolerated(level) else None
+        return (found.span, found) if found is not None and found.change > self._moves_by(found) else None
 
     def _above_both(self) -> tuple[int, Shift | None] | None:
         """Several nights above both of two clusters that nights are drawn from at random, whatever segments they made."""
@@ -326,7 +326,7 @@ class _Walk(DriftingLevel):
         self.remembers, self.reached = [*self.remembers, *off][-WINDOW:], []
         self._outer = None
         self.now = Growing(after, "usual", before[-WINDOW:], where)
-        self.off, self._told, self.crept = [], None, 0.0
+        self.off, self._told, self.crept, self.runs = [], None, 0.0, [*self.runs, []]
         change = self._worse_by(held.level, level)
         words = change_in_words(change)
         if accepted and change > 0.0:
