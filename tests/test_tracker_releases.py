@@ -148,14 +148,15 @@ def release(version: str, day: int, values: dict[str, Any]) -> Any:
 
 
 def asked(version: str, day: int, values: dict[str, float], unit: str = "m") -> Any:
-    """Of a stack of three boxes of 1 m edge, and of one ball."""
+    """Of a stack of three boxes of 1 m edge, and of one ball at rest or struck."""
     named = {key: key.split("/") for key in values}
     built = engine("", name="other", version=version, commit_time="", parents=())
     started = f"2026-01-{day:02}T00:00:00+00:00"
     floor = DrawnSolid(kind="plane", position=(0.0, 0.0, 0.0), size=(0.0, 0.0, 1.0), fixed=True)
     box = DrawnSolid(kind="box", position=(0.0, 0.0, 0.0), size=(1.0, 1.0, 1.0))
     ball = DrawnSolid(kind="sphere", position=(0.0, 0.0, 0.0), size=(0.5,))
-    drawn = {"stack": SceneDrawing(solids=(floor, box, box, box)), "ball": SceneDrawing(solids=(floor, ball))}
+    one = SceneDrawing(solids=(floor, ball))
+    drawn = {"stack": SceneDrawing(solids=(floor, box, box, box)), "ball": one, "blow": one}
     facts = {"role": "reported", "limit": None, "set_point": None, "parameters": {}, "unit": unit}
     return run(
         engine=built,
@@ -182,6 +183,14 @@ def test_one_body_comes_before_a_heap_however_much_the_heap_changed(tmp_path: Pa
     told = told_between(tmp_path, before, {"stack/a/drift": 0.4, "ball/a/depth": 1e-4})
 
     assert [line.split()[1] for line in told] == ["ball/a/depth", "stack/a/drift"]
+
+
+def test_of_tests_of_as_many_bodies_the_one_that_changed_most_comes_first(tmp_path: Path) -> None:
+    """An error that is gone, before one of another body that fell by some per cent."""
+    before = {"ball/a/depth": 0.066, "blow/a/depth": 0.12}
+    told = told_between(tmp_path, before, {"ball/a/depth": 0.063, "blow/a/depth": 2e-5})
+
+    assert [line.split()[1] for line in told] == ["blow/a/depth", "ball/a/depth"]
 
 
 def test_a_collapse_is_told_once_and_as_one(tmp_path: Path) -> None:

@@ -51,7 +51,7 @@ def steps_between(history: History, engine: str) -> tuple[list[RunInfo], list[St
             Step(
                 release=after.engine.version,
                 before=before.engine.version,
-                changes=tuple(direct_first((change for change in found.changes if visible(change)), drawn)),
+                changes=tuple(direct_first([change for change in found.changes if visible(change)], drawn)),
                 asked=len(both),
                 alike=alike(found.changes),
                 scenes=drawn,

@@ -62,12 +62,18 @@ def _size(solid: DrawnSolid) -> float:
     return 0.0
 
 
-def direct_first(changes: Iterable[Change], drawn: Mapping[str, Scene]) -> list[Change]:
-    """Those of the fewest bodies first, then of the fewest links; else as they were, the worst first."""
+def direct_first(changes: Sequence[Change], drawn: Mapping[str, Scene]) -> list[Change]:
+    """Those of the fewest bodies first, then of the fewest links, then of the test that changed by most decades.
 
-    def directness(change: Change) -> tuple[int, int]:
+    Those of one test as they were, the worst first.
+    """
+    largest: dict[str, float] = {}
+    for change in changes:
+        largest[change.test] = max(largest.get(change.test, 0.0), abs(change.decades or 0.0))
+
+    def directness(change: Change) -> tuple[int, int, float]:
         scene = drawn.get(change.test, NOT_DRAWN)
-        return scene.bodies, scene.links
+        return scene.bodies, scene.links, -largest[change.test]
 
     return sorted(changes, key=directness)
 
