@@ -241,6 +241,29 @@ def test_a_value_that_stands_still_is_drawn_on_to_tonight(driver: Any, site: Pat
     assert [rows[0].text.split()[0], "2025-10-01" in rows[0].text] == ["measured", True]
 
 
+@pytest.mark.parametrize("width", [360, 1400])
+def test_stages_left_out_are_folded_after_those_kept_and_open_by_keyboard(
+    driver: Any, site: Path, width: int
+) -> None:
+    """What shows before and after the key: every stage kept from the start, every other with its reason."""
+    from selenium.webdriver.common.keys import Keys
+
+    visit(driver, site, "tests/pendulum.html", width=width)
+    shown = """return [...document.querySelectorAll('#stages li')].filter((e) => e.checkVisibility())
+        .sort((a, b) => a.getBoundingClientRect().top - b.getBoundingClientRect().top).map((e) => e.className)"""
+    before = driver.execute_script(shown)
+    fold = driver.find_element("css selector", "#stages summary")
+    fold.send_keys(Keys.ENTER)
+    after = driver.execute_script(shown)
+
+    assert set(before) == {"in"}
+    assert after == [*before, *["out"] * (len(after) - len(before))]
+    assert fold.text == f"{len(after) - len(before)} left out, and why" and len(after) > len(before)
+    assert driver.switch_to.active_element == fold
+    for reason in driver.find_elements("css selector", "#stages li span:last-child"):
+        assert reason.rect["x"] + reason.rect["width"] <= width and reason.rect["width"] >= 150
+
+
 def test_a_ladder_stands_beside_the_night_that_the_reader_chooses(driver: Any, site: Path) -> None:
     visit(driver, site, "tests/pendulum.html")
     driver.execute_async_script(DRAWN)

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
+import click
 import pytest
 
 from spook_tracker import engine
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.tracker.cli.report_catalogue import stage_table
 from spook_tracker.tracker.measure.cards import explained
 from spook_tracker.tracker.measure.step_cost import ROUNDS, leaving_out
 from spook_tracker.tracker.website.nights import book
@@ -64,3 +67,14 @@ def test_only_what_is_left_out_is_forced_in_and_timed(name: str, stages: set[str
     assert len(found.times) == ROUNDS * bool(stages)
     if not stages:
         assert set(asked) == {1}
+
+
+@pytest.mark.parametrize("name", ["pendulum", "falling_pile", "vehicle"])
+def test_kept_stages_are_told_first_and_both_in_the_order_of_a_step(name: str) -> None:
+    test = CATALOGUE[name]
+    order = {choice.stage: choice.kept for choice in explained(test, engine)}
+    table = click.unstyle(stage_table(name, test, engine))
+    told = re.findall(r"^[✓·] (?:kept|left out) +(\w+) ", table, re.MULTILINE)
+
+    assert told == [s for s, kept in order.items() if kept] + [s for s, kept in order.items() if not kept]
+    assert told != list(order), "some that is left out comes before one that is kept"

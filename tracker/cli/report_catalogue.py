@@ -143,12 +143,12 @@ def stage_table(
     costs: StepCost | None = None,
     out: LeavingOut | None = None,
 ) -> str:
-    """The stages of a step of this test's scene: first those kept, in order, then why.
+    """The stages of a step of this test's scene: first those kept, in order, then those left out, each with its reason.
 
     `costs` are those of stages kept, `out` what leaving out saves, if measured: of the stages that are left out only
     what was measured has a line then.
     """
-    choices = list(explained(test, engine))
+    choices = sorted(explained(test, engine), key=lambda choice: not choice.kept)
     saved = out.saved if out is not None else {}
     kept = [choice.stage for choice in choices if choice.kept]
     rows: list[tuple[str, ...]] = [("✓ kept" if c.kept else "· left out", c.stage, c.reason) for c in choices]
