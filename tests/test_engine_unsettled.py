@@ -121,9 +121,9 @@ def test_solves_that_settled_leave_no_residual_to_speak_of() -> None:
     assert result.residual < 1e-6
 
 
-@pytest.mark.parametrize(("seed", "counted"), [(45, 2), (10, 0)])
+@pytest.mark.parametrize(("seed", "counted"), [(19, 2), (11, 0)])
 def test_an_impact_whose_points_contradict_each_other_is_counted(seed: int, counted: int) -> None:
-    """Points of a box that are to leave at speeds which no rigid motion has: twice in heap 45, never in heap 10."""
+    """Points of a box that are to leave at speeds which no rigid motion has: twice in heap 19, never in heap 11."""
     result = simulate(heap(np.random.default_rng(seed), 0.05), time_step=0.01, steps=30)
 
     assert result.completed

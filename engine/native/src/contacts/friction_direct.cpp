@@ -150,8 +150,7 @@ void finish_by_pgs(MixedSystem& system, MixedSystem& start, std::vector<Friction
 bool is_for_newton(const MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model) {
     if (model != FrictionModel::cone && !points.empty()) return false;
     if (points.empty() && system.rows.size() <= few_blocks) return false;
-    if (std::any_of(points.begin(), points.end(), [](const FrictionPoint& p) { return p.row != 1; }))
-        return false;  // it knows no friction of turning
+    if (std::any_of(points.begin(), points.end(), turns)) return false;
     // Its units tie two bodies; bilateral rows may tie more.
     return std::all_of(system.rows.begin(), system.rows.end(), [&](const RowBlock& block) {
         if (points.empty()) return block.lower[0] == 0.0 && block.further.empty();
@@ -369,9 +368,9 @@ bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, Fr
     return false;
 }
 
-/// Joints and contacts: Newton's method on the whole, at the cost of its pattern; where its path ends, the joints are
-/// eliminated, and iterations and Newton's method go on over contacts alone; in turns, each from the best so far, which is
-/// the answer.
+/// Joints and contacts, or contacts with friction of turning: Newton's method on the whole, at the cost of its pattern, which
+/// knows no friction of turning; where its path ends, the joints are eliminated, and iterations and Newton's method go on
+/// over contacts alone; in turns, each from the best so far, which is the answer.
 void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points, DirectSolver& direct,
                          FrictionReport& report) {
     MixedSystem& best = work().best;
@@ -389,7 +388,8 @@ void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points
     direct.newton.near_enough = fair;
     direct.newton.max_losses = 1;
     direct.newton.max_frozen = max_frozen;
-    for (int turn = 0; turn < joint_turns && !(report.residual <= (turn == 0 ? fair : near)); ++turn) {
+    const int turns = std::any_of(points.begin(), points.end(), spook::turns) ? turning_turns : joint_turns;
+    for (int turn = 0; turn < turns && !(report.residual <= (turn == 0 ? fair : near)); ++turn) {
         if (newton && turn == 0) {
             const ConeReport found = direct.newton.solve(system, points);
             report.rounds += found.iterations;
@@ -451,7 +451,7 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
     if (system.velocity.size() == system.mass.size() && still_right(system, points, model)) return report;
     MixedSystem& start = work().start;
     const IterationBudget full_budget{max_rounds};
-    if ((model == FrictionModel::cone || points.empty()) && ReducedContacts::takes(system)) {
+    if ((model == FrictionModel::cone || points.empty()) && ReducedContacts::takes(system, points)) {
         bool kept = false;
         if (!settle_quickly(system, points, model, direct, true, false, kept, report))
             solve_beside_joints(system, points, direct, report);

@@ -27,6 +27,9 @@ struct FrictionPoint {
         false;  // the two rows differ in scale: their own part is solved exactly, not by projection
 };
 
+/// Whether the point is rolling or torsional friction.
+inline bool turns(const FrictionPoint& point) noexcept { return point.row != 1; }
+
 struct FrictionReport {
     int rounds = 0;  // solves of the whole system
     int pivots = 0;  // rows that changed state

@@ -15,14 +15,15 @@ using namespace tolerances::reduced_contacts;
 
 }  // namespace
 
-bool ReducedContacts::takes(const MixedSystem& system) {
+bool ReducedContacts::takes(const MixedSystem& system, const std::vector<FrictionPoint>& points) {
     int bounded = 0;
-    bool joints = false;
+    const bool turning = std::any_of(points.begin(), points.end(), turns);
+    bool reduces = turning;
     for (const RowBlock& block : system.rows)
         for (int i = 0; i < block.size; ++i)
-            if (BilateralRows::is_bilateral(block, i)) joints = true;
+            if (BilateralRows::is_bilateral(block, i)) reduces = true;
             else ++bounded;
-    return joints && bounded > 0 && bounded <= most_rows;
+    return reduces && bounded > 0 && bounded <= (turning ? most_turning_rows : most_rows);
 }
 
 void ReducedContacts::analyse(const MixedSystem& system) {

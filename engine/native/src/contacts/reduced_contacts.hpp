@@ -10,6 +10,7 @@
 // there is an answer, whose residual is told.
 //
 // Beyond `most_rows` W is too large to be dense, and Newton's method on the whole is asked (contacts/cone_newton.hpp).
+// Rolling and torsional friction, which that does not know, is found here without joints, too.
 //
 // Sources: Featherstone 2008, ch. 11 (contacts by the inverse of the operational-space inertia); Alart, Curnier 1991 (the
 // laws as a root); Horak, Trinkle 2019 (how solvers of robots' contacts compare).
@@ -26,14 +27,15 @@ namespace spook {
 class ReducedContacts {
 public:
     static constexpr int most_rows = 120;  // bounded: three of a contact with friction
+    static constexpr int most_turning_rows = 400;  // up to six of one, for which there is no other Newton
 
     struct Report {
         int iterations = 0, newton_steps = 0;
         double residual = unbounded;  // of the worst row, relative to the speeds in the system
     };
 
-    /// Whether the system has joints to eliminate, and few enough rows besides.
-    static bool takes(const MixedSystem& system);
+    /// Whether the system has joints to eliminate, or friction of turning, and few enough rows between bounds.
+    static bool takes(const MixedSystem& system, const std::vector<FrictionPoint>& points);
 
     /// Starts from the multipliers of bounded rows in `system`; fills velocities and all multipliers. Points obey the cone.
     /// `iterations`: between tries of Newton's method.
