@@ -26,7 +26,7 @@ namespace spook {
 
 class ReducedContacts {
 public:
-    static constexpr int most_rows = 120;  // bounded: three of a contact with friction
+    static constexpr int most_rows = 120;          // bounded: three of a contact with friction
     static constexpr int most_turning_rows = 400;  // up to six of one, for which there is no other Newton
 
     struct Report {

@@ -131,7 +131,7 @@ inline constexpr double near = 1e-6,
                             3e-5;  // residuals, of the speeds: answers; the second where points are redundant
 // Beside joints: iterations, four times as many each turn, and paths of the convex part.
 inline constexpr int joint_turns = 3, first_iterations = 8, max_frozen = 8;
-inline constexpr int turning_turns = 4;  // the same with friction of turning
+inline constexpr int turning_turns = 4;                         // the same with friction of turning
 inline constexpr int pgs_turns = 1, iterations_per_turn = 100;  // where Newton's path ends without an answer
 }  // namespace tolerances::friction_direct
 
