@@ -230,3 +230,27 @@ def test_a_can_on_a_soft_floor_leans_on_all_four_points_that_give() -> None:
     lean = math.hypot(2.0 * (x * z + w * y), 2.0 * (y * z - w * x))
     assert 0.06 < lean < 0.2 and abs(2.0 * (y * z - w * x)) < 1e-6
     assert np.abs(result["w"]).max() < 1e-6
+
+
+@pytest.mark.parametrize("lean", [0.006, 0.01, 0.02, 0.03, 0.04, 0.048])
+@pytest.mark.parametrize("load", [500.0, 2000.0])  # N
+def test_a_leaning_coin_is_pressed_flat_by_a_heavy_load_beside_its_lean(load: float, lean: float) -> None:
+    """The load acts 6 cm beside the middle, inside the square of its four points: it comes to lie flat and still, though the
+    load's moment would turn it by radians in one step."""
+    floor = RigidBody(
+        name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=ROUGH
+    )
+    coin = can(
+        shape=Cylinder(0.1, 0.02),
+        position=(0.0, 0.0, 0.1 * math.sin(lean) + 0.01 * math.cos(lean)),
+        orientation=turned((0.0, 1.0, 0.0), lean),
+    )
+    press = Load(name="press", body="can", force=(0.0, 0.0, -load), torque=(0.06 * load, 0.0, 0.0))
+    result = simulate(
+        Scene(bodies=(floor, coin), forces=(press,), gravity=DOWN),
+        time_step=H,
+        steps=60,
+        observe={"w": Trace(quantity=AngularVelocity("can")), "x": Final(quantity=Position("can"))},
+    )
+    assert np.abs(result["w"][3:]).max() < 1e-9
+    assert float(result["x"][2]) == pytest.approx(0.01, abs=1e-9)
