@@ -237,9 +237,7 @@ def test_a_can_on_a_soft_floor_leans_on_all_four_points_that_give() -> None:
 def test_a_leaning_coin_is_pressed_flat_by_a_heavy_load_beside_its_lean(load: float, lean: float) -> None:
     """The load acts 6 cm beside the middle, inside the square of its four points: it comes to lie flat and still, though the
     load's moment would turn it by radians in one step."""
-    floor = RigidBody(
-        name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=ROUGH
-    )
+    floor = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=ROUGH)
     coin = can(
         shape=Cylinder(0.1, 0.02),
         position=(0.0, 0.0, 0.1 * math.sin(lean) + 0.01 * math.cos(lean)),
