@@ -263,8 +263,9 @@ def test_space_has_no_direction_and_no_origin(name: str) -> None:
 
 
 def settled_heaps() -> dict[int, Scene]:
-    """By seed. What a solve that stopped early leaves depends on where it began, and so on how the scene is written: of those none."""
-    heaps = {seed: heap(np.random.default_rng(seed), 0.05) for seed in range(30)}
+    """By seed. What a solve that stopped early leaves depends on where it began, and so on how the scene is written: of those
+    none. Such are a quarter (90 of 400), where points of an impact are to leave at speeds which no rigid motion has."""
+    heaps = {seed: heap(np.random.default_rng(seed), 0.05) for seed in range(40)}
     return {
         seed: scene
         for seed, scene in heaps.items()
