@@ -1,6 +1,7 @@
 """Which motions a website offers: those whose files it has, each once, whatever the budget."""
 
 import re
+from pathlib import Path
 
 import msgspec
 import pytest
@@ -8,6 +9,7 @@ import pytest
 import spook_tracker.tracker.measure.trajectory as motion
 from spook_tracker.engine import Particle, Scene, simulate
 from spook_tracker.scalar_tests.case import Example
+from spook_tracker.tracker.resources import resource
 from spook_tracker.tracker.website import motions
 from spook_tracker.tracker.website.causes import causes_of, told
 from spook_tracker.tracker.website.nights import book
@@ -88,3 +90,36 @@ def test_a_night_whose_file_is_gone_says_so_and_tonight_stays(driver, tmp_path):
     driver.execute_script("document.getElementById('replay').player.seek(5)")
 
     assert driver.execute_script("return document.getElementById('replay').player.sample") == 5
+
+
+@pytest.mark.parametrize("damage", [Path.unlink, lambda file: file.write_bytes(file.read_bytes()[:200])])
+def test_a_motion_of_tonight_that_cannot_be_read_says_why_and_not_that_webgl_lacks(driver, tmp_path, damage):
+    history = nights(1.0)
+    publish(history, tmp_path / "public")
+    (tonight,) = book(history).motions["friction"]
+    damage(tmp_path / "public" / tonight.address)
+
+    look(driver)
+    driver.get((tmp_path / "public" / "tests" / "friction.html").as_uri())
+    driver.execute_script("document.getElementById('replay').scrollIntoView()")
+    note = "document.querySelector('#replay .replay-note').textContent"
+    wait_for(driver, f"{note}.includes('picture shows the start')")
+
+    said = driver.execute_script(f"return {note}")
+    assert re.search("could not be loaded|numbers is damaged", said)
+    assert "WebGL" not in said
+    driver.get_log("browser")  # says what is missing
+
+
+def test_an_engine_whose_module_cannot_be_read_answers_that_it_cannot_start(driver):
+    static = resource("site") / "static"
+    worker = "".join((static / name).read_text("utf-8") for name in ("packed.js", "live-engine.js"))
+    driver.get("about:blank")
+    for before, lacking in (("", ""), ("delete self.DecompressionStream;", "no DecompressionStream")):
+        told = driver.execute_async_script(
+            """const [source, done] = arguments, worker = new Worker(URL.createObjectURL(new Blob([source])));
+            worker.onmessage = ({ data }) => done(data);
+            worker.postMessage({ packed: "AAAA" });""",
+            before + worker,
+        )
+        assert told["failed"] and lacking in told["failed"]

@@ -169,12 +169,15 @@
     const i = versions.findIndex((v) => v.id === before.value), j = versions.findIndex((v) => v.id === after.value);
     if (i === j) {
       told.replaceChildren(make("div", { class: "card pad" }, verdict("pass", "IDENTICAL"), make("p", {}, "The same run on both sides.")));
+      told.dataset.shown = `${i},${j}`;
       return;
     }
     const engines = engineOf(i).which !== engineOf(j).which;
     let pair;
     try { pair = await (engines ? enginesOf : pairOf)(i, j); } catch (error) {
-      told.replaceChildren(make("div", { class: "card pad" }, make("p", { class: "is-fail" }, `These two cannot be compared: ${error.message}.`)));
+      if (mine !== turn) { return; }
+      delete told.dataset.shown;
+      told.replaceChildren(make("div", { class: "card pad" }, make("p", { class: "is-fail" }, `These two cannot be compared: ${reasonOf(error)}.`)));
       return;
     }
     if (mine !== turn) { return; }

@@ -362,7 +362,10 @@ function observedOrder(engine, name, parameters) {
 // In a worker: answers questions one after the other. The page ends the worker when it no longer wants the answer.
 async function serve({ data }) {
   if (data.packed || data.module) {
-    serve.engine = await LiveEngine.from(data.module || (await inflated(data.packed).arrayBuffer()));
+    try { serve.engine = await LiveEngine.from(data.module || (await inflated(data.packed).arrayBuffer())); } catch (error) {
+      postMessage({ failed: error.message });  // the page does not hear of a promise that fails
+      return;
+    }
     postMessage({ ready: true, module: serve.engine.module });
     return;
   }

@@ -35,6 +35,7 @@ async function movieOf(data) {
 
 async function movieFrom(source) {
   if (!recordings.has(source.key)) { await script(source.address); }
+  if (!recordings.has(source.key)) { throw new Error(DAMAGED); }
   return movieOf(recordings.get(source.key));
 }
 
@@ -62,7 +63,11 @@ async function startReplay(box) {
     await threeFrom(box.dataset.three);
     for (const source of sources) { source.address = box.dataset.root + source.address; }
     const tonight = await movieFrom(sources[0]);
-    const player = new Player(box, tonight, "t");
+    let player;
+    try { player = new Player(box, tonight, "t"); } catch (error) {
+      say(`The replay needs WebGL, which this browser does not offer (${error.message}). The picture shows the start.`);
+      return;
+    }
     box.classList.add("moving");
     box.player = player;
     if (sources.length < 2) { return; }
@@ -108,7 +113,7 @@ async function startReplay(box) {
         if (asked !== key) { return; }
         first.hidden = beside.hidden = true;
         player.use(tonight, true);
-        say(`The motion of that night cannot be shown: ${error.message}.`);
+        say(`The motion of that night cannot be shown: ${reasonOf(error)}.`);
       }
     }
     player.tools.prepend(make("label", {}, "against ", other), first, beside);
@@ -118,7 +123,7 @@ async function startReplay(box) {
       if (!first.hidden && first.dataset.seen >= 0) { player.seek(Number(first.dataset.seen)); player.remember(); } else if (!first.hidden) { player.toWorst(); }
     }
   } catch (error) {
-    say(`The replay needs WebGL, which this browser does not offer (${error.message}). The picture shows the start.`);
+    say(`The motion is not shown: ${reasonOf(error)}. The picture shows the start.`);
   }
 }
 

@@ -27,7 +27,7 @@ function script(address) {
       const tag = document.createElement("script");
       tag.src = address;
       tag.onload = () => done();
-      tag.onerror = () => { scripts.delete(address); failed(new Error(`${address} could not be loaded`)); };
+      tag.onerror = () => { scripts.delete(address); failed(new Error(`${address} could not be loaded; reload the page`)); };
       document.head.append(tag);
     }));
   }
@@ -35,6 +35,10 @@ function script(address) {
 }
 
 // --- charts ---
+// Where tonight.js did not come, the rest of the page works.
+const EARLIER = typeof TONIGHT === "undefined" ? [] : TONIGHT.earlier;
+const MEASURED = typeof TONIGHT === "undefined" ? "When this was measured is not known: tonight.js could not be loaded; reload the page." : TONIGHT.measured;
+
 const chartData = new Handed();
 const charted = (key, packed) => chartData.set(key, packed);  // called by the files of charts/
 
@@ -136,7 +140,7 @@ const CELLS = ["#0072b2", "#56b4e9", "#e69f00", "#d55e00", "#5b2333", "#8a939c"]
 
 // The earlier night that stands in short dashes beside tonight: the reader's choice, or the first that is offered.
 function earlierNight() {
-  const offered = [...TONIGHT.earlier.map(([key]) => key), "none"];
+  const offered = [...EARLIER.map(([key]) => key), "none"];
   return offered.includes(state.get("night")) ? state.get("night") : offered[0];
 }
 
@@ -220,7 +224,7 @@ function drawChart(box) {
   plot.hidden = false;
   if (!box.classList.contains("drawn")) { box.append(tableOf(box, { ...data, over: given.over })); }
   box.classList.add("drawn");
-  Plotly.react(plot, data.data.map(dressTrace), layout, CONFIG).then(() => { box.dataset.drawn = ""; });
+  const drawing = Plotly.react(plot, data.data.map(dressTrace), layout, CONFIG).then(() => { box.dataset.drawn = ""; });
   if (!plot.dataset.live) {
     plot.dataset.live = "1";
     plot.on("plotly_relayout", () => {
@@ -232,6 +236,7 @@ function drawChart(box) {
       drawChart(box);
     });
   }
+  return drawing;
 }
 
 function charts() {
@@ -241,10 +246,16 @@ function charts() {
   const show = async (box) => {
     try {
       await script(box.dataset.file);
-      if ((await chartData.read(box.dataset.key)).over) { await script(box.dataset.file.replace(/[^/]*$/, "nights.js")); }
-    } catch { return missing(box); }
-    seen.add(box);
-    drawChart(box);
+      if ((await chartData.read(box.dataset.key)).over) {
+        await script(box.dataset.file.replace(/[^/]*$/, "nights.js"));
+        if (!nights.length) { throw new Error(DAMAGED); }
+      }
+      seen.add(box);
+      await drawChart(box);
+    } catch (error) {
+      seen.delete(box);
+      missing(box, reasonOf(error));
+    }
   };
   const watch = new IntersectionObserver((entries) => {
     for (const entry of entries) {
@@ -256,22 +267,23 @@ function charts() {
   addEventListener("hashchange", () => seen.forEach(drawChart));
   const tools = document.getElementById("earlier"), choice = document.getElementById("night");
   if (tools) {
-    for (const [key, words] of [...TONIGHT.earlier, ["none", "none"]]) { choice.append(new Option(words, key)); }
+    for (const [key, words] of [...EARLIER, ["none", "none"]]) { choice.append(new Option(words, key)); }
     const restore = () => { choice.value = earlierNight(); };
     choice.addEventListener("change", () => {
       state.set("night", choice.selectedIndex ? choice.value : "");
       seen.forEach(drawChart);
     });
     addEventListener("hashchange", restore);
-    tools.hidden = !TONIGHT.earlier.length;
+    tools.hidden = !EARLIER.length;
     restore();
   }
 }
 
-function missing(box) {
+function missing(box, reason) {
   const note = document.createElement("p");
   note.className = "chart-note";
-  note.textContent = "The file of this chart could not be loaded; reload the page.";
+  note.textContent = `This chart is not drawn: ${reason}.`;
+  box.querySelector(".plot").hidden = true;
   box.append(note);
 }
 
@@ -279,7 +291,7 @@ function missing(box) {
 async function tonight() {
   const measured = document.getElementById("measured"), times = document.getElementById("run-times");
   if (measured) {
-    measured.textContent = TONIGHT.measured;
+    measured.textContent = MEASURED;
     measured.hidden = false;
   }
   if (!times) { return; }
@@ -287,7 +299,13 @@ async function tonight() {
   try {
     await script(times.dataset.file);
     text = await parts.read(times.dataset.test);
-  } catch { return; }
+  } catch (error) {
+    const note = document.createElement("p");
+    note.className = "small soft";
+    note.textContent = `The run times are not shown: ${reasonOf(error)}.`;
+    times.replaceChildren(note);
+    return;
+  }
   if (text) { times.innerHTML = text; }
   folds(times);
   scrollers();
