@@ -89,7 +89,9 @@ def test_a_chart_that_cannot_be_read_says_so_and_the_others_are_drawn(
     )
     assert driver.execute_script(NOTES) == [f"This chart is not drawn: {reason}."]
     assert not driver.find_element("css selector", f"[data-key='{first.stem}'] .plot").is_displayed()
-    driver.execute_script("document.getElementById('theme').click()")  # draws again what is drawn, and no more
+    driver.execute_script(
+        "document.getElementById('theme').click()"
+    )  # draws again what is drawn, and no more
     assert len(driver.execute_script(NOTES)) == 1
 
 
@@ -204,7 +206,9 @@ def test_what_a_reader_chooses_while_a_chart_is_unpacked_holds(driver: Any, site
     assert paint, "in the theme chosen meanwhile"
 
 
-def test_data_that_two_ask_for_at_once_are_unpacked_once_and_a_text_stays_one(driver: Any, site: Path) -> None:
+def test_data_that_two_ask_for_at_once_are_unpacked_once_and_a_text_stays_one(
+    driver: Any, site: Path
+) -> None:
     packed = [re.findall('"([^"]*)"', call("f", "k", text).decode())[1] for text in ('"words"', '{"a":[1]}')]
     visit(driver, site, "index.html")
 
