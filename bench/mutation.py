@@ -60,6 +60,8 @@ MUTANTS = (
     mutant("a-visit-may-last", "run_times", "LONGER = 2 ", "LONGER = 200 "),
     mutant("a-walk-is-many-steps", "level", "len(moves) < WINDOW or len(worse)", "True or len(worse)"),
     mutant("faster-is-wandering", "level", "min(median(worse), median(", "max(median(worse), median("),
+    mutant("one-slow-night-is-a-move", "level", "np.clip(forties, middle - far, middle + far)", "forties"),
+    mutant("a-walk-is-long-remembered", "level", "len(moves) - REACHED", "len(moves) - 2 * REACHED"),
     mutant("no-memory", "shifts", "return min(strongest, 0.98)", "return 0.0"),
     mutant("no-permutations", "shifts", "if probability < enough else None", "if probability < 1.0 else None"),
     mutant("no-t-test", "shifts", "rise <= standard_error(base, len(last), memory)", "False"),

@@ -91,6 +91,47 @@ def test_steps_that_were_told_make_a_series_no_blinder_to_the_next() -> None:
     assert found >= 9
 
 
+def newly_red(values: Any, since: int) -> bool:
+    """Whether a red stretch begins at or after that night."""
+    return battery.starts(red(values), since) > 0
+
+
+@pytest.mark.parametrize(("share", "factor"), [(0.04, 1.3), (0.05, 5.0)])
+def test_a_night_in_twenty_that_is_slow_makes_a_series_no_blinder(share: float, factor: float) -> None:
+    """5 % after two hundred nights of 1 % noise; by sums of twenty nights 28 and 24 of forty were found."""
+    found = 0
+    for series in range(40):
+        draws = np.random.default_rng(series)
+        values = (1.0 + 0.01 * draws.standard_normal(220)) * np.where(draws.random(220) < share, factor, 1.0)
+        values[200:] *= 1.05
+        found += newly_red(values, 200)
+
+    assert found >= 38
+
+
+def test_a_level_that_once_wandered_is_no_blinder_when_it_has_long_stood_still() -> None:
+    """A walk of .5 % a night for three hundred nights, four months at one level, then 3 %."""
+    found = 0
+    for series in range(40):
+        draws = np.random.default_rng(series)
+        level = np.exp(0.005 * np.cumsum(draws.standard_normal(300)))
+        values = np.concatenate([level, np.repeat(level[-1], 120), np.repeat(1.03 * level[-1], 20)])
+        found += newly_red(values * (1.0 + 0.01 * draws.standard_normal(len(values))), 420)
+
+    assert found >= 19
+
+
+def test_after_a_year_of_seasons_a_tenth_is_told() -> None:
+    """Within twenty nights, as a red that begins; not held to how nights move, half of the series are red by then."""
+    found = 0
+    for series in range(40):
+        seconds = battery.machine("seasons of ±5 %", series, 385)[0]
+        seconds[365:] *= 1.10
+        found += newly_red(seconds, 365)
+
+    assert found >= 36
+
+
 @pytest.mark.parametrize("draw", ["visits", "vis2", "vis3", "d"])
 def test_a_level_that_the_machine_visits_for_ten_nights_is_known_from_the_third_visit_on(draw: str) -> None:
     """Also where a night of a visit strays, where visits were never red, and where one begins in its noise."""

@@ -10,7 +10,6 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import accumulate
 from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.document.middle import median, median_of_sorted
@@ -170,13 +169,21 @@ class PresentLevel:
         self.runs[-1] += [self.values[i] for i in places]
 
     def _moves(self) -> list[float]:
-        """How far the sum of twenty nights lay above that of the twenty before, relatively, on the last nights."""
+        """How far the sum of twenty nights lay above that of the twenty before, relatively, on the last nights.
+
+        What lies far off the forty counts as if it lay nearer: a rare slow night would move every sum that it is in.
+        """
+        import numpy as np
+
         moves: list[float] = []
         for run in reversed(self.runs):
-            sums, last = [0.0, *accumulate(run)], len(run) - 2 * ENOUGH + 1
-            for i in range(max(0, last - REACHED + len(moves)), last):
-                middle = sums[i + ENOUGH]
-                moves.append(self._worse_by(middle - sums[i], sums[i + 2 * ENOUGH] - middle))
+            near = run[len(moves) - REACHED - 2 * ENOUGH + 1 :]  # as many as give the moves that are missing
+            if len(near) >= 2 * ENOUGH:
+                forties = np.lib.stride_tricks.sliding_window_view(near, 2 * ENOUGH)
+                middle = np.median(forties, axis=1, keepdims=True)
+                far = CLIP * NORMAL * np.median(np.abs(forties - middle), axis=1, keepdims=True)
+                sums = np.clip(forties, middle - far, middle + far).reshape(-1, 2, ENOUGH).sum(axis=2)
+                moves += [self._worse_by(before, after) for before, after in sums.tolist()]
             if len(moves) >= REACHED:
                 break
         return moves
