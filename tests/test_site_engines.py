@@ -11,17 +11,20 @@ from typing import Any
 import msgspec
 import pytest
 
+from spook_tracker.tracker.document.wording import clean
 from spook_tracker.tracker.judge.compare import ComparedRun, compare, side_of
 from spook_tracker.tracker.judge.rank import answers
 from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.website.page_engines import _cells, _value
 from spook_tracker.tracker.website.publish import publish
-from tests.browser import arrive, wait_for
+from tests.browser import arrive, look, wait_for
 from tests.synthetic_history import (
     HOSTILE,
     MACHINE,
+    SEVEN,
     DocumentHistory,
     history,
+    of_test,
     rival,
     with_rival,
 )
@@ -102,7 +105,6 @@ def test_the_first_engine_at_an_error_stands_out_and_ours_is_not_spared(site: Pa
     ]
     page = (site / "engines.html").read_text(encoding="utf-8")
     assert len(re.findall('class="best"', page)) == 3  # one a column that any engine fills
-    assert not re.search(r"<tbody>\s*</tbody>", page), "no engine was asked with h = 1/60 s"
 
 
 def test_scenes_that_one_engine_alone_was_asked_are_no_race(site: Path) -> None:
@@ -220,3 +222,77 @@ def test_errors_within_rounding_are_a_tie_and_no_ratio_of_rounding_is_said() -> 
         "",
         "3 times the best",
     ]
+
+
+NAMES = (
+    "", 'a"b\\c\nd', "</style><b>x</b>", "}body{display:none}", "\N{ROCKET} rocket", "\u202egnp.exe", "\u05d0\u05d1 \u05d2",
+    "x" * 10_000, "it's; content: 'y'", "a\0b", "\u00bd\u00b2\u01c5",
+)  # fmt: skip
+
+
+def test_where_tables_are_cards_a_column_bears_the_name_of_its_engine_as_cleaned(
+    driver: Any, tmp_path: Path
+) -> None:
+    """Also one that would end a string, a rule or the style sheet; each row has as many cells as the head."""
+    others = []
+    for place, name in enumerate(NAMES):
+        run = rival("1", name=f"rival-{place}")
+        others.append(msgspec.structs.replace(run, engine=msgspec.structs.replace(run.engine, name=name)))
+    report = publish(DocumentHistory([*history(2).documents.values(), *others]), tmp_path / "public")
+    look(driver, width=360, height=740)
+    arrive(driver, (tmp_path / "public" / "engines.html").as_uri())
+
+    tables = driver.execute_script(
+        """return [...document.querySelectorAll("table.matrix")].map((table) => [...table.rows].slice(1).map((row) =>
+          [...row.cells].slice(-arguments[0]).map((cell) => getComputedStyle(cell, "::before").content)))""",
+        len(NAMES) + 1,
+    )
+    said = ["spook 0.1.1", *(clean(f"{name} 1") for name in NAMES)]
+    quoted = [text.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\a ") for text in said]
+    assert report.failed == ()
+    assert sum(bool(rows) for rows in tables) > 1
+    assert {tuple(row) for rows in tables for row in rows} == {tuple(f'"{text}"' for text in quoted)}
+    assert driver.execute_script("return getComputedStyle(document.body).display") == "block"
+    assert driver.execute_script("return document.documentElement.scrollWidth") <= 360
+
+
+def check_totals(site: Path) -> None:
+    """Of each engine those of its column, of the gates those of both lists, in the catalogue's order; links lead somewhere."""
+    page = (site / "engines.html").read_text(encoding="utf-8")
+    head, *gates = lines(site, "engines.html", "A line for each gate")
+    own, *alone = lines(site, "engines.html", "The value of ours")
+    cards = re.findall(r"asked</dt><dd>(\d+) <small>of (\d+)</small>.*?there are</dt><dd>(\d+)</dd>", page)
+    assert len(cards) == len(head) - 2
+    assert {int(asked) for _, _, asked in cards} == {len(gates) + len(alone)}
+    assert alone and {line[0] for line in gates}.isdisjoint(line[0] for line in alone)
+    for place, (kept, answered, _) in enumerate(cards, 2):
+        cells = [line[place] for line in gates]
+        if head[place] in own:
+            cells += [line[own.index(head[place])] for line in alone]
+        else:
+            assert all(head[place] != name for name in own)
+        signed = [cell.partition(": ")[0] for cell in cells if cell.startswith(("kept: ", "not kept: "))]
+        assert (int(kept), int(answered)) == (signed.count("kept"), len(signed)), head[place]
+    catalogue = [test for test, *_ in SEVEN.values()]
+    for rows in (gates, alone):
+        order = [next(i for i, title in enumerate(catalogue) if row[0].startswith(title)) for row in rows]
+        assert order == sorted(order), "as the catalogue has them"
+    for address in re.findall(r'<a href="([^"#:]+)(?:#[^"]*)?"', page):
+        assert (site / address).is_file(), address
+
+
+def test_the_totals_of_an_engine_are_those_of_its_column_and_every_link_leads_somewhere(site: Path) -> None:
+    check_totals(site)
+
+
+def test_gates_that_no_other_engine_was_asked_are_not_said_to_be_beyond_them(tmp_path: Path) -> None:
+    """A test newer than the night of the others, or asked otherwise by then: their adapters may well do it."""
+    publish(
+        DocumentHistory([*history(2).documents.values(), of_test(rival("3.3"), "pendulum")]),
+        tmp_path / "site",
+    )
+    text = (tmp_path / "site" / "engines.html").read_text(encoding="utf-8")
+
+    assert len(lines(tmp_path / "site", "engines.html", "The value of ours")) == 1 + len(SEVEN) - 1
+    assert "Gates that no other engine answers" in text
+    assert "no other engine can be asked" not in text

@@ -16,7 +16,7 @@ from spook_tracker.tracker.website.options import SiteOptions
 from spook_tracker.tracker.website.publish import publish
 from spook_tracker.tracker.website.recorded import NIGHT, OCCASION, RELEASES, RecordedError
 from tests.synthetic_history import MACHINE, document, history, rival
-from tests.test_site_engines import lines, table
+from tests.test_site_engines import check_totals, lines, table
 
 ELSEWHERE = msgspec.structs.replace(MACHINE, fingerprint="another", processor="a processor far away")
 TEN_LOADED = b'[{"engine": "rival", "started": "2026-01-01T00:00:00Z", "seconds": 90, "load": [1.5, 3.2], "limit": 0.5}]'
@@ -49,6 +49,10 @@ def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
         place / "files", document(0), rival("3.3"), releases=(rival("3.10"), rival("3.9", door=0.25))
     )
     return published(place / "public", history(3), folder)
+
+
+def test_the_totals_of_the_recorded_engines_and_of_tonight_are_those_of_their_columns(site: Path) -> None:
+    check_totals(site)
 
 
 def test_a_site_of_ours_alone_shows_the_recorded_engines_and_says_when_and_where(site: Path) -> None:

@@ -8,13 +8,18 @@ import json
 import math
 import re
 
+from pathlib import Path
+
+import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.website.data_files import inert, records, table
+from spook_tracker.tracker.website.publish import publish
 from spook_tracker.tracker.website.templates import css_text, embedded, environment
-from tests.synthetic_history import HOSTILE
+from tests.synthetic_history import HOSTILE, DocumentHistory, document, of_test, sample, series
 
 
 @pytest.mark.parametrize("formula", ["=cmd()", "+1", "-1+2", "@SUM(A1)", "\t=1", "\r=1"])
@@ -82,3 +87,54 @@ def test_no_template_marks_anything_safe() -> None:
         assert "|safe" not in text.replace(" ", "")
         assert "autoescape" not in text
         assert "{% include" not in text
+
+
+def worked(night: int, *metrics: tuple[str, float]) -> RunDocument:
+    """A night that says itself what it counted, under whatever names."""
+    run = of_test(document(night), "friction")
+    bare = tuple(msgspec.structs.replace(s, counters={}) for s in run.samples)
+    counts = [(series("friction", name, kind="work", time_step=None), value) for name, value in metrics]
+    return msgspec.structs.replace(
+        run,
+        series=(*run.series, *(definition for definition, _ in counts)),
+        samples=(*bare, *(sample(definition, value, counters={}) for definition, value in counts)),
+    )
+
+
+def test_work_that_comes_later_goes_or_has_a_name_of_its_own_is_told_and_nothing_else_is_lost(
+    tmp_path: Path,
+) -> None:
+    nights = DocumentHistory(
+        [
+            worked(0, ("work:values:steps", 5.0)),
+            worked(
+                1, ("work:values:steps", 5.0), ("work:values:sweeps", 3.5), ("work:x", 1.0), ("plain", 2.0)
+            ),
+            worked(
+                2, ("work:values:steps", 5.0), ("work:values:sweeps", 3.5), ("work:x", 1.0), ("a:b:c:d", 7.0)
+            ),
+            worked(3, ("work:values:steps", 5.0), ("work:x", 1.0)),
+            worked(4, ("work:values:steps", 5.0), ("work:x", 1.0)),
+            worked(5, ("work:x", 1.0)),
+        ]
+    )
+    report = publish(nights, tmp_path / "public")
+    told = list(csv.DictReader(io.StringIO((tmp_path / "public" / "data" / "work.csv").read_text())))
+
+    assert report.failed == ()
+    assert (tmp_path / "public" / "feed.xml").is_file(), "what follows work.csv is there"
+    days = [run.started[:10] for run in nights.runs()]
+    by_part = {
+        part: [line for line in told if line["part"] == part] for part in ("values", "x", "plain", "a")
+    }
+    assert len(told) == sum(map(len, by_part.values()))
+    assert [
+        (days.index(line["since"][:10]), line["steps"], line["sweeps"]) for line in by_part["values"]
+    ] == [
+        (0, "5", ""),
+        (1, "5", "3.5"),
+        (3, "5", ""),
+    ], "the night on which sweeps were not counted any more has a line"
+    assert [(line["count"], line["steps"]) for line in by_part["x"]] == [("1", "")]
+    assert [line["count"] for line in by_part["plain"]] == ["2"]
+    assert [line["b:c:d"] for line in by_part["a"]] == ["7"]

@@ -92,20 +92,31 @@ def newest(book: Book, tests: Sequence[TestHistory]) -> Table:
 
 def work(book: Book) -> Table:
     """Operations and iterations counted, of every configuration of every test and each part of a night (values, ladders,
-    stability): a line for the first night, and one for each that changed any of them; a column for each kind."""
+    stability): a line for the first night, and one for each that changed any of them or counts one no more; a column for
+    each kind."""
     groups: dict[tuple[str, str, str], dict[str, Trend]] = {}
     for test in book.tests:
         for t in test.trends:
             if t.definition.kind == "work":
-                _, part, kind = t.definition.metric.split(":")
-                groups.setdefault((test.name, t.definition.configuration, part), {})[kind] = t
+                # as judge/work.py names them; a document from outside may hold any name
+                part, _, kind = t.definition.metric.removeprefix("work:").partition(":")
+                groups.setdefault((test.name, t.definition.configuration, part), {})[kind or "count"] = t
     kinds = sorted({kind for counted in groups.values() for kind in counted})
     lines: list[list[Cell]] = []
     for group, counted in groups.items():
-        for night in sorted({t.nights[i] for t in counted.values() for i in changed(t)}):
+        told = {t.nights[i] for t in counted.values() for i in changed(t)}
+        for night in sorted(told | _without_one(list(counted.values()))):
             counts = {kind: _counted(t, night) for kind, t in counted.items()}
             lines.append([*group, book.nights[night].started, *map(counts.get, kinds)])
     return ("test", "configuration", "part", "since", *kinds), lines
+
+
+def _without_one(counted: Sequence[Trend]) -> set[int]:
+    """The nights on which one of them is not there any more, and another is."""
+    if len({tuple(t.nights) for t in counted}) < 2:
+        return set()
+    ended = {night + 1 for t in counted for night in set(t.nights) - {night - 1 for night in t.nights}}
+    return ended & {night for t in counted for night in t.nights}
 
 
 def _counted(trend: Trend, night: int) -> Cell:
