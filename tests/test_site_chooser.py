@@ -43,7 +43,7 @@ def test_the_first_answer_names_the_soonest_engines_and_below_what_each_cannot_b
     site = tmp_path / "public"
     publish(DocumentHistory([*history(3).documents.values(), rival("3.3")]), site)
     first = table(site, "engines.html", "The soonest to an error")
-    every = table(site, "engines.html", "Robots and chains of joints: time for half of 1 scenes")
+    every = table(site, "engines.html", "Robots and chains of joints: time for half of 1 scene,")
 
     (use,) = [line for name, line in first.items() if name != "I simulate"]
     assert use == [
