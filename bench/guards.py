@@ -145,7 +145,7 @@ def main() -> int:
         dead = red(guard)
         found += dead
         print(f"{'red     ' if dead else 'PASSED  '}  {guard.name:52} {guard.tests}", flush=True)
-    print(f"\n{found} of {len(guards)} guards are missed by their tests, seed {asked.seed}")
+    print(f"\n{found} of {len(guards)} broken guards turn their tests red, seed {asked.seed}")
     return 0 if found == len(guards) else 1
 
 

@@ -232,7 +232,7 @@ def test_a_can_on_a_soft_floor_leans_on_all_four_points_that_give() -> None:
     assert np.abs(result["w"]).max() < 1e-6
 
 
-@pytest.mark.parametrize("lean", [0.006, 0.01, 0.02, 0.03, 0.04, 0.048])
+@pytest.mark.parametrize("lean", [0.006, 0.02, 0.048, 0.051, 0.07, 0.1, 0.2])
 @pytest.mark.parametrize("load", [500.0, 2000.0])  # N
 def test_a_leaning_coin_is_pressed_flat_by_a_heavy_load_beside_its_lean(load: float, lean: float) -> None:
     """The load acts 6 cm beside the middle, inside the square of its four points: it comes to lie flat and still, though the
@@ -252,3 +252,50 @@ def test_a_leaning_coin_is_pressed_flat_by_a_heavy_load_beside_its_lean(load: fl
     )
     assert np.abs(result["w"][3:]).max() < 1e-9
     assert float(result["x"][2]) == pytest.approx(0.01, abs=1e-9)
+
+
+@pytest.mark.parametrize("along", [3.0, 30.0, 100.0])  # m/s² down the slope
+def test_a_wheel_that_speeds_up_is_not_held_at_a_radian_a_step(along: float) -> None:
+    """A solid cylinder rolls with two thirds of what pulls it along, through more than four radians a step."""
+    press = 200.0  # m/s²: friction does not limit it
+    steps = round(80.0 / along / H)
+    wheel = can(
+        shape=Cylinder(0.3, 0.2),
+        position=(0.0, 0.0, 0.3),
+        orientation=turned((1.0, 0.0, 0.0), math.pi / 2.0),
+        material=ROUGH,
+    )
+    floor = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=ROUGH)
+    result = simulate(
+        Scene(bodies=(floor, wheel), gravity=(along, 0.0, -press)),
+        time_step=H,
+        steps=steps,
+        observe={"v": Final(quantity=Velocity("can")), "w": Final(quantity=AngularVelocity("can"))},
+    )
+    speed = 2.0 / 3.0 * along * steps * H
+    assert H * speed / 0.3 > 2.0
+    assert result["v"] == pytest.approx([speed, 0.0, 0.0], abs=1e-9)
+    assert result["w"] == pytest.approx([0.0, speed / 0.3, 0.0], abs=1e-8)
+
+
+@pytest.mark.parametrize("lean", [6.0, 20.0, 45.0])  # degrees
+def test_a_leaning_disc_that_is_spun_up_turns_through_its_points(lean: float) -> None:
+    """A torque about its own axis, up to four radians a step on a smooth floor: nothing but the disc's spin changes."""
+    angle = math.radians(lean)
+    axis = np.array([math.sin(angle), 0.0, math.cos(angle)])
+    smooth = Material(friction=0.0)
+    floor = RigidBody(
+        name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=smooth
+    )
+    disc = can(
+        shape=Cylinder(0.1, 0.02),
+        position=(0.0, 0.0, 0.1 * math.sin(angle) + 0.01 * math.cos(angle)),
+        orientation=turned((0.0, 1.0, 0.0), angle),
+        material=smooth,
+    )
+    moment = 4.0 / H / (20.0 * H) * 0.5 * 2.0 * 0.1**2  # to four radians a step in 20
+    x, y, z = (moment * axis).tolist()
+    spun = Load(name="spun", body="can", torque=(x, y, z))
+    observe = {"w": Final(quantity=AngularVelocity("can"))}
+    spin = simulate(Scene(bodies=(floor, disc), forces=(spun,)), time_step=H, steps=20, observe=observe)["w"]
+    assert H * spin == pytest.approx(4.0 * axis, abs=1e-7)

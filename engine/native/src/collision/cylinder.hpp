@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 
 #include "collision/shape.hpp"
 
@@ -26,5 +27,10 @@ inline Vec3 unit_across(Vec3 v, Vec3 axis, Vec3 otherwise) noexcept {
 
 /// The point of a cylinder nearest to `p`, both in its own axes; inside the height is negative.
 Nearest nearest_on_cylinder(const Primitive& cylinder, Vec3 p) noexcept;
+
+/// Whether a point of a rim on a plane, as the pairs here name them, is one between its lowest and its opposite.
+inline bool is_between(const Primitive& rim, std::uint32_t feature) noexcept {
+    return rim.has_rims() && feature % 2 == 1;
+}
 
 }  // namespace spook

@@ -4,31 +4,26 @@
 #include "collision/frustum.hpp"
 #include "collision/narrow_phase.hpp"
 #include "collision/segment.hpp"
-#include "collision/tolerances.hpp"
 
 namespace spook {
 
-using namespace tolerances::cylinder_pairs;
-
 /// Four points a rim: the lowest, its opposite and the two between. A disc that leans in any direction is held at its
-/// very edge there; while it lies flat the lowest point is not defined, and it stands on the corners of a square. Where it is too
-/// steep to land flat in a step, open points between have no say: a rim that rolls turns through them, and their rows would hold
-/// it to a radian a step.
+/// very edge there; while it lies flat the lowest point is not defined, and it stands on the corners of a square. As it leans
+/// the two between draw in to the middle: a disc that lands flat has them at its edge, and a wheel has no surface there.
 Manifold cylinder_plane(const Primitive& cylinder, const Pose& at, const Primitive& plane,
                         const Pose& at_plane, double margin) noexcept {
     const Vec3 n = at_plane.rotation * plane.normal, axis = column(at.rotation, 2);
     const Vec3 level = -n + dot(n, axis) * axis;
     const Vec3 flat = column(at.rotation, 0);
     const Vec3 down = norm(level) > 1e-12 ? unit_across(level, axis, flat) : flat;
-    const Vec3 aside = cross(axis, down);
+    const Vec3 aside = std::abs(dot(n, axis)) * cross(axis, down);
     const Vec3 spokes[4] = {down, aside, -down, -aside};
-    const bool leans = norm(level) > steep;
     Manifold manifold;
     for (std::uint32_t k = 0; k < 8; ++k) {
         const Vec3 point = at.position + (k < 4 ? -cylinder.half_length : cylinder.half_length) * axis +
                            cylinder.radius * spokes[k % 4];
         const double gap = dot(n, point - at_plane.position);
-        if (gap <= (leans && k % 2 == 1 ? 0.0 : margin)) manifold.add(point - 0.5 * gap * n, n, gap, k);
+        if (gap <= margin) manifold.add(point - 0.5 * gap * n, n, gap, k);
     }
     return manifold;
 }
@@ -38,14 +33,14 @@ Manifold cone_plane(const Primitive& cone, const Pose& at, const Primitive& plan
                     double margin) noexcept {
     const Vec3 n = at_plane.rotation * plane.normal;
     const Frustum frustum(cone, at);
-    const Vec3 down = frustum.outward(-n), aside = cross(frustum.axis, down);
+    const Vec3 down = frustum.outward(-n);
+    const Vec3 aside = std::abs(dot(n, frustum.axis)) * cross(frustum.axis, down);
     const Vec3 spokes[5] = {down, aside, -down, -aside, {}};
-    const bool leans = norm(cross(n, frustum.axis)) > steep;
     Manifold manifold;
     for (std::uint32_t k = 0; k < 5; ++k) {
         const Vec3 point = k < 4 ? frustum.centre[0] + cone.radius * spokes[k] : frustum.centre[1];
         const double gap = dot(n, point - at_plane.position);
-        if (gap <= (leans && k % 2 == 1 ? 0.0 : margin)) manifold.add(point - 0.5 * gap * n, n, gap, k);
+        if (gap <= margin) manifold.add(point - 0.5 * gap * n, n, gap, k);
     }
     return manifold;
 }

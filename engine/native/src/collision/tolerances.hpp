@@ -20,11 +20,6 @@ inline constexpr std::size_t few_of = 2;  // those that escape are searched for 
 inline constexpr int most_coarse = 8;     // of them that are to be compared with all
 }  // namespace tolerances::broad_phase
 
-// cylinder_pairs.cpp
-namespace tolerances::cylinder_pairs {
-inline constexpr double steep = 0.05;  // sine of the angle from which on a disc does not land flat in a step
-}
-
 // detection.cpp
 namespace tolerances::detection {
 inline constexpr std::size_t most_grown = 256;  // bodies looked for one by one: beyond, all anew is cheaper

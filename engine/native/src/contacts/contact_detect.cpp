@@ -3,6 +3,7 @@
 #include <cmath>
 #include <iterator>
 
+#include "collision/cylinder.hpp"
 #include "collision/shape_cast.hpp"
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
@@ -38,6 +39,28 @@ double ContactStage::margin_of(std::size_t b, const std::vector<Vec6>& velocity,
         spin = std::max(spin, norm(angular(other[b])));
     }
     return options_.time_step * (speed + spin * radius) + closed * radius;
+}
+
+bool is_turned_through(const Detection& detection, const Contact& contact, const Pose& first,
+                       const Pose& second, const std::vector<Vec6>& velocity, const std::vector<Vec6>& dv_ext,
+                       double h) noexcept {
+    constexpr std::uint64_t lower = (std::uint64_t{1} << collider_bits) - 1;
+    const std::uint64_t pair = contact.key >> feature_bits;
+    const Collider::View one = detection.collider(static_cast<int>(pair >> collider_bits)),
+                         two = detection.collider(static_cast<int>(pair & lower));
+    const bool swapped = one.shape.kind == ShapeKind::plane;
+    const Collider::View& rim = swapped ? two : one;
+    const Collider::View& plane = swapped ? one : two;
+    if (plane.shape.kind != ShapeKind::plane || !is_between(rim.shape, contact.point.feature)) return false;
+    const Pose at = placed(swapped ? second : first, rim.part);
+    const Vec3 axis = column(at.rotation, 2);
+    const Vec6& now = velocity[rim.body];
+    const double spin = std::max(std::abs(dot(axis, angular(now))),
+                                 std::abs(dot(axis, angular(now) + angular(dv_ext[rim.body]))));
+    const double lever =
+        std::abs(dot(contact.point.normal, cross(axis, contact.point.position - at.position)));
+    const double gap = contact.point.gap, none = closed * detection.radius()[rim.body];
+    return gap > none && gap <= h * spin * lever + none;
 }
 
 /// Bodies that pass each other sideways need no row: what counts is the speed along the normal.
@@ -154,6 +177,7 @@ void ContactStage::find_open_again() {
 }
 
 void ContactStage::look_at(const std::vector<IndexPair>& near) {
+    const double h = options_.time_step;
     known_.clear();
     open_bodies_.clear();
     const std::size_t before = points_.size();
@@ -204,8 +228,12 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
         for (std::size_t i = 1; i < scratch_.size(); ++i)  // a few, nearly always in order
             for (std::size_t at = i; at > 0 && by_key(scratch_[at], scratch_[at - 1]); --at)
                 std::swap(scratch_[at], scratch_[at - 1]);
-        for (const Contact& contact : scratch_)
-            if (reachable(contact)) add_point(contact, poses_[contact.first], poses_[contact.second], -1.0);
+        for (const Contact& contact : scratch_) {
+            const Pose &one = poses_[contact.first], &two = poses_[contact.second];
+            if (reachable(contact) &&
+                !is_turned_through(detection_, contact, one, two, velocity_, dv_ext_, h))
+                add_point(contact, one, two, -1.0);
+        }
     }
     for (std::size_t k = before; k < points_.size(); ++k) {
         // As deep as a body will be when it meets the next part of what holds it.

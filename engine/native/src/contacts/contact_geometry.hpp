@@ -3,8 +3,9 @@
 
 #include <cmath>
 #include <cstddef>
+#include <vector>
 
-#include "collision/shape.hpp"
+#include "collision/detection.hpp"
 #include "contacts/pivot_system.hpp"
 #include "contacts/tolerances.hpp"
 #include "linear/vec.hpp"
@@ -44,5 +45,12 @@ inline Vec6 sum(const Vec6& a, const Vec6& b, double s = 1.0) noexcept {
     for (int i = 0; i < 6; ++i) c[i] = a[i] + s * b[i];
     return c;
 }
+
+/// Whether a rim's spin about its own axis alone closes an open point between its lowest and its opposite within a step, with
+/// or without this step's forces. Such a point is not of the surface that comes there: the rim turns through it, and its row
+/// would hold the rim to a radian a step. The bodies stand at `first` and `second`.
+bool is_turned_through(const Detection& detection, const Contact& contact, const Pose& first,
+                       const Pose& second, const std::vector<Vec6>& velocity, const std::vector<Vec6>& dv_ext,
+                       double h) noexcept;
 
 }  // namespace spook

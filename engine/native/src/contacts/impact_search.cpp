@@ -183,6 +183,8 @@ bool ContactStage::add_toi_points(IndexPair pair, const Pose& first, const Pose&
                             scratch_);
     bool met = false;
     for (const Contact& contact : scratch_) {
+        if (is_turned_through(detection_, contact, first, second, velocity, dv_ext_, options_.time_step))
+            continue;
         add_point(contact, first, second, time);
         Point& point = points_.back();
         const double closing = -relative(point, contact.point.normal, velocity, false);
@@ -246,7 +248,9 @@ void ContactStage::move_impacts_to_start(std::size_t from, const std::vector<Vec
             }))
             scratch_.clear();
         for (const Contact& contact : scratch_) {
-            add_point(contact, poses_[contact.first], poses_[contact.second], toi);
+            const Pose &one = poses_[contact.first], &two = poses_[contact.second];
+            if (is_turned_through(detection_, contact, one, two, velocity, dv_ext_, h)) continue;
+            add_point(contact, one, two, toi);
             if (material(contact).restitution > 0.0)
                 put_on_mover(points_.back(), solver_index_[contact.first] >= 0,
                              solver_index_[contact.second] >= 0);
