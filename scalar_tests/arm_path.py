@@ -25,7 +25,7 @@ from spook_tracker.engine import (
     Trace,
 )
 from spook_tracker.engine.observe import Observable
-from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
@@ -110,9 +110,10 @@ def guided() -> Scene:
 
 
 @functools.cache
-def falling() -> Scene:
-    """Held in the second pose by drives of which two are too weak."""
-    return drives([Motor(speed=0.0, max_force=WEAK.get(k)) for k in JOINTS], POSES[1])
+def falling(share: float = 1.0) -> Scene:
+    """Held in the second pose by drives of which two are too weak, and may carry `share` of their bounds."""
+    bounds = {k: share * bound for k, bound in WEAK.items()}
+    return drives([Motor(speed=0.0, max_force=bounds.get(k)) for k in JOINTS], POSES[1])
 
 
 ANGLES: dict[str, Observable] = {f"q{k}": Trace(quantity=JointCoordinate(f"joint {k + 1}")) for k in JOINTS}
@@ -158,15 +159,23 @@ def late() -> float:
     return worst
 
 
-def fall(simulate: Simulate) -> dict[str, float]:
-    """A quarter of a second with two drives at their bounds."""
+def released(simulate: Simulate, share: float = 1.0) -> tuple[Any, float]:
+    """Angles in a quarter of a second with two drives at so much of their bounds, and how far their torques are from that,
+    relative to it."""
     observe = ANGLES | {f"{k}": Trace(quantity=ConstraintForce(f"joint {k + 1}")) for k in WEAK}
-    result = simulate(falling(), time_step=TIME_STEP, steps=FALL, observe=observe)
+    result = simulate(falling(share), time_step=TIME_STEP, steps=FALL, observe=observe)
     turned, worst = angles(result), 0.0
     for step in range(1, FALL + 1):
         arm = kinematics(np.asarray(POSES[1]) + turned[step - 1])
         for k, bound in WEAK.items():
-            worst = max(worst, abs(abs(float(arm[k][1] @ result[f"{k}"][step, 3:])) / bound - 1.0))
+            torque = float(arm[k][1] @ result[f"{k}"][step, 3:])
+            worst = max(worst, abs(abs(torque) / (share * bound) - 1.0))
+    return turned, worst
+
+
+def fall(simulate: Simulate) -> dict[str, float]:
+    """The drives' torques, and how far their joints and the others have turned."""
+    turned, worst = released(simulate)
     held = [k for k in JOINTS if k not in WEAK]
     return {
         "bound_error": worst,
@@ -238,6 +247,11 @@ def stiffest(simulate: Simulate) -> BreakPoint:
     return break_point(
         functools.partial(comes_back, simulate), 0.3 * FASTEST, 3.0 * FASTEST, resolution=1e-3, walk=4
     )
+
+
+def bounded(simulate: Simulate, share: float) -> bool:
+    """Whether drives of so small a share of their bounds carry that, to 1e-9, while the arm falls."""
+    return released(simulate, share)[1] < 1e-9
 
 
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
@@ -368,6 +382,18 @@ TEST = ScalarTest(
             expected=(0.998 * FASTEST, 1.001 * FASTEST),
             expected_source="e'' = −ω² e − 2 ω e' once a step is z² − (2 − 2 h ω − (h ω)²) z + 1 − 2 h ω: a root is −1 at "
             "h ω = 2 (√2 − 1); the search ends within a thousandth",
+        ),
+        unbroken(
+            bounded,
+            1.0,
+            1e-6,
+            name="weakest",
+            title="Least share of their bounds that two drives carry while the arm falls",
+            definition="their torques are the bounds to 1e-9 in 15 steps",
+            source="a multiplier at its bound is the bound",
+            unit="1",
+            configuration="weak",
+            walk=4,
         ),
     ),
     ladders=(

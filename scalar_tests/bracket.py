@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from spook_tracker.engine import Result
-from spook_tracker.scalar_tests.case import BreakPoint
+from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityStudy
 
 WALK = 12  # grid values between easy and hard
 GROWTH = 2.0  # a quantity that doubles from the middle third of a run to the last is growing
@@ -44,6 +44,37 @@ def break_point(
         else:
             bad = middle
     return BreakPoint(value=good, resolution=resolution, evaluations=asked)
+
+
+def unbroken(
+    holds: Callable[[Simulate, float], bool],
+    easy: float,
+    hard: float,
+    *,
+    name: str,
+    title: str,
+    definition: str,
+    source: str,
+    unit: str,
+    configuration: str = "plain",
+    walk: int = 6,
+) -> StabilityStudy:
+    """The break point of what by theory holds all the way to `hard`, where the search ends; `source` says why it does."""
+
+    def study(simulate: Simulate) -> BreakPoint:
+        return break_point(lambda value: holds(simulate, value), easy, hard, walk=walk)
+
+    return StabilityStudy(
+        name=name,
+        title=title,
+        configuration=configuration,
+        definition=definition,
+        study=study,
+        unit=unit,
+        better="larger" if hard > easy else "smaller",
+        expected=(hard, hard),
+        expected_source=f"{source}; the search ends at {hard:g} {'' if unit == '1' else unit}".rstrip(),
+    )
 
 
 def break_count(holds: Callable[[int], bool], counts: Sequence[int]) -> BreakPoint:

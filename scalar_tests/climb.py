@@ -111,6 +111,24 @@ def hardest(simulate: Simulate) -> BreakPoint:
     return break_point(functools.partial(rolls, simulate), 0.4 * SLIPS, 2.0 * SLIPS, resolution=1e-3)
 
 
+# tan θ at which the torques carry the weight's part along the slope and no more: 2 T/r = M g sin θ
+STALLS = math.tan(math.asin(2.0 * TORQUE / RADIUS / (MASS * GRAVITY)))
+
+
+def goes_up(simulate: Simulate, slope: float) -> bool:
+    """Whether the vehicle has moved up a slope of that tan θ after half a second."""
+    observe = {"v": Final(quantity=Velocity("chassis"))}
+    result = simulate(scene(-slope, torque=TORQUE), time_step=TIME_STEP, steps=30, observe=observe)
+    return result.completed and float(result["v"][0]) > 0.0
+
+
+def steepest(simulate: Simulate) -> BreakPoint:
+    """The steepest slope that the drives climb."""
+    return break_point(
+        functools.partial(goes_up, simulate), 0.5 * STALLS, 2.0 * STALLS, resolution=1e-3, walk=5
+    )
+
+
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Way up the slope in a second against ½ a t² [m]."""
     observe = {"x": Final(quantity=Position("chassis"))}
@@ -215,6 +233,16 @@ TEST = ScalarTest(
             expected=(0.998 * SLIPS, 1.002 * SLIPS),
             expected_source="friction of the rear wheels, µ times what they carry; all is linear in the torque. The search ends "
             "within a thousandth",
+        ),
+        StabilityStudy(
+            name="steepest",
+            title="Steepest slope that the drives climb",
+            configuration="plain",
+            definition="after half a second the vehicle moves up",
+            study=steepest,
+            unit="1",
+            expected=(0.998 * STALLS, 1.0005 * STALLS),
+            expected_source="2 T/r = M g sin(θ): tan θ = 0.1886. The search ends within a thousandth",
         ),
     ),
     ladders=(

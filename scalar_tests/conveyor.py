@@ -21,7 +21,7 @@ from spook_tracker.engine import (
     Trace,
     Velocity,
 )
-from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
@@ -49,7 +49,7 @@ LAG = 0.5 * BELT**2 / (FRICTION * GRAVITY)  # m
 CLIMB = 0.2  # tan of the slope of the climbing belt
 
 
-def scene(slope: float = 0.0, away: float = AWAY) -> Scene:
+def scene(slope: float = 0.0, away: float = AWAY, speed: float = BELT) -> Scene:
     """A box laid at rest on a belt; gravity is tilted by atan(slope) against the belt's way."""
     rough = Material(friction=FRICTION)
     way = (math.cos(away), math.sin(away))
@@ -59,7 +59,7 @@ def scene(slope: float = 0.0, away: float = AWAY) -> Scene:
         shape=Plane(),
         position=(0.0, 0.0, 0.0),
         material=rough,
-        surface_velocity=(BELT * way[0], BELT * way[1], 0.0),
+        surface_velocity=(speed * way[0], speed * way[1], 0.0),
     )
     box = RigidBody(
         name="box", mass=MASS, shape=Box(EDGE), position=(0.0, 0.0, 0.5 * EDGE[2]), material=rough
@@ -117,6 +117,13 @@ def climbs(simulate: Simulate, slope: float) -> bool:
 def steepest(simulate: Simulate) -> BreakPoint:
     """The steepest slope that is climbed, walking from a fifth of µ to three times µ."""
     return break_point(lambda slope: climbs(simulate, slope), 0.2 * FRICTION, 3.0 * FRICTION, resolution=1e-3)
+
+
+def taken_along(simulate: Simulate, speed: float) -> bool:
+    """Whether a belt of that speed [m/s] gives the box µ g, no more, in ten steps."""
+    observe = {"v": Final(quantity=Velocity("box"))}
+    result = simulate(scene(away=0.0, speed=speed), time_step=TIME_STEP, steps=10, observe=observe)
+    return result.completed and abs(float(result["v"][0]) / (10.0 * TIME_STEP * gain(0.0)) - 1.0) < 1e-9
 
 
 def draw(simulate: Simulate) -> Drawing:
@@ -217,6 +224,16 @@ TEST = ScalarTest(
             unit="1",
             expected=(0.998 * FRICTION, FRICTION),
             expected_source="tan θ = µ, to the resolution of the search",
+        ),
+        unbroken(
+            taken_along,
+            BELT,
+            1e6,
+            name="fastest",
+            title="Fastest belt that takes a box along by µ g",
+            definition="the box's speed after ten steps is µ g t to 1e-9",
+            source="Coulomb's friction knows no speed",
+            unit="m/s",
         ),
     ),
     figures=(Figure(name="speed", title="Speed against time", draw=draw),),

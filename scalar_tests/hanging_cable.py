@@ -19,7 +19,7 @@ from spook_tracker.engine import (
     RigidBody,
     Scene,
 )
-from spook_tracker.scalar_tests.bracket import break_count
+from spook_tracker.scalar_tests.bracket import break_count, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
@@ -80,19 +80,20 @@ def nodes(count: int) -> list[tuple[float, float]]:
 
 
 @functools.cache
-def scene(count: int) -> Scene:
-    """Thin rods on ball joints, at rest where statics puts them."""
+def scene(count: int, whole: float = MASS) -> Scene:
+    """Thin rods on ball joints, at rest where statics puts them; `whole` [kg] is the mass of all."""
     length, places = LENGTH / count, nodes(count)
     rods, joints = [], []
+    across = whole / count * length**2 / 12.0
     for k, angle in enumerate(angles(count, horizontal(count))):
         (x, z), (u, w) = places[k], places[k + 1]
         turn = 0.5 * (0.5 * math.pi - angle)  # the rod lies along its z axis
         rods.append(
             RigidBody(
                 name=f"link {k}",
-                mass=MASS / count,
+                mass=whole / count,
                 shape=Capsule(0.02, length - 0.04),
-                inertia=(MASS / count * length**2 / 12.0, MASS / count * length**2 / 12.0, 1e-5),
+                inertia=(across, across, 1e-5 * whole / MASS),
                 position=(0.5 * (x + u), 0.0, 0.5 * (z + w)),
                 orientation=(math.cos(turn), 0.0, math.sin(turn), 0.0),
             )
@@ -123,6 +124,17 @@ def finest(simulate: Simulate) -> BreakPoint:
         return result.completed and float(result["x"].max()) < 1e-6
 
     return break_count(still, (10, 20, 40, 80))
+
+
+def hangs(simulate: Simulate, whole: float) -> bool:
+    """Whether ten links of that mass [kg] hang still for a second and pull in proportion to it."""
+    observe = {
+        "x": MaximumAbsolute(quantity=Position(), from_start=True),
+        "force": Final(quantity=ConstraintForce("joint 0")),
+    }
+    result = simulate(scene(10, whole), time_step=TIME_STEP, duration=DURATION, observe=observe)
+    pull = -float(result["force"][0]) * MASS / whole
+    return result.completed and float(result["x"].max()) < 1e-9 and abs(pull / horizontal(10) - 1.0) < 1e-9
 
 
 def measure(simulate: Simulate, count: int, time_step: float) -> dict[str, float]:
@@ -261,6 +273,16 @@ TEST = ScalarTest(
             unit="1",
             expected=(49.0, 49.0),
             expected_source="h ω = 2 of the hanging links' fastest swing in their plane",
+        ),
+        unbroken(
+            hangs,
+            MASS,
+            1e12,
+            name="heaviest",
+            title="Heaviest cable of ten links that hangs still",
+            definition="in a second nothing moves by 1e-9 m, and the pull is its weight's share to 1e-9",
+            source="mass scales out of rigid joints",
+            unit="kg",
         ),
     ),
 )

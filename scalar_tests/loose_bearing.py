@@ -32,7 +32,7 @@ from spook_tracker.engine import (
     Velocity,
 )
 from spook_tracker.engine.observe import Observable
-from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
@@ -73,9 +73,9 @@ DURATION = 2.25  # s: four flights
 
 
 @functools.cache
-def scene(time_step: float, preload: float | None = None) -> Scene:
+def scene(time_step: float, preload: float | None = None, slider: float = SLIDER) -> Scene:
     """A crank that a motor turns, a rod whose far end is a pin guided along x, and round it the slider's slot. The pin
-    touches the slot's left wall: it brakes the slider. Or the right one, which a preload [N] on the slider shuts."""
+    touches the slot's left wall: it brakes the slider [kg]. Or the right one, which a preload [N] on the slider shuts."""
     x, lean, _ = (float(value) for value in pin(START))
     rates = [SPEED * float(slope(lambda t, i=i: pin(t)[i], START)) for i in (0, 1)]
     c, s = CRANK * math.cos(START), CRANK * math.sin(START)
@@ -100,7 +100,7 @@ def scene(time_step: float, preload: float | None = None) -> Scene:
         ),
         RigidBody(
             name="slider",
-            mass=SLIDER,
+            mass=slider,
             shape=Compound(tuple(Part(shape=Box(WALL), position=(d, 0.0, 0.0)) for d in (-aside, aside))),
             inertia=(0.01,) * 3,
             position=(x + (PLAY if preload is None else -PLAY), 0, 0),
@@ -188,14 +188,20 @@ def path(times: Any) -> Any:
     return found
 
 
-def runs(simulate: Simulate, time_step: float, method: Method = PLAIN) -> tuple[Any, Any, Any]:
+def runs(
+    simulate: Simulate, time_step: float, method: Method = PLAIN, slider: float = SLIDER
+) -> tuple[Any, Any, Any]:
     """Times, and the slider's place and speed along its guide."""
     observe: dict[str, Observable] = {
         "x": Trace(quantity=Position("slider")),
         "v": Trace(quantity=Velocity("slider")),
     }
     result = simulate(
-        scene(time_step), time_step=time_step, duration=DURATION, method=method, observe=observe
+        scene(time_step, slider=slider),
+        time_step=time_step,
+        duration=DURATION,
+        method=method,
+        observe=observe,
     )
     return result.sample_times["x"], result["x"][:, 0], result["v"][:, 0]
 
@@ -253,6 +259,12 @@ def least(simulate: Simulate) -> BreakPoint:
     return break_point(
         functools.partial(shut, simulate), 4.0 * PRELOAD, 0.25 * PRELOAD, resolution=1e-3, walk=4
     )
+
+
+def flies(simulate: Simulate, slider: float) -> bool:
+    """Whether a slider of that mass [kg] is where it should be in two turns and a quarter."""
+    times, x, _ = runs(simulate, TIME_STEP, slider=slider)
+    return float(np.abs(x - path(times)).max()) < place_limit(TIME_STEP)
 
 
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
@@ -359,6 +371,17 @@ TEST = ScalarTest(
             expected=(PRELOAD - preload_error(), 1.00101 * PRELOAD + preload_error()),
             expected_source="m ω² r (1 + r/l), what the slider needs where crank and rod lie in one line; m (2 ω)² times what the "
             "joints lag; the search ends within a thousandth",
+        ),
+        unbroken(
+            flies,
+            SLIDER,
+            1e9,
+            name="heaviest",
+            title="Heaviest slider that flies, strikes and sticks as it should",
+            definition="in two turns and a quarter its place is right to the limit of the question",
+            source="the pin goes as the motor has it, whatever it pushes",
+            unit="kg",
+            walk=4,
         ),
     ),
     ladders=(

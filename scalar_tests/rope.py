@@ -29,7 +29,7 @@ from spook_tracker.engine import (
     Trace,
 )
 from spook_tracker.engine.observe import Observable
-from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
@@ -61,10 +61,10 @@ def middle_pull() -> float:
 
 
 @functools.cache
-def rope(count: int, spin: float = SPIN, nudge: float = 0.0) -> Scene:
+def rope(count: int, spin: float = SPIN, nudge: float = 0.0, whole: float = MASS) -> Scene:
     """Thin rods on ball joints in a straight line along x, which turns about its middle; nothing else acts. `nudge` [rad/s]
-    tilts every other rod up and down."""
-    length, mass = LENGTH / count, MASS / count
+    tilts every other rod up and down; `whole` [kg] is the mass of all."""
+    length, mass = LENGTH / count, whole / count
     across = mass * length**2 / 12.0
     links = []
     for k in range(count):
@@ -196,6 +196,14 @@ def straight(simulate: Simulate, spin: float) -> bool:
 def fastest(simulate: Simulate) -> BreakPoint:
     """The fastest spin of a rope of few links."""
     return break_point(functools.partial(straight, simulate), 0.4 * FASTEST, 2.0 * FASTEST, resolution=0.005)
+
+
+def pulls(simulate: Simulate, whole: float) -> bool:
+    """Whether forty links of that mass [kg] pull in their middle as Σ m ω² x asks, after thirty steps."""
+    observe = {"pull": Final(quantity=ConstraintForce("joint 20"))}
+    result = simulate(rope(40, whole=whole), time_step=TIME_STEP, steps=30, observe=observe)
+    pull = float(np.linalg.norm(result["pull"][:3])) * MASS / whole
+    return result.completed and abs(pull / middle_pull() - 1.0) < 10.0 * (SPIN * TIME_STEP) ** 2
 
 
 def cost(simulate: Simulate) -> dict[str, float]:
@@ -366,6 +374,17 @@ TEST = ScalarTest(
             unit="rad/s",
             expected=(0.99 * FASTEST, 1.005 * FASTEST),
             expected_source="h ω = 2 of the fastest swing across it, by eigenvalues: about T h²/(m l) = 1/3 in the middle",
+        ),
+        unbroken(
+            pulls,
+            MASS,
+            1e12,
+            name="heaviest",
+            title="Heaviest rope of forty links that pulls as it should",
+            definition="the pull in its middle after thirty steps is Σ m ω² x, to ten times (h ω)²",
+            source="mass scales out of rigid joints",
+            unit="kg",
+            walk=4,
         ),
     ),
     ladders=(

@@ -64,9 +64,9 @@ FALLS = 1.6  # s
 FINE = 1.0 / 500.0  # s, of the integration
 
 
-def scene(pace: Sinusoid | Table, strength: float, frequency: float) -> Scene:
+def scene(pace: Sinusoid | Table, strength: float, frequency: float, friction: float = 2.0) -> Scene:
     """The block upright at rest; the floor's speed is the pace times that of (strength × UPLIFT) sin(2π frequency t)."""
-    rough = Material(friction=2.0)
+    rough = Material(friction=friction)
     floor = RigidBody(
         name="floor",
         motion="kinematic",
@@ -93,11 +93,11 @@ def shaken() -> Scene:
     return scene(pace, SHAKE, FREQUENCY)
 
 
-def struck(strength: float) -> Scene:
+def struck(strength: float, friction: float = 2.0) -> Scene:
     """By one half sine; then the floor goes on steadily."""
     times = [0.5 / PULSE * k / KNOTS for k in range(KNOTS + 1)]
     pace = Table(tuple(times), tuple(1.0 - math.cos(2.0 * math.pi * PULSE * t) for t in times))
-    return scene(pace, strength, PULSE)
+    return scene(pace, strength, PULSE, friction)
 
 
 @dataclass(frozen=True)
@@ -241,6 +241,18 @@ def strongest(simulate: Simulate) -> BreakPoint:
     return break_point(functools.partial(stands, simulate), 0.6, 4.0, resolution=1e-3)
 
 
+def lifts(simulate: Simulate, friction: float) -> bool:
+    """Whether a floor of that friction lifts an edge, rather than draw itself away below the block."""
+    observe = {"q": Final(quantity=Orientation("block"))}
+    result = simulate(struck(1.2, friction), time_step=COARSE, steps=15, observe=observe)
+    return result.completed and abs(float(result["q"][2])) > 1e-6
+
+
+def smoothest(simulate: Simulate) -> BreakPoint:
+    """The least friction of a floor that makes the block rock."""
+    return break_point(functools.partial(lifts, simulate), 2.0, 0.02, resolution=1e-3, walk=6)
+
+
 def draw(simulate: Simulate) -> Drawing:
     """The lean over time at three steps."""
     curves, after = [], []
@@ -340,6 +352,17 @@ TEST = ScalarTest(
             expected=(0.998 * LEAST, 1.002 * LEAST),
             expected_source="1.915 times the acceleration that lifts an edge, by integration of Housner's equation; steps of "
             "1/60 s give 0.02 % more, the search ends within 0.1 %",
+        ),
+        StabilityStudy(
+            name="smoothest",
+            title="Least friction with which the floor makes the block rock",
+            configuration="plain",
+            definition="1.2 times the acceleration that lifts an edge does so, by 2e-6 rad",
+            study=smoothest,
+            unit="1",
+            better="smaller",
+            expected=(HALF_WIDTH / HALF_HEIGHT, 1.002 * HALF_WIDTH / HALF_HEIGHT),
+            expected_source="µ m g h tips the block over b where µ > b/h; the search ends within 0.1 %",
         ),
     ),
     ladders=(

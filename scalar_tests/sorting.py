@@ -22,7 +22,7 @@ from spook_tracker.engine import (
     Trace,
     Velocity,
 )
-from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
@@ -72,8 +72,8 @@ def box(name: str, friction: float, place: complex, velocity: complex, spin: flo
     )
 
 
-def belt() -> Scene:
-    """Boxes of different friction come in askew onto a belt, one behind the other."""
+def belt(times: float = 1.0) -> Scene:
+    """Boxes of different friction come in askew onto a belt, one behind the other, `times` as fast as seen from it."""
     surface = RigidBody(
         name="belt",
         motion="static",
@@ -83,7 +83,7 @@ def belt() -> Scene:
         surface_velocity=(BELT, 0.0, 0.0),
     )
     boxes = [
-        box(f"box {k}", friction, complex(APART * k), complex(*FEED)) for k, friction in enumerate(SORTS)
+        box(f"box {k}", friction, complex(APART * k), BELT + times * SLIP) for k, friction in enumerate(SORTS)
     ]
     return Scene(bodies=(surface, *boxes), gravity=(0.0, 0.0, -GRAVITY))
 
@@ -124,6 +124,12 @@ def ride(start: complex, velocity: complex, friction: float, rate: float, h: flo
     return np.array(places)
 
 
+def off_the_way(result: Result, k: int, times: float = 1.0) -> tuple[Any, Any]:
+    """The way of a box as seen from the belt, and that by the method's own steps [m]."""
+    way = result[f"x{k}"][:, 0] - APART * k - BELT * result.sample_times[f"x{k}"] + 1j * result[f"x{k}"][:, 1]
+    return way, ride(0.0, times * SLIP, SORTS[k], 0.0, TIME_STEP, len(way) - 1)
+
+
 def on_the_belt(simulate: Simulate) -> dict[str, float]:
     """Ways in the belt's frame, until all boxes rest in it."""
     observe = {f"x{k}": Trace(quantity=Position(f"box {k}")) for k in range(len(SORTS))}
@@ -131,10 +137,8 @@ def on_the_belt(simulate: Simulate) -> dict[str, float]:
     result = simulate(belt(), time_step=TIME_STEP, duration=DURATION, observe=observe)
     place, straight, late, carried = 0.0, 0.0, 0.0, 0.0
     for k, friction in enumerate(SORTS):
-        time = result.sample_times[f"x{k}"]
-        way = result[f"x{k}"][:, 0] - APART * k - BELT * time + 1j * result[f"x{k}"][:, 1]
+        way, exact = off_the_way(result, k)
         slip = np.hypot(result[f"v{k}"][:, 0] - BELT, result[f"v{k}"][:, 1])
-        exact = ride(0.0, SLIP, friction, 0.0, TIME_STEP, len(way) - 1)
         place = max(place, float(np.abs(way - exact).max()))
         straight = max(straight, float(np.abs((way / SLIP).imag).max() * abs(SLIP)))
         takes = math.ceil(abs(SLIP) / (friction * GRAVITY * TIME_STEP))
@@ -188,6 +192,14 @@ def stays(simulate: Simulate, friction: float) -> bool:
 def smoothest(simulate: Simulate) -> BreakPoint:
     """The least µ that keeps a box, walking from three times the least to a third of it."""
     return break_point(lambda mu: stays(simulate, mu), 3.0 * LEAST, LEAST / 3.0, resolution=1e-3)
+
+
+def sorted_at(simulate: Simulate, times: float) -> bool:
+    """Whether boxes so many times as fast keep their ways for a second, to 1e-9 of them."""
+    observe = {f"x{k}": Trace(quantity=Position(f"box {k}")) for k in range(len(SORTS))}
+    result = simulate(belt(times), time_step=TIME_STEP, steps=60, observe=observe)
+    ways = [off_the_way(result, k, times) for k in range(len(SORTS))]
+    return result.completed and all(np.abs(a - b).max() < 1e-9 * np.abs(b).max() for a, b in ways)
 
 
 def draw_belt(simulate: Simulate) -> Drawing:
@@ -331,6 +343,16 @@ TEST = ScalarTest(
             better="smaller",
             expected=(LEAST, 1.006 * LEAST),
             expected_source="Ω² r/g; the circle grows by 0.5 %, and the resolution of the search",
+        ),
+        unbroken(
+            sorted_at,
+            1.0,
+            1e6,
+            name="fastest",
+            title="How many times as fast boxes may come onto the belt",
+            definition="ways of four boxes are the method's own for a second, to 1e-9 of them",
+            source="Coulomb's friction knows no speed",
+            unit="1",
         ),
     ),
     figures=(

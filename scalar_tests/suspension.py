@@ -62,20 +62,20 @@ CORNERS = {
 }
 
 
-def scene(heave: float = 0.0, tilt: float = 0.0, lean: float = 0.0) -> Scene:
+def scene(heave: float = 0.0, tilt: float = 0.0, lean: float = 0.0, weight: float = 1.0) -> Scene:
     """A chassis on four upright springs at the height of its centre, let go `heave` [m] too high and turned by `tilt` about
-    its axles' direction or by `lean` along it."""
+    its axles' direction or by `lean` along it; of so many times its mass."""
     chassis = RigidBody(
         name="chassis",
-        mass=MASS,
-        inertia=(ROLLING, PITCHING, 1700.0),
+        mass=weight * MASS,
+        inertia=(weight * ROLLING, weight * PITCHING, weight * 1700.0),
         shape=Box((3.6, 1.2, 0.5)),
         position=(0.0, 0.0, LENGTH + heave),
         orientation=_turned(tilt, lean),
     )
     springs = []
     for name, (x, side, stiffness) in CORNERS.items():
-        carried = 0.5 * MASS * GRAVITY * (REAR if x > 0.0 else FRONT) / (FRONT + REAR)  # N
+        carried = 0.5 * weight * MASS * GRAVITY * (REAR if x > 0.0 else FRONT) / (FRONT + REAR)  # N
         springs.append(
             Spring(
                 name=name,
@@ -94,14 +94,14 @@ def _turned(tilt: float, lean: float) -> tuple[float, float, float, float]:
     return (math.cos(0.5 * angle), share * lean, share * tilt, 0.0)
 
 
-def bounded(simulate: Simulate, time_step: float) -> bool:
+def bounded(simulate: Simulate, time_step: float, weight: float = 1.0) -> bool:
     """Whether a nudge in bounce, pitch and roll stays small for 30 steps; struts that carry a load fall over sideways, but
     not so soon."""
     observe: dict[str, Observable] = {
         "x": Trace(quantity=Position("chassis")),
         "q": Trace(quantity=Orientation("chassis")),
     }
-    result = simulate(scene(NUDGE, NUDGE, NUDGE), time_step=time_step, steps=30, observe=observe)
+    result = simulate(scene(NUDGE, NUDGE, NUDGE, weight), time_step=time_step, steps=30, observe=observe)
     if not result.completed:
         return False
     swings = (result["x"][:, 2] - LENGTH, 2.0 * result["q"][:, 1], 2.0 * result["q"][:, 2])
@@ -112,6 +112,16 @@ def longest(simulate: Simulate) -> BreakPoint:
     """The longest step that carries the springs."""
     fastest = 2.0 / ROLL
     return break_point(functools.partial(bounded, simulate), 0.4 * fastest, 2.0 * fastest, resolution=0.002)
+
+
+LIGHTEST = (0.5 * TIME_STEP * ROLL) ** 2  # of its mass: h ω = 2 of the roll
+
+
+def lightest(simulate: Simulate) -> BreakPoint:
+    """The least part of its mass with which the chassis rests on its springs."""
+    return break_point(
+        functools.partial(bounded, simulate, TIME_STEP), 1.0, 0.25 * LIGHTEST, resolution=2e-3, walk=6
+    )
 
 
 def swings(simulate: Simulate, time_step: float, method: Method = PLAIN) -> dict[str, float]:
@@ -262,6 +272,17 @@ TEST = ScalarTest(
             expected=(0.995 * 2.0 / ROLL, 1.005 * 2.0 / ROLL),
             expected_source="springs are plain forces: h ω = 2 of the fastest swing, the roll at √(Σk y²/I); 0.5 % more grow "
             "four hundredfold in 30 steps",
+        ),
+        StabilityStudy(
+            name="lightest",
+            title="Least part of its mass with which the chassis rests on its springs at 1/60 s",
+            configuration="plain",
+            definition="let go 1e-7 m and rad in bounce, pitch and roll none of them grows a hundredfold in 30 steps",
+            study=lightest,
+            unit="1",
+            better="smaller",
+            expected=(0.99 * LIGHTEST, 1.01 * LIGHTEST),
+            expected_source="h ω = 2 of the roll, ω² as 1 over the mass; 1 % less grows four hundredfold in 30 steps",
         ),
     ),
     ladders=(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from typing import Any
 
@@ -47,6 +48,10 @@ TURN = 2.0 * math.pi / CIRCLE  # s
 STEPS = round(TURN / TIME_STEP)
 THROWN = FRICTION * GRAVITY / RATE**2  # m, where boxes begin to slide
 BOX = (0.06, 0.06, 0.02)  # m
+FEW = 10  # steps, of the study of the longest
+# s: a step asks (2/7) Ω h |v| of h µ g, and |v| grows by √(1 + (2 Ω h/7)²) a step; the last friction that is seen is that of the
+# last step but one.
+LONGEST = math.sqrt((FRICTION * GRAVITY / CIRCLE / math.hypot(*PUSH)) ** (2.0 / (FEW - 2)) - 1.0) / CIRCLE
 
 ROUGH = Material(friction=FRICTION)
 
@@ -152,6 +157,21 @@ def farthest(simulate: Simulate) -> BreakPoint:
     return break_point(lambda radius: stays(simulate, radius), 0.3 * THROWN, 3.0 * THROWN, resolution=1e-3)
 
 
+def follows(simulate: Simulate, time_step: float) -> bool:
+    """Whether the ball's places are those of the recursion in so long steps [s]."""
+    observe = {"x": Trace(quantity=Position("ball"))}
+    result = simulate(rolling(), time_step=time_step, steps=FEW, observe=observe)
+    places = result["x"][:, 0] + 1j * result["x"][:, 1]
+    return result.completed and float(np.abs(places - recursion(time_step, FEW)).max()) < 1e-6
+
+
+def longest_step(simulate: Simulate) -> BreakPoint:
+    """The longest step in which the ball rolls."""
+    return break_point(
+        functools.partial(follows, simulate), TIME_STEP, 4.0 * LONGEST, resolution=1e-3, walk=6
+    )
+
+
 def draw(simulate: Simulate) -> Drawing:
     """The ball's way over one circle, from above."""
     observe = {"x": Trace(quantity=Position("ball"))}
@@ -191,7 +211,7 @@ TEST = ScalarTest(
     theory=(
         "Rolling: v + r n × w = Ω × x. With I = ⅖ m r² the friction gives (7/2) v' = Ω × v: a circle at (2/7) Ω.",
         "One step: x₊ = x + h v, v₊ = v + (2/7) h Ω × v. The speed grows by (1 + (2 Ω h/7)²)^½ a step, the turn is "
-        "arctan(2 Ω h/7): the rate is (2 Ω h/7)²/3 too low.",
+        "arctan(2 Ω h/7): the rate is (2 Ω h/7)²/3 too low. It rolls while (2/7) Ω |v| ≤ µ g.",
         "A box rides along while Ω² R ≤ µ g; a step asks h Ω² R of at most h µ g, so the radius is exact.",
     ),
     reference="Closed forms; the recursion of one step.",
@@ -236,6 +256,17 @@ TEST = ScalarTest(
             unit="m",
             expected=(0.998 * THROWN, 1.002 * THROWN),
             expected_source="µ g/Ω² = 0.545 m, to the resolution of the search and of what counts as carried",
+        ),
+        StabilityStudy(
+            name="longest-step",
+            title="Longest step in which the ball rolls",
+            configuration="plain",
+            definition="its places in ten steps are those of the recursion, to 1e-6 m",
+            study=longest_step,
+            unit="s",
+            expected=(0.998 * LONGEST, 1.001 * LONGEST),
+            expected_source="the ball's speed grows by √(1 + (2 Ω h/7)²) a step, until (2/7) Ω |v| is more than µ g in the ninth; "
+            "to the resolution of the search",
         ),
     ),
     figures=(Figure(name="circle", title="The ball's way from above", draw=draw),),

@@ -22,7 +22,7 @@ from spook_tracker.engine import (
     Trace,
 )
 from spook_tracker.engine.observe import Observable
-from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Example,
@@ -74,8 +74,9 @@ def _place(point: Any) -> tuple[float, float, float]:
     return (float(point[0]), float(point[1]), 0.0)
 
 
-def scene(time_step: float) -> Scene:
-    """Seven bodies, ten hinges, a spring from C to D; no gravity, at rest, a torque on the crank."""
+def scene(time_step: float, times: float = 1.0) -> Scene:
+    """Seven bodies, ten hinges, a spring from C to D; no gravity, at rest, a torque on the crank. Masses, torque and all that
+    gives way so many `times` as large and stiff."""
     fixed = np.zeros(2)
     crank_end = _turn(START["crank"]) @ [0.007, 0.0]  # F
     joint = B + _turn(START["triangle"]) @ [0.0, -0.035]  # E
@@ -84,7 +85,8 @@ def scene(time_step: float) -> Scene:
     upper = A + _turn(START["upper"]) @ [0.0, -0.04]  # H
 
     def body(name: str, mass: float, inertia: float, centre: np.ndarray) -> RigidBody:
-        return RigidBody(name=name, mass=mass, inertia=(inertia, inertia, inertia), position=_place(centre))
+        moment = times * inertia
+        return RigidBody(name=name, mass=times * mass, inertia=(moment,) * 3, position=_place(centre))
 
     bodies = (
         body("K1", 0.04325, 2.194e-6, _along(fixed, crank_end, 0.00092)),
@@ -99,7 +101,7 @@ def scene(time_step: float) -> Scene:
     def hinge(name: str, first: str, second: str, at: np.ndarray) -> Hinge:
         damping = 2.0 * time_step
         return Hinge(
-            name=name, between=(first, second), at=_place(at), compliance=COMPLIANCE, damping=damping
+            name=name, between=(first, second), at=_place(at), compliance=COMPLIANCE / times, damping=damping
         )
 
     spring = Distance(
@@ -107,7 +109,7 @@ def scene(time_step: float) -> Scene:
         between=(_place(C), "K3"),
         anchors=((0.0, 0.0, 0.0), _place(hook - bodies[2].position[:2])),
         rest_length=REST,
-        compliance=1.0 / STIFFNESS,
+        compliance=1.0 / (times * STIFFNESS),
         damping=0.0,
     )
     hinges = (
@@ -122,7 +124,7 @@ def scene(time_step: float) -> Scene:
         hinge("A upper", WORLD, "K7", A),
         hinge("H", "K7", "K6", upper),
     )
-    torque = Load(name="torque", body="K1", torque=(0.0, 0.0, TORQUE))
+    torque = Load(name="torque", body="K1", torque=(0.0, 0.0, times * TORQUE))
     return Scene(
         bodies=bodies,
         constraints=(*hinges, spring),
@@ -132,13 +134,15 @@ def scene(time_step: float) -> Scene:
     )
 
 
-def answers(simulate: Simulate, time_step: float, method: Method = PLAIN) -> dict[str, float]:
+def answers(
+    simulate: Simulate, time_step: float, method: Method = PLAIN, times: float = 1.0
+) -> dict[str, float]:
     """The library's error of the four angles at the ground, and how far F is off after 0.01 s."""
     observe: dict[str, Observable] = {
         name: Trace(quantity=JointCoordinate(hinge)) for name, hinge in HINGES.items()
     }
     result = simulate(
-        scene(time_step), time_step=time_step, duration=DURATION, method=method, observe=observe
+        scene(time_step, times), time_step=time_step, duration=DURATION, method=method, observe=observe
     )
     angles = {name: START[name] + result[name] for name in HINGES}
     early = _turn(float(angles["crank"][round(0.01 / time_step)])) @ [0.007, 0.0]
@@ -176,6 +180,11 @@ def in_class(simulate: Simulate, time_step: float) -> bool:
 def longest_step(simulate: Simulate) -> BreakPoint:
     """The longest step [s] that keeps the low class."""
     return break_point(functools.partial(in_class, simulate), 5e-5, 5e-4, resolution=2e-3, walk=6)
+
+
+def scales(simulate: Simulate, times: float) -> bool:
+    """Whether a mechanism so many times as heavy, driven and stiff keeps the low class in steps of 1e-4 s."""
+    return answers(simulate, 1e-4, times=times)["library_error"] < LOW
 
 
 OUTPUTS = "the angles of crank, triangle and both rockers after 0.03 s"
@@ -247,6 +256,17 @@ TEST = ScalarTest(
             expected=(0.997 * LONGEST, LONGEST),
             expected_source="213 steps keep it and 212 do not: the same rows in the mechanism's plane, stepped by the prototype "
             "tests/oracle_squeezer.py; to the resolution of the search",
+        ),
+        unbroken(
+            scales,
+            1.0,
+            1e12,
+            name="heaviest",
+            title="How many times as heavy and as strongly driven the mechanism may be",
+            definition="the library's error below 0.1 after 0.03 s in steps of 1e-4 s, all that gives way as much stiffer",
+            source="the unit of mass scales out of every equation",
+            unit="1",
+            walk=4,
         ),
     ),
 )
