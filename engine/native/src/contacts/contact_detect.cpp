@@ -137,7 +137,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
         move_impacts_to_start(closed_points, predicted_);
     }
     if (points_.empty()) {
-        state_.cache.clear();
+        state_.cache.points.clear();
         return false;
     }
     state_.counters.contacts += points_.size();
@@ -273,7 +273,7 @@ void ContactStage::add_point(const Contact& contact, const Pose& first, const Po
     point.toi = toi;
     point.begun = contact.point.gap;
     if (oriented_) orient(point, first, second);
-    if (!state_.asleep.empty()) wake_sleepers(contact);
+    if (!state_.cache.asleep.empty()) wake_sleepers(contact);
 }
 
 /// Where friction differs with the direction its bound is an ellipse about the direction's shadow on the surface. In

@@ -128,16 +128,17 @@ void ContactStage::lay_down() {
 /// Sorts the points by key and finds each one's predecessor in the step before.
 void ContactStage::order_points() {
     order_by_key(points_, toi_points_, places_);
+    const std::vector<CachedContact>& cached = state_.cache.points;
     std::size_t old = 0;
     for (Point& point : points_) {
-        while (old < state_.cache.size() && state_.cache[old].contact.key < point.contact.key) ++old;
-        if (old == state_.cache.size() || state_.cache[old].contact.key != point.contact.key) continue;
+        while (old < cached.size() && cached[old].contact.key < point.contact.key) ++old;
+        if (old == cached.size() || cached[old].contact.key != point.contact.key) continue;
         // What carries nothing may be rounded below it.
-        point.before = std::max(0.0, state_.cache[old].normal);
-        point.compression_before = state_.cache[old].compression;
+        point.before = std::max(0.0, cached[old].normal);
+        point.compression_before = cached[old].compression;
         if (point.solved) continue;
-        std::copy_n(state_.cache[old].tangent, 2, point.tangents);
-        if (resists_turning_) std::copy_n(state_.cache[old].turning, 3, own_extras(point).turning);
+        std::copy_n(cached[old].tangent, 2, point.tangents);
+        if (resists_turning_) std::copy_n(cached[old].turning, 3, own_extras(point).turning);
     }
     ordered_ = points_.size();
 }

@@ -99,10 +99,8 @@ void ContactStage::take_in(std::size_t known) {
     state_.counters.contacts += points_.size() - known;
     for (std::size_t k = known; k < points_.size(); ++k) {
         Point& point = points_[k];
-        const auto old =
-            std::lower_bound(state_.cache.begin(), state_.cache.end(), point.contact.key,
-                             [](const CachedContact& t, std::uint64_t key) { return t.contact.key < key; });
-        if (old == state_.cache.end() || old->contact.key != point.contact.key) continue;
+        const CachedContact* const old = state_.cache.find(point.contact.key);
+        if (old == nullptr) continue;
         point.before = std::max(0.0, old->normal);
         point.compression_before = old->compression;
         std::copy_n(old->tangent, 2, point.tangents);
@@ -282,7 +280,7 @@ bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
     mark_rows(system);  // by joints; of contacts those that push, or did in an impact
     for (std::size_t b = 0; b < solver_index_.size(); ++b)
         if (solver_index_[b] >= 0 && event_time_[b] >= 0.0) has_rows_[solver_index_[b]] = 1;
-    state_.cache.clear();
+    state_.cache.points.clear();
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
         double impulse[3];
@@ -299,7 +297,7 @@ bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
             if (solver_index_[body] >= 0) has_rows_[solver_index_[body]] = 1;
     }
     if (report.finite) correct_events(system);
-    order_by_key(state_.cache, unordered_, places_);
+    order_by_key(state_.cache.points, unordered_, places_);
     return report.finite;
 }
 

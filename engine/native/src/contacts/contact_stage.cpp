@@ -360,7 +360,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
                 z *= share[std::max(system.rows[k].first, system.rows[k].second)];
     }
 
-    state_.cache.clear();
+    state_.cache.points.clear();
     for (std::size_t k = 0; k < points_.size(); ++k) {
         Point& point = points_[k];
         const Vec3 along = store_solution(system.rows[joints + k], point);
@@ -403,9 +403,9 @@ bool ContactStage::is_stopped(const Point& point, double normal) const {
 }
 
 /// Takes down what a point did: its normal impulse, and that along the surface.
-ContactStage::CachedContact& ContactStage::cache_contact(const MixedSystem& system, const Point& point,
-                                                         double normal, Vec3 along) {
-    CachedContact& cached = state_.cache.emplace_back();
+CachedContact& ContactStage::cache_contact(const MixedSystem& system, const Point& point, double normal,
+                                           Vec3 along) {
+    CachedContact& cached = state_.cache.points.emplace_back();
     const Vec3 n = point.contact.point.normal;
     cached.contact = point.contact;
     cached.normal = normal;
@@ -469,6 +469,18 @@ void ContactStage::correct_events(const MixedSystem& system) {
         for (int i = 0; i < 3; ++i) correction_[u][i] += more[i];
     }
     apply_support_impulses(system);
+}
+
+BlockLdlt::Counters ContactStage::factor_counters() const noexcept {
+    BlockLdlt::Counters sum = resting_solver_.counters();
+    for (const IslandSolver* solver : {&impact_solver_, &projection_solver_}) {
+        const BlockLdlt::Counters more = solver->counters();
+        sum.factorisations += more.factorisations;
+        sum.block_operations += more.block_operations;
+        sum.floored_pivots += more.floored_pivots;
+        sum.solves += more.solves;
+    }
+    return sum;
 }
 
 }  // namespace spook

@@ -49,6 +49,7 @@
 
 #include "collision/detection.hpp"
 #include "contacts/contact_arrays.hpp"
+#include "contacts/contact_cache.hpp"
 #include "contacts/contact_islands.hpp"
 #include "contacts/contact_material.hpp"
 #include "contacts/friction_direct.hpp"
@@ -173,18 +174,7 @@ public:
     bool has_rows(int index) const noexcept { return has_rows_[index] != 0; }
 
     /// What this step's contacts did.
-    struct CachedContact {
-        Contact contact;
-        Vec3 impulse;                    // on the first body, impact and resting, N s
-        double normal = 0.0;             // nu of the resting stage, N s
-        double impact = 0.0;             // normal impulse of the impact, N s
-        double tangent[2] = {0.0, 0.0};  // of the resting stage along the tangents, for a warm start
-        double turning[3] = {0, 0, 0};   // of rolling along them and of turning, scaled, for a warm start
-        double compression = 0.0;        // how far its bodies have pressed it in by the step's end, m
-        double friction = 0.0;           // mu of the pair, along its direction if it has one
-        bool active = false;             // pushes, or closed
-    };
-    const std::vector<CachedContact>& cached_contacts() const noexcept { return state_.cache; }
+    const ContactCache& cache() const noexcept { return state_.cache; }
 
     // contact_sleep.cpp: bodies that sleep have no pairs with each other, nor with what stands still.
     /// These fall asleep where they are, and every body that touches them: what their touches did stays, to be read.
@@ -193,8 +183,6 @@ public:
     void wake(const std::vector<int>& bodies);
     /// A body that moves as it is told does so in this step, or stands still.
     void mark_moving(int body, bool moves) noexcept { detection_.mark_moving(body, moves); }
-    /// Sleepers that touch one of the bodies that `is_moving` names.
-    std::vector<int> touching(const std::vector<char>& is_moving) const;
     /// Sleepers that another body met, or was moved into, since the step began.
     const std::vector<int>& woken() const noexcept { return woken_; }
     /// A step that all bodies sleep through.
@@ -205,9 +193,7 @@ public:
 
     /// What a later step depends on: copying it back goes back.
     struct State {
-        std::vector<CachedContact> cache;     // of the last step until the end of solve()
-        std::vector<CachedContact> sleeping;  // of sleepers
-        std::vector<char> asleep;             // by body; empty while none has slept
+        ContactCache cache;
         ContactCounters counters;
         DepthOfPair initial_penetration;  // by pair: overlap the scene began with, as far as it is left, m
         bool initial_penetration_known = false;  // whether it has been looked for
@@ -232,16 +218,6 @@ public:
         projection_solver_.set_backoff(kept.projection);
     }
 
-    /// Force [N] on `body` from `other` (or from all if −1), mean over the step.
-    Vec3 force(int body, int other) const noexcept;
-    /// Points that push or are closed.
-    int count() const noexcept;
-    /// Largest depth [m] among this step's points, at its start.
-    double penetration() const noexcept;
-    /// Points that push or are closed, ten numbers each: place [m], normal onto the first body, force [N] on it,
-    /// coefficient of friction. The first `most` of them in order of bodies; NaN where there are fewer.
-    void points(int most, double* out) const noexcept;
-
     ContactCounters counters() const noexcept { return state_.counters; }
     BlockLdlt::Counters factor_counters() const noexcept;
     double residual() const noexcept {
@@ -257,7 +233,6 @@ private:
     void add_point(const Contact& contact, const Pose& first, const Pose& second, double toi);
     void lie_as(const State& state);
     void wake_sleepers(const Contact& contact);
-    bool sleeps(int body) const noexcept { return state_.asleep[body] != 0; }
     void orient(Point& point, const Pose& first, const Pose& second);
     PairMaterial material(const Contact& contact) const noexcept {
         return combined(materials_[contact.first], materials_[contact.second]);

@@ -96,7 +96,7 @@ void ContactStage::update_initial_penetrations() {
     if (state_.initial_penetration.empty()) return;
     DepthOfPair& left = arrays_.left;
     left.clear();
-    for (const CachedContact& cached : state_.sleeping)
+    for (const CachedContact& cached : state_.cache.sleeping)
         if (const auto given = state_.initial_penetration.find(cached.contact.key >> feature_bits);
             given != state_.initial_penetration.end())
             left[given->first] = given->second;
@@ -223,7 +223,7 @@ double ContactStage::find_overlaps(const std::vector<Pose>& poses, bool again) {
         });
     if (!again) find_neighbours(poses, margin);
     find_neighbour_overlaps(poses, margin);
-    if (!state_.asleep.empty())
+    if (!state_.cache.asleep.empty())
         for (const PenetrationRecord& record : penetrations_) wake_sleepers(record.contact);
     return deepest;
 }
@@ -234,18 +234,19 @@ double ContactStage::look_for_overlaps(const std::vector<Pose>& poses, double ma
     penetrations_.clear();
     double deepest = 0.0;
     unsigned seen = 0;
-    for (std::size_t from = 0, end = 0; from < state_.cache.size(); from = end) {
-        const std::uint64_t key = state_.cache[from].contact.key >> feature_bits;
-        const int a = state_.cache[from].contact.first, b = state_.cache[from].contact.second;
-        const double rounding = slack(state_.cache[from].contact);
+    const std::vector<CachedContact>& cache = state_.cache.points;
+    for (std::size_t from = 0, end = 0; from < cache.size(); from = end) {
+        const std::uint64_t key = cache[from].contact.key >> feature_bits;
+        const int a = cache[from].contact.first, b = cache[from].contact.second;
+        const double rounding = slack(cache[from].contact);
         double most_compression = 0.0;
         bool overlapped = false;
-        for (; end < state_.cache.size() && state_.cache[end].contact.key >> feature_bits == key; ++end) {
-            most_compression = std::max(most_compression, state_.cache[end].compression);
-            overlapped = overlapped || state_.cache[end].contact.point.gap < -rounding;
+        for (; end < cache.size() && cache[end].contact.key >> feature_bits == key; ++end) {
+            most_compression = std::max(most_compression, cache[end].compression);
+            overlapped = overlapped || cache[end].contact.point.gap < -rounding;
         }
-        if (from + ahead < state_.cache.size()) {
-            const Contact& later = state_.cache[from + ahead].contact;
+        if (from + ahead < cache.size()) {
+            const Contact& later = cache[from + ahead].contact;
             for (const int body : {later.first, later.second}) prefetch(poses[body]), prefetch(poses_[body]);
         }
         if (!is_reconsidered(a, b)) continue;
@@ -259,7 +260,7 @@ double ContactStage::look_for_overlaps(const std::vector<Pose>& poses, double ma
             double compression = 0.0;
             if (materials_[a].compliance + materials_[b].compliance > 0.0) compression = most_compression;
             for (std::size_t k = from; k < end; ++k)
-                if (state_.cache[k].contact.key == contact.key) compression = state_.cache[k].compression;
+                if (cache[k].contact.key == contact.key) compression = cache[k].compression;
             double excess = -contact.point.gap - compression - rounding;
             if (again && excess > 0.0 && state_.initial_penetration.contains(key))
                 excess = std::max(0.0, excess - state_.initial_penetration.at(key));
@@ -282,8 +283,8 @@ double ContactStage::separation_speed(const PenetrationRecord& record, bool agai
 /// Which bodies are to be seen as one: contacts that pushed aside are known; contacts that push, whose laws a turn of some of
 /// their bodies would break, joints and the ground are added.
 void ContactStage::note_projected(const MixedSystem& projection) {
-    for (const CachedContact& cached : state_.cache)
-        if (cached.normal > 0.0 || cached.impact > 0.0)
+    for (const CachedContact& cached : state_.cache.points)
+        if (cached.pushes())
             arrays_.projected.tie(solver_index_[cached.contact.first], solver_index_[cached.contact.second]);
     for (const RowBlock& block : projection.rows) arrays_.projected.tie(block);
     projection_.velocity = projection.velocity;
@@ -301,7 +302,7 @@ void ContactStage::note_projected(const MixedSystem& projection) {
         return projection_.islands
             .of_body[std::max(solver_index_[contact.first], solver_index_[contact.second])];
     };
-    for (const CachedContact& cached : state_.cache) {
+    for (const CachedContact& cached : state_.cache.points) {
         const int k = island(cached.contact);
         if (k < 0) continue;
         if (is_externally_driven(cached.contact)) projection_.externally_driven[k] = 1;
@@ -413,11 +414,11 @@ bool ContactStage::project_by_pgs(MixedSystem& projection, bool again) {
 }
 
 void ContactStage::apply_balancing_impulse(int island, Vec3 momentum) noexcept {
-    for (CachedContact& cached : state_.cache) {
+    for (CachedContact& cached : state_.cache.points) {
         const int first = solver_index_[cached.contact.first], second = solver_index_[cached.contact.second];
         if (std::min(first, second) >= 0 || projection_.islands.of_body[std::max(first, second)] != island)
             continue;
-        if (!(cached.normal > 0.0 || cached.impact > 0.0)) continue;
+        if (!cached.pushes()) continue;
         cached.impulse += first >= 0 ? -momentum : momentum;
         return;
     }

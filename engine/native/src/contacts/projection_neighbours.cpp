@@ -38,7 +38,7 @@ void ContactStage::find_neighbours(const std::vector<Pose>& poses, double margin
         const auto inside = [&](int b) { return reached[b] != 0 && reached[b] < round; };
         ++round;
         grown_.clear();
-        for (const CachedContact& cached : state_.cache) {
+        for (const CachedContact& cached : state_.cache.points) {
             const int a = cached.contact.first, b = cached.contact.second;
             if (inside(a)) reach(b);
             if (inside(b)) reach(a);
@@ -46,11 +46,7 @@ void ContactStage::find_neighbours(const std::vector<Pose>& poses, double margin
         for (const IndexPair& pair : near_) {
             const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
             if (!inside(a) && !inside(b)) continue;
-            const std::uint64_t key = pair_of(pair);
-            const auto cached = std::lower_bound(
-                state_.cache.begin(), state_.cache.end(), key,
-                [](const CachedContact& t, std::uint64_t k) { return t.contact.key >> feature_bits < k; });
-            if (cached != state_.cache.end() && cached->contact.key >> feature_bits == key) continue;
+            if (state_.cache.has_pair(pair_of(pair))) continue;
             scratch_.clear();
             detection_.collide_pair(pair, poses[a], poses[b], margin, scratch_);
             if (scratch_.empty()) continue;

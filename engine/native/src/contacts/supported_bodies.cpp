@@ -108,7 +108,7 @@ void ContactStage::apply_support_impulses(const MixedSystem& system) {
     for (std::size_t b = 0; b < solver_index_.size(); ++b) {
         if (support_impulse_dv_[b] == Vec6{}) continue;
         const Vec3 momentum = system.mass[solver_index_[b]][0] * linear(support_impulse_dv_[b]);
-        for (CachedContact& cached : state_.cache) {
+        for (CachedContact& cached : state_.cache.points) {
             const int first = solver_index_[cached.contact.first],
                       second = solver_index_[cached.contact.second];
             if (std::min(first, second) >= 0 || !is_closed(cached.contact)) continue;

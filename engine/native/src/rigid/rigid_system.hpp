@@ -114,14 +114,14 @@ public:
     double tension(int joint) const noexcept;
     /// Force [N] on `body` from `other` (−1: from all) in the last step; count and depth of its contact points.
     Vec3 contact_force(int body, int other) const noexcept {
-        return contacts_ ? contacts_->force(body, other) : Vec3{};
+        return contacts_ ? contacts_->cache().force(body, other, h_) : Vec3{};
     }
-    int contact_count() const noexcept { return contacts_ ? contacts_->count() : 0; }
+    int contact_count() const noexcept { return contacts_ ? contacts_->cache().count() : 0; }
     void contact_points(int most, double* out) const noexcept {
-        if (contacts_) contacts_->points(most, out);
+        if (contacts_) contacts_->cache().tell(most, h_, out);
         else std::fill_n(out, CONTACT_NUMBERS * most, std::numeric_limits<double>::quiet_NaN());
     }
-    double penetration() const noexcept { return contacts_ ? contacts_->penetration() : 0.0; }
+    double penetration() const noexcept { return contacts_ ? contacts_->cache().penetration() : 0.0; }
 
 public:
     /// What solves of the next step start from.

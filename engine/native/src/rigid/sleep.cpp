@@ -147,7 +147,7 @@ void RigidSystem::sleep() {
         scratch_.finder.tie(constants_[a].moves() ? a : -1, constants_[b].moves() ? b : -1);
     };
     for (const auto& [a, b] : sleep_rules_.ties) tie(a, b);
-    for (const ContactStage::CachedContact& cached : contacts_->cached_contacts()) {
+    for (const CachedContact& cached : contacts_->cache().points) {
         tie(cached.contact.first, cached.contact.second);
         if (contacts_->conveys(cached.contact))
             kept_up[cached.contact.first] = kept_up[cached.contact.second] = 1;

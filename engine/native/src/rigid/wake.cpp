@@ -27,7 +27,7 @@ void RigidSystem::wake() {
         contacts_->mark_moving(i, told[i] != 0);
     }
     if (!some) return;
-    std::vector<int> met = contacts_->touching(told);
+    std::vector<int> met = contacts_->cache().touching(told);
     for (const auto& [a, b] : sleep_rules_.ties) {
         if (told[a]) met.push_back(b);
         if (told[b]) met.push_back(a);
