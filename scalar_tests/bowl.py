@@ -310,6 +310,12 @@ TEST = ScalarTest(
                 Configuration(
                     name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 1920, 1 / 240)
                 ),
+                Configuration(
+                    name="half-step",
+                    method=Method(half_step_velocities=True),
+                    expected_order=1.0,
+                    order_range=(1 / 1920, 1 / 240),
+                ),
             ),
             error=ladder_error,
             run=ladder_run,

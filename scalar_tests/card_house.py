@@ -229,7 +229,10 @@ TEST = ScalarTest(
             description="relative error of the load of a lowest foot after a quarter of a second",
             unit="1",
             time_steps=tuple(1.0 / n for n in (40, 60, 120)),
-            configurations=(Configuration(name="direct", method=PLAIN, expected_order=None),),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+            ),
             error=ladder_error,
             run=ladder_run,
             target_error=1e-9,

@@ -390,7 +390,14 @@ TEST = ScalarTest(
             description="largest error of the slider's place",
             unit="m",
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 480)),
-            configurations=(Configuration(name="direct", method=PLAIN, expected_order=2.0),),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=2.0),
+                Configuration(
+                    name="half-step, curved twice",
+                    method=Method(half_step_velocities=True, corrections=2),
+                    expected_order=None,
+                ),
+            ),
             error=ladder_error,
             run=ladder_run,
             target_error=5e-4,

@@ -247,6 +247,12 @@ TEST = ScalarTest(
                 Configuration(
                     name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 7680, 1 / 1920)
                 ),
+                Configuration(
+                    name="iterative",
+                    method=Method(solver="iterative"),
+                    expected_order=1.0,
+                    order_range=(1 / 7680, 1 / 1920),
+                ),
             ),
             error=ladder_error,
             run=ladder_run,

@@ -293,6 +293,12 @@ TEST = ScalarTest(
                 Configuration(
                     name="direct", method=PLAIN, expected_order=1.0, order_range=(1 / 3840, 1 / 480)
                 ),
+                Configuration(
+                    name="half-step",
+                    method=Method(half_step_velocities=True),
+                    expected_order=1.0,
+                    order_range=(1 / 3840, 1 / 480),
+                ),
             ),
             error=ladder_error,
             run=ladder_run,

@@ -191,7 +191,10 @@ TEST = ScalarTest(
             description="relative error of the roll's frequency against √(m g GM/I)",
             unit="1",
             time_steps=tuple(1.0 / n for n in (15, 30, 60, 120)),
-            configurations=(Configuration(name="plain", method=PLAIN, expected_order=2.0),),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=2.0),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=2.0),
+            ),
             error=ladder_error,
             run=ladder_run,
             target_error=1e-4,

@@ -317,6 +317,7 @@ TEST = ScalarTest(
             configurations=(
                 # What is left is the search for the flips between the steps.
                 Configuration(name="plain", method=PLAIN, expected_order=None),
+                Configuration(name="order4", method=Method(composition="order4"), expected_order=None),
             ),
             error=ladder_error,
             run=ladder_run,
@@ -330,6 +331,7 @@ TEST = ScalarTest(
             time_steps=tuple(1.0 / n for n in (4, 6, 8, 12, 16, 32)),
             configurations=(
                 Configuration(name="plain", method=PLAIN, expected_order=None),  # no step errs
+                Configuration(name="order4", method=Method(composition="order4"), expected_order=None),
             ),
             error=turn_error,
             run=turn_run,

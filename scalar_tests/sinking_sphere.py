@@ -287,6 +287,12 @@ TEST = ScalarTest(
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480, 960)),
             configurations=(
                 Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 960, 1 / 240)),
+                Configuration(
+                    name="half-step",
+                    method=Method(half_step_velocities=True),
+                    expected_order=1.0,
+                    order_range=(1 / 960, 1 / 240),
+                ),
             ),
             error=ladder_error,
             run=ladder_run,

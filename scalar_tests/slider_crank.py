@@ -351,7 +351,14 @@ TEST = ScalarTest(
             description="largest error of the slider's place in a turn",
             unit="m",
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 480)),
-            configurations=(Configuration(name="direct", method=PLAIN, expected_order=2.0),),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=2.0),
+                Configuration(
+                    name="half-step, curved twice",
+                    method=Method(half_step_velocities=True, corrections=2),
+                    expected_order=4.0,
+                ),
+            ),
             error=ladder_error,
             run=run,
             target_error=2e-4,

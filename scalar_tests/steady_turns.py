@@ -241,6 +241,7 @@ TEST = ScalarTest(
             time_steps=tuple(1.0 / n for n in STEPS),
             configurations=(
                 Configuration(name="plain", method=PLAIN, expected_order=None),  # no step errs
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
             ),
             error=motor_error,
             run=ladder_run,

@@ -333,7 +333,10 @@ TEST = ScalarTest(
             description="sinking of the third stone under 0.99 of its limit load in 0.1 s: none is right",
             unit="m",
             time_steps=tuple(1.0 / n for n in (30, 60, 120)),
-            configurations=(Configuration(name="direct", method=PLAIN, expected_order=None),),
+            configurations=(
+                Configuration(name="direct", method=PLAIN, expected_order=None),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+            ),
             error=lambda simulate, time_step, method: sinking(
                 simulate, 2, LESS * LIMIT[2], time_step, method, SHORT
             ),

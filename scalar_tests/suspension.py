@@ -291,7 +291,10 @@ TEST = ScalarTest(
             description="relative error of the bounce's frequency against √(Σk/m)",
             unit="1",
             time_steps=tuple(1.0 / n for n in (15, 30, 60, 120, 240)),
-            configurations=(Configuration(name="plain", method=PLAIN, expected_order=2.0),),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=2.0),
+                Configuration(name="order4", method=Method(composition="order4"), expected_order=4.0),
+            ),
             error=ladder_error,
             run=ladder_run,
             target_error=1e-3,

@@ -205,6 +205,7 @@ TEST = ScalarTest(
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480)),
             configurations=(
                 Configuration(name="plain", method=PLAIN, expected_order=None),  # no step errs
+                Configuration(name="order4", method=Method(composition="order4"), expected_order=None),
             ),
             error=turn_error,
             run=ladder_run,

@@ -58,6 +58,16 @@ def test_every_scene_that_breaks_has_one_band_from_theory_at_least() -> None:
     assert without == []
 
 
+def test_every_ladder_compares_two_configurations_at_least() -> None:
+    alone = [
+        f"{name}: {ladder.name}"
+        for name, test in CATALOGUE.items()
+        for ladder in test.ladders
+        if len(ladder.configurations) < 2
+    ]
+    assert alone == []
+
+
 def test_a_cell_is_what_there_is_or_the_reason_or_empty() -> None:
     test = CATALOGUE["pendulum"]
     bare = replace(test, ladders=(), stability=())
@@ -78,7 +88,16 @@ def test_a_cell_is_what_there_is_or_the_reason_or_empty() -> None:
 @pytest.mark.parametrize(
     ("errors", "told"),
     [
-        ([1e-2, 3e-3], "rolled: 1 configuration, down to 0.003 m, not 1e-4"),
+        (
+            [1e-2, 5e-3],
+            "rolled: 1 configuration, down to 0.005 m, not 1e-4: order 1 asks for steps of 0.001 s",
+        ),
+        (
+            [3.2e-2, 8e-3, 2e-3],
+            "rolled: 1 configuration, down to 0.002 m, not 1e-4: order 2 asks for steps of 0.0056 s",
+        ),
+        ([4e-3, 3.9e-3], "rolled: 1 configuration, down to 0.0039 m, not 1e-4: smaller steps do not help"),
+        ([4e-3], "rolled: 1 configuration, down to 0.004 m, not 1e-4: no smaller step was asked"),
         ([1e-2, -5e-5], "rolled: 1 configuration, down to 5×10⁻⁵ m"),
         ([float("nan")], "rolled: 1 configuration"),
     ],

@@ -308,7 +308,10 @@ TEST = ScalarTest(
                         ),
                     ),
                 ),
-                "high": ((1 / 480, 1 / 1000, 1 / 2000, 1 / 4000), (PLAIN_CONFIGURATION,)),
+                "high": (
+                    (1 / 480, 1 / 1000, 1 / 2000, 1 / 4000),
+                    (PLAIN_CONFIGURATION, _composed("order4", 1 / 60, 1 / 120, 1 / 240)),
+                ),
             },
             ladder_error,
             ladder_run,

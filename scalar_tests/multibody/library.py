@@ -24,6 +24,13 @@ PLAIN_CONFIGURATION = Configuration(name="plain", method=PLAIN, expected_order=N
 FIRST_ORDER = Configuration(name="plain", method=PLAIN, expected_order=1.0)
 
 
+SECOND_ORDER = Configuration(
+    name="half-step, curved twice",
+    method=Method(half_step_velocities=True, corrections=2),
+    expected_order=2.0,
+)
+
+
 def library_error(found: Any, reference: Any, threshold: float = THRESHOLD) -> float:
     """Root mean square over all outputs of |y − y_ref| / max(|y_ref|, threshold)."""
     wanted = np.asarray(reference, dtype=float)

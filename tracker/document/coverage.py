@@ -24,13 +24,15 @@ class Rungs:
     unit: str
     configurations: int
     least: float | None = None  # in `unit`; None: not measured
+    short: str = ""  # what keeps it from SMALL
 
     def __str__(self) -> str:
         many = f"{self.name}: {self.configurations} configuration{'s' * (self.configurations != 1)}"
         if self.least is None:
             return many
         unit = "" if self.unit in ("", "1") else f" {self.unit}"
-        return f"{many}, down to {number(self.least, 2)}{unit}{', not 1e-4' * (self.least > SMALL)}"
+        short = f", not 1e-4: {self.short}" if self.least > SMALL and self.short else ""
+        return f"{many}, down to {number(self.least, 2)}{unit}{short}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,19 +79,38 @@ def saved(saving: Saving | None) -> str:
 
 def rungs(pairs: Iterable[tuple[SeriesDefinition, Sample]]) -> dict[str, dict[str, Rungs]]:
     """By test and ladder, from the samples of a run."""
-    found: dict[tuple[str, str], tuple[str, set[str], list[float]]] = {}
+    found: dict[tuple[str, str], tuple[str, dict[str, list[tuple[float, float]]]]] = {}
     for series, sample in pairs:
         if series.kind != "ladder":
             continue
         place = series.test, series.metric.removeprefix("ladder:")
-        _, configurations, errors = found.setdefault(place, (series.unit, set(), []))
-        configurations.add(series.configuration)
-        if sample.outcome == "value" and math.isfinite(sample.value):
-            errors.append(abs(float(sample.value)))
+        _, configurations = found.setdefault(place, (series.unit, {}))
+        errors = configurations.setdefault(series.configuration, [])
+        if sample.outcome == "value" and math.isfinite(sample.value) and series.time_step:
+            errors.append((series.time_step, abs(float(sample.value))))
     told: dict[str, dict[str, Rungs]] = {}
-    for (test, name), (unit, configurations, errors) in found.items():
-        told.setdefault(test, {})[name] = Rungs(name, unit, len(configurations), min(errors, default=None))
+    for (test, name), (unit, configurations) in found.items():
+        measured = [sorted(errors) for errors in configurations.values() if errors]
+        best = min(measured, key=lambda errors: min(error for _, error in errors), default=[])
+        least = min((error for _, error in best), default=None)
+        told.setdefault(test, {})[name] = Rungs(name, unit, len(configurations), least, _short_of(best))
     return told
+
+
+def _short_of(errors: Sequence[tuple[float, float]]) -> str:
+    """What keeps (time step [s], error) pairs, fine to coarse, from SMALL: the step that their order asks for, or that smaller
+    steps do not help."""
+    if len(errors) < 2:
+        return "no smaller step was asked"
+    if not 0.0 < errors[0][1] < errors[1][1]:
+        return "smaller steps do not help"
+    (fine, small), (coarse, large) = errors[:2]
+    order = math.log(large / small) / math.log(coarse / fine)
+    if order < 0.3:
+        return "smaller steps do not help"
+    return (
+        f"order {number(order, 2)} asks for steps of {number(fine * (SMALL / small) ** (1.0 / order), 2)} s"
+    )
 
 
 def summary(rows: Sequence[Coverage]) -> str:
