@@ -333,8 +333,8 @@ MUTANTS = (
         "3 % of every restitution is lost",
         "bouncing_ball",
         "contacts/contact_order.cpp",
-        "const double psi = material(contact).restitution, speed",
-        "const double psi = 0.97 * material(contact).restitution, speed",
+        "const double psi = surfaces_->pair(contact).restitution, speed",
+        "const double psi = 0.97 * surfaces_->pair(contact).restitution, speed",
     ),
     wrong(
         "contacts",
@@ -360,8 +360,8 @@ MUTANTS = (
         "a side skipped between iterations is not tested again when they end",
         "tests/test_engine_falling.py::test_a_side_skipped_between_iterations_is_met_if_the_body_gets_there",
         "contacts/contact_pgs.cpp",
-        "const bool all = first || (was_settling && over && swings_);",
-        "const bool all = first || (was_settling && !over && swings_);",
+        "const bool all = first || (was_settling && over && bodies_->swings);",
+        "const bool all = first || (was_settling && !over && bodies_->swings);",
     ),
     wrong(
         "contacts",

@@ -30,7 +30,7 @@ SLIDES = 60  # over tiles
 NEAR = {  # by part: the tests beside it
     "contacts/internal_edges": ("test_engine_tiles",),
     "contacts/position_projection": ("test_engine_position_projection", "test_engine_overlaps", "test_engine_piles"),
-    "contacts/projection_neighbours": ("test_engine_position_projection", "test_engine_overlaps", "test_engine_piles"),
+    "contacts/overlap_search": ("test_engine_position_projection", "test_engine_overlaps", "test_engine_piles"),
 }  # fmt: skip
 FROM_ENVIRONMENT = r"""#pragma once
 #include <cmath>

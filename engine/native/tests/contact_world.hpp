@@ -93,9 +93,10 @@ public:
         for (int round = 0; touching && round < 3; ++round) {
             for (std::size_t k = 0; k < bodies.size(); ++k)
                 poses[k] = {bodies[k].position, rotation(bodies[k].turn)};
-            if (!stage.project_positions(system, 0, poses, round > 0)) break;
+            const PositionProjection* const projection = stage.project_positions(system, 0, poses, round > 0);
+            if (projection == nullptr) break;
             for (std::size_t k = 0, u = 0; k < bodies.size(); ++k)
-                if (bodies[k].mass > 0.0) move(bodies[k], stage.projection().velocity[u++]);
+                if (bodies[k].mass > 0.0) move(bodies[k], projection->velocity[u++]);
         }
     }
 

@@ -78,14 +78,6 @@ struct DepthOfPair {
     std::vector<Item> items;  // in order of pairs
 };
 
-/// A point where the step ends, of bodies that may overlap.
-struct PenetrationRecord {
-    Contact contact;
-    Vec3 first_arm, second_arm;  // from the centres of mass, m
-    double damping = 0.0;        // of the pair
-    double depth = 0.0;          // how deep it is, m; negative where bodies are apart
-};
-
 /// Of the search for impacts that act at their own time; by an island's first body.
 struct EventSearch {
     std::vector<std::size_t> members;
@@ -133,12 +125,8 @@ struct ContactArrays {
     std::vector<Vec6> free_velocity;              // per moving body
     std::vector<IndexPair> grazing;               // pairs, see skip_grazing()
     std::vector<std::vector<std::size_t>> asked;  // open pairs to be judged, by each thread
-    std::vector<char> reached;                    // bodies, see find_neighbours()
-    std::vector<char> moved_far;                  // islands, see mark_far_islands()
-    std::vector<double> island_mass;              // kg
-    DepthOfPair left;                             // see update_initial_penetrations()
-    // Which bodies are connected by rows of joints and points; in what parts; where a solve is shortened.
-    IslandFinder connected, projected, shortened;
+    // Which bodies are connected by rows of joints and points; where a solve is shortened.
+    IslandFinder connected, shortened;
 };
 
 }  // namespace spook

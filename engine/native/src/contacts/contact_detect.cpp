@@ -21,18 +21,10 @@ using namespace tolerances::contact_detect;
 
 }  // namespace
 
-double ContactStage::size(const Contact& contact) const noexcept {
-    return std::max(detection_.radius()[contact.first], detection_.radius()[contact.second]);
-}
-
-bool ContactStage::is_closed(const Contact& contact, double gap) const noexcept {
-    return gap <= closed * size(contact);
-}
-
 /// How far a body may get in the step with either velocity, m.
 double ContactStage::margin_of(std::size_t b, const std::vector<Vec6>& velocity,
                                const std::vector<Vec6>& other) const {
-    const double radius = detection_.radius()[b];
+    const double radius = bodies_->radius[b];
     double speed = norm(linear(velocity[b])), spin = norm(angular(velocity[b]));
     if (&other != &velocity) {
         speed = std::max(speed, norm(linear(other[b])));
@@ -73,8 +65,8 @@ bool ContactStage::reachable(const Contact& contact) const {
         return std::max(std::abs(dot(n, linear(velocity_[b]))), std::abs(dot(n, linear(free)))) +
                spin * radius[b];
     };
-    return contact.point.gap <=
-           options_.time_step * (speed(contact.first) + speed(contact.second)) + closed * size(contact);
+    return contact.point.gap <= options_.time_step * (speed(contact.first) + speed(contact.second)) +
+                                    closed * bodies_->size(contact);
 }
 
 bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6>& velocity,
@@ -84,19 +76,11 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     poses_ = poses;
     velocity_ = velocity;
     dv_ext_.resize(bodies);
-    for (std::size_t b = 0; b < bodies; ++b) {
-        dv_ext_[b] = sum(free_velocity[b], velocity[b], -1.0);
-        prescribed_[b] = solver_index_[b] < 0 ? velocity[b] : Vec6{};
-    }
+    for (std::size_t b = 0; b < bodies; ++b) dv_ext_[b] = sum(free_velocity[b], velocity[b], -1.0);
     whole_dv_ext_ = dv_ext_;
-    has_external_drive_ = conveys_ || std::any_of(prescribed_.begin(), prescribed_.end(),
-                                                  [](const Vec6& v) { return v != Vec6{}; });
+    drive_.begin(*bodies_, *surfaces_, velocity);
+    projector_.begin_step();
     // By island, of which there may be as many as bodies, however late; a copy of the stage has no room for them.
-    for (std::vector<char>* flags :
-         {&projection_.grounded, &projection_.externally_driven, &arrays_.moved_far})
-        flags->reserve(bodies);
-    for (std::vector<double>* depths : {&projection_.overlap, &projection_.overlap_before})
-        depths->reserve(bodies);
     arrays_.sums.reserve(bodies);
     std::fill(toi_fraction_.begin(), toi_fraction_.end(), 0.0);
     std::fill(event_time_.begin(), event_time_.end(), -1.0);
@@ -104,14 +88,13 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     std::fill(depth_.begin(), depth_.end(), 0.0);
     std::fill(predicted_sinking_.begin(), predicted_sinking_.end(), 0.0);
     correction_.clear();
-    projection_.velocity.clear();
     points_.clear();
     extras_.clear();
     woken_.clear();
     impact_needed_ = plastic_first_ = false;
     iterating_ = ran_away_ = false;  // of a step that was taken back, or is over
     impact_rounds_ = 0;
-    if (rebounds_ || options_.impacts == ImpactOrder::successive)
+    if (surfaces_->rebounds || options_.impacts == ImpactOrder::successive)
         clock_.assign(bodies, 0.0), path_.assign(bodies, Vec6{}), in_order_.assign(bodies, 0);
 
     for (std::size_t b = 0; b < bodies; ++b) margin_[b] = margin_of(b, velocity, free_velocity);
@@ -129,7 +112,9 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     find_supported();
     predicted_.resize(bodies);
     for (std::size_t b = 0; b < bodies; ++b)
-        predicted_[b] = supported_[b] || jointed_[b] || solver_index_[b] < 0 ? velocity[b] : free_velocity[b];
+        predicted_[b] = supported_[b] || bodies_->jointed[b] || bodies_->solver_index[b] < 0
+                            ? velocity[b]
+                            : free_velocity[b];
     const std::size_t closed_points = points_.size();
     if (!state_.initial_penetration_known) note_initial_penetrations();
     if (find_impacts(predicted_, false) > 0) {
@@ -147,6 +132,17 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     return true;
 }
 
+/// Takes down how deep pairs overlap where the run begins: nothing but the scene has brought them there.
+void ContactStage::note_initial_penetrations() {
+    state_.initial_penetration_known = true;
+    for (const Point& point : points_) {
+        const double excess = -point.contact.point.gap - elastic_depth(point);
+        if (!(excess > 0.0)) continue;
+        double& given = state_.initial_penetration[point.contact.key >> feature_bits];
+        given = std::max(given, excess);
+    }
+}
+
 /// Pairs near enough to meet: the closed ones get points, the others are open. Pairs that have points are known.
 void ContactStage::find_open() {
     open_.clear();
@@ -157,7 +153,7 @@ void ContactStage::find_open() {
 /// The same where the search has been widened for some bodies since: what is new is theirs.
 void ContactStage::find_open_again() {
     if (!detection_.near_again(grown_, search_, near_)) {
-        changed_.assign(solver_index_.size(), 1);
+        changed_.assign(bodies_->solver_index.size(), 1);
         return find_open();
     }
     for (const int body : grown_) changed_[body] = 1;
@@ -207,15 +203,15 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
                              second = detection_.collider(pair.second);
         const double reach = search_[first.body] + search_[second.body];
         const OpenPair open = opened(pair, shared ? apart_[k] : separation_of(pair));
-        const double size = std::max(detection_.radius()[first.body], detection_.radius()[second.body]);
+        const double size = std::max(bodies_->radius[first.body], bodies_->radius[second.body]);
         if (round_or_plane(first.shape) && round_or_plane(second.shape) && open.apart.gap > 1e-6 * size) {
             if (open.apart.gap <= reach) open_.push_back(open);  // clearly apart: no need for its points
             continue;
         }
         scratch_.clear();
         detection_.collide_pair(pair, reach, scratch_);
-        const bool touching =
-            std::any_of(scratch_.begin(), scratch_.end(), [this](const Contact& c) { return is_closed(c); });
+        const bool touching = std::any_of(scratch_.begin(), scratch_.end(),
+                                          [this](const Contact& c) { return bodies_->is_closed(c); });
         // Any two shapes apart give a point, if they are near enough to meet; but not solids corner to corner, nor
         // where a triangle's neighbour comes first.
         const bool solids = (first.shape.faceted() && second.shape.faceted()) ||
@@ -266,14 +262,14 @@ OpenPair ContactStage::opened(const IndexPair& pair, const Separation& apart) co
 void ContactStage::add_point(const Contact& contact, const Pose& first, const Pose& second, double toi) {
     Point& point = points_.emplace_back();
     point.contact = contact;
-    point.friction = material(contact).friction;
+    point.friction = surfaces_->pair(contact).friction;
     point.first_arm = contact.point.position - first.position;
     point.second_arm = contact.point.position - second.position;
     point.tangent = world_tangent(contact.point.normal);
     point.toi = toi;
     point.begun = contact.point.gap;
-    if (oriented_) orient(point, first, second);
-    if (!state_.cache.asleep.empty()) wake_sleepers(contact);
+    if (surfaces_->oriented) orient(point, first, second);
+    if (!state_.cache.asleep.empty()) state_.cache.add_sleepers(contact, woken_);
 }
 
 /// Where friction differs with the direction its bound is an ellipse about the direction's shadow on the surface. In
@@ -283,9 +279,9 @@ void ContactStage::add_point(const Contact& contact, const Pose& first, const Po
 /// shadow; no residual is told too small, rows being stretched, never shrunk.
 void ContactStage::orient(Point& point, const Pose& first, const Pose& second) {
     const Contact& contact = point.contact;
-    const bool of_first = materials_[contact.first].is_oriented();
-    const SurfaceMaterial& own = materials_[of_first ? contact.first : contact.second];
-    const SurfaceMaterial& other = materials_[of_first ? contact.second : contact.first];
+    const bool of_first = (*surfaces_)[contact.first].is_oriented();
+    const SurfaceMaterial& own = (*surfaces_)[of_first ? contact.first : contact.second];
+    const SurfaceMaterial& other = (*surfaces_)[of_first ? contact.second : contact.first];
     const double mu = point.friction;
     if (!own.is_oriented() || !(mu > 0.0)) return;
     const Vec3 n = contact.point.normal, whole = (of_first ? first : second).rotation * own.direction;
@@ -308,7 +304,7 @@ double ContactStage::slop(const OpenPair& open) const noexcept {
     const int a = open.first, b = open.second;
     const bool sides =
         have_sides(detection_.collider(open.pair.first).shape, detection_.collider(open.pair.second).shape);
-    return closed * std::max(detection_.radius()[a], detection_.radius()[b]) +
+    return closed * std::max(bodies_->radius[a], bodies_->radius[b]) +
            (sides ? 2.0 * std::max(predicted_sinking_[a], predicted_sinking_[b]) : 0.0);
 }
 

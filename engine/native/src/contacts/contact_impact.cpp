@@ -117,7 +117,8 @@ void ContactStage::share_impact(MixedSystem& hit, std::size_t joints,
 void ContactStage::solve_impact(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
                                 FrictionModel model) {
     const std::vector<FrictionPoint>& fresh = arrays_.impact.first_friction = friction;
-    FrictionReport report = run(hit, friction, impact_solver_, model);
+    const IslandRules rules = rules_of(model, true);
+    FrictionReport report = solve_islands(hit, friction, impact_solver_, options_, rules, state_.counters);
     if (report.converged && is_broken(hit, joints)) {
         for (std::size_t k = joints; k < hit.rows.size(); ++k) {
             RowBlock& block = hit.rows[k];
@@ -126,7 +127,7 @@ void ContactStage::solve_impact(MixedSystem& hit, std::size_t joints, std::vecto
             block.softness[0] = impact_compliance * own_inertia(hit, block, 0);
         }
         friction = fresh;
-        report = run(hit, friction, impact_solver_, model);
+        report = solve_islands(hit, friction, impact_solver_, options_, rules, state_.counters);
     }
     bool settled = report.converged;
     std::vector<double>& asked = filled(arrays_.impact.asked, 0);
@@ -150,7 +151,7 @@ void ContactStage::solve_impact(MixedSystem& hit, std::size_t joints, std::vecto
             block.right[0] = right;
         }
         if (change <= left * fastest || again == most_again) break;
-        report = run(hit, friction, impact_solver_, model, &answered);
+        report = solve_islands(hit, friction, impact_solver_, options_, rules, state_.counters, &answered);
         settled = settled && report.converged;
     }
     const double enough = options_.solver == SolverKind::direct ? 0.0 : options_.residual_tolerance;
@@ -183,12 +184,14 @@ const Islands& ContactStage::connected(const MixedSystem& system, std::size_t jo
     arrays_.connected.begin(static_cast<int>(system.mass.size()));
     for (std::size_t k = 0; k < joints; ++k) arrays_.connected.tie(system.rows[k]);
     for (const Point& point : points_)
-        arrays_.connected.tie(solver_index_[point.contact.first], solver_index_[point.contact.second]);
+        arrays_.connected.tie(bodies_->solver_index[point.contact.first],
+                              bodies_->solver_index[point.contact.second]);
     return arrays_.connected.find();
 }
 
 int ContactStage::island_of(const Islands& islands, const Point& point) const noexcept {
-    return islands.of_body[std::max(solver_index_[point.contact.first], solver_index_[point.contact.second])];
+    return islands.of_body[std::max(bodies_->solver_index[point.contact.first],
+                                    bodies_->solver_index[point.contact.second])];
 }
 
 /// Whether a joint's stop takes part in impacts: it sends back what hits it, or plastic impacts are met as well.
@@ -310,8 +313,8 @@ void ContactStage::impact(MixedSystem& system) {
             friction.push_back({static_cast<int>(hit.rows.size()), point.friction, 0.0, -1.0});
             friction.back().anisotropic = extras(point).is_anisotropic();
             const double slip = point.bounce > 0.0 && is_impact(point)
-                                    ? std::max(materials_[point.contact.first].tangential_restitution,
-                                               materials_[point.contact.second].tangential_restitution)
+                                    ? std::max((*surfaces_)[point.contact.first].tangential_restitution,
+                                               (*surfaces_)[point.contact.second].tangential_restitution)
                                     : 0.0;
             for (int i = 1; i < 3 && slip > 0.0; ++i)
                 block.right[i] -= returned[j][i - 1] =
@@ -369,14 +372,15 @@ void ContactStage::impact(MixedSystem& system) {
 
 /// Impacts set bodies in motion that meet others within the same step.
 void ContactStage::after_impact(const MixedSystem& system) {
-    for (std::size_t b = 0; b < solver_index_.size(); ++b)
-        if (solver_index_[b] >= 0 && has_rows_[solver_index_[b]]) {
-            release_support(static_cast<int>(b), system.velocity[solver_index_[b]]);
-            velocity_[b] = system.velocity[solver_index_[b]];
+    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b)
+        if (bodies_->solver_index[b] >= 0 && has_rows_[bodies_->solver_index[b]]) {
+            release_support(static_cast<int>(b), system.velocity[bodies_->solver_index[b]]);
+            velocity_[b] = system.velocity[bodies_->solver_index[b]];
         }
     std::vector<Vec6>& next = arrays_.impact.next = velocity_;
     for (std::size_t b = 0; b < next.size(); ++b)
-        if (solver_index_[b] >= 0 && !supported_[b] && !jointed_[b]) next[b] = sum(velocity_[b], dv_ext_[b]);
+        if (bodies_->solver_index[b] >= 0 && !supported_[b] && !bodies_->jointed[b])
+            next[b] = sum(velocity_[b], dv_ext_[b]);
     changed_.assign(next.size(), 1);
     if (outrun(next)) find_open_again();
     const std::size_t known = points_.size();

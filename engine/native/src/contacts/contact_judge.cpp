@@ -139,13 +139,13 @@ void ContactStage::blame_sunk() {
         const auto given = state_.initial_penetration.find(point.contact.key >> feature_bits);
         const double known =
             elastic_depth(point) + (given == state_.initial_penetration.end() ? 0.0 : given->second);
-        const double share = (-point.contact.point.gap - known) / moving_size(point.contact);
+        const double share = (-point.contact.point.gap - known) / bodies_->moving_size(point.contact);
         if (!(share > worst)) continue;
         worst = share;
         unsettled_by_ = residual_;
         sunk_ = true;
         unsettled_body_ =
-            solver_index_[point.contact.first] >= 0 ? point.contact.first : point.contact.second;
+            bodies_->solver_index[point.contact.first] >= 0 ? point.contact.first : point.contact.second;
     }
 }
 
@@ -156,8 +156,9 @@ void ContactStage::blame(double residual, int index) {
     // A billionth of the fastest body's speed, or so, is rounding wherever it stands.
     if (!(residual > options_.unsettled_residual + 1e-6 * speed)) return;
     unsettled_by_ = residual;
-    unsettled_body_ = static_cast<int>(std::find(solver_index_.begin(), solver_index_.end(), index) -
-                                       solver_index_.begin());
+    unsettled_body_ =
+        static_cast<int>(std::find(bodies_->solver_index.begin(), bodies_->solver_index.end(), index) -
+                         bodies_->solver_index.begin());
 }
 
 /// `share`, per moving body: what is left of the impulses of its island, where a solve that did not settle would raise
@@ -171,8 +172,8 @@ void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints, co
     for (std::size_t k = 0; k < joints; ++k) arrays_.shortened.tie(system.rows[k]);
     for (std::size_t k = 0; k < points_.size(); ++k)
         if (pushes[k])
-            arrays_.shortened.tie(solver_index_[points_[k].contact.first],
-                                  solver_index_[points_[k].contact.second]);
+            arrays_.shortened.tie(bodies_->solver_index[points_[k].contact.first],
+                                  bodies_->solver_index[points_[k].contact.second]);
     const Islands& islands = arrays_.shortened.find();
     std::vector<EnergySums>& sums = arrays_.sums;
     sums.assign(islands.count, {});
@@ -182,8 +183,9 @@ void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints, co
     for (std::size_t k = 0; k < joints; ++k) driven(system.rows[k].first, system.rows[k].second);
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
-        if (pushes[k] && (is_externally_driven(point.contact) || material(point.contact).compliance > 0.0))
-            driven(solver_index_[point.contact.first], solver_index_[point.contact.second]);
+        if (pushes[k] &&
+            (drive_.acts_at(point.contact, *surfaces_) || surfaces_->pair(point.contact).compliance > 0.0))
+            driven(bodies_->solver_index[point.contact.first], bodies_->solver_index[point.contact.second]);
     }
     std::vector<Vec6>& free = arrays_.free_velocity;
     free = system.momentum;
@@ -191,8 +193,8 @@ void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints, co
         for (std::size_t u = begin; u < end; ++u)
             if (islands.of_body[u] >= 0) solve_six(factor_six(system.mass[u]), free[u]);
     });
-    for (std::size_t b = 0; b < solver_index_.size(); ++b) {
-        const int u = solver_index_[b];
+    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b) {
+        const int u = bodies_->solver_index[b];
         if (u < 0 || islands.of_body[u] < 0) continue;
         const Vec6 by_contacts = sum(system.velocity[u], free[u], -1.0),
                    kick = sum(free[u], velocity_[b], -1.0);

@@ -23,33 +23,34 @@ using namespace tolerances::contact_order;
 /// that goes with it changes the energy. A supported body that moves along the forces would gain energy by it, unless what
 /// is moved supports it, or the impact is with something that stands still and pushes against the forces.
 void ContactStage::find_events() {
-    connected_.begin(solver_index_.size());
+    connected_.begin(bodies_->solver_index.size());
     const auto root = [this](int b) { return connected_.root(b); };
     const auto join = [this](int a, int b) {
-        if (solver_index_[a] >= 0 && solver_index_[b] >= 0) connected_.join(a, b);
+        if (bodies_->solver_index[a] >= 0 && bodies_->solver_index[b] >= 0) connected_.join(a, b);
     };
     for (const Point& point : points_) join(point.contact.first, point.contact.second);
-    for (const auto& [a, b] : joints_)
+    for (const auto& [a, b] : bodies_->joints)
         if (a >= 0 && b >= 0) join(a, b);
 
     auto& [members, impact_pair, plain, bouncy, when, speed, moving_along, may_move_along] = arrays_.events;
-    members.assign(solver_index_.size(), 0);
-    impact_pair.assign(solver_index_.size(), 0);
-    plain.assign(solver_index_.size(), 1), bouncy.assign(solver_index_.size(), 0);
-    moving_along.assign(solver_index_.size(), 0), may_move_along.assign(solver_index_.size(), 0);
-    when.assign(solver_index_.size(), -1.0);
-    for (std::size_t b = 0; b < solver_index_.size(); ++b)
-        if (solver_index_[b] >= 0) {
+    members.assign(bodies_->solver_index.size(), 0);
+    impact_pair.assign(bodies_->solver_index.size(), 0);
+    plain.assign(bodies_->solver_index.size(), 1), bouncy.assign(bodies_->solver_index.size(), 0);
+    moving_along.assign(bodies_->solver_index.size(), 0),
+        may_move_along.assign(bodies_->solver_index.size(), 0);
+    when.assign(bodies_->solver_index.size(), -1.0);
+    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b)
+        if (bodies_->solver_index[b] >= 0) {
             const int island = root(static_cast<int>(b));
             ++members[island];
-            plain[island] = plain[island] && ball_[b];
+            plain[island] = plain[island] && bodies_->ball[b];
             if (!is_free(b)) bouncy[island] |= held;
             moving_along[island] += moves_along_forces(static_cast<int>(b));
         }
     for (const Point& point : points_) {
         const Contact& contact = point.contact;
-        const int island = root(solver_index_[contact.first] >= 0 ? contact.first : contact.second);
-        if (is_externally_driven(contact)) may_move_along[island] = event_bodies;
+        const int island = root(bodies_->solver_index[contact.first] >= 0 ? contact.first : contact.second);
+        if (drive_.acts_at(contact, *surfaces_)) may_move_along[island] = event_bodies;
         else if (pushes_against_forces(point))
             may_move_along[island] = std::max<std::size_t>(may_move_along[island], 1);
         if (point.toi < 0.0) {
@@ -62,18 +63,19 @@ void ContactStage::find_events() {
         if (impact_pair[island] != 0 && impact_pair[island] != pair) plain[island] = 0;
         impact_pair[island] = pair;
         when[island] = point.toi;
-        if (material(point.contact).restitution > 0.0) bouncy[island] |= rebounds;
+        if (surfaces_->pair(point.contact).restitution > 0.0) bouncy[island] |= rebounds;
     }
     // A plastic impact among bodies that may meet others after it acts at the start of the step, as the rows of those
     // others will: bodies moved to an event's time would not be where such rows expect them. Nor are impacts that come in order,
     // successive ones and those of free balls, moved here: another may come first.
     const bool successive = options_.impacts == ImpactOrder::successive;
-    speed.assign(solver_index_.size(), 0.0);
-    for (std::size_t b = 0; b < solver_index_.size(); ++b) {
-        double& fastest = speed[solver_index_[b] >= 0 ? root(static_cast<int>(b)) : static_cast<int>(b)];
+    speed.assign(bodies_->solver_index.size(), 0.0);
+    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b) {
+        double& fastest =
+            speed[bodies_->solver_index[b] >= 0 ? root(static_cast<int>(b)) : static_cast<int>(b)];
         fastest = std::max(fastest, norm(linear(predicted_[b])));
     }
-    const auto island = [&](int b) { return solver_index_[b] >= 0 ? root(b) : b; };
+    const auto island = [&](int b) { return bodies_->solver_index[b] >= 0 ? root(b) : b; };
     for (const OpenPair& open : open_) {
         if (open.has_met()) continue;
         const int a = island(open.first), b = island(open.second);
@@ -81,17 +83,19 @@ void ContactStage::find_events() {
         plain[a] = plain[a] && bouncy[a] == (rebounds | held) && !successive;
         plain[b] = plain[b] && bouncy[b] == (rebounds | held) && !successive;
     }
-    for (std::size_t b = 0; b < solver_index_.size(); ++b) {
-        if (solver_index_[b] < 0) continue;
+    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b) {
+        if (bodies_->solver_index[b] < 0) continue;
         const int island = root(static_cast<int>(b));
         if (impact_pair[island] == 0 || !plain[island] || members[island] > event_bodies) continue;
         if (moving_along[island] > may_move_along[island]) continue;
         event_time_[b] = when[island];
-        if (is_free(b)) apply_forces_until(b, part_of_forces(when[island] / options_.time_step, rebounds_));
+        if (is_free(b))
+            apply_forces_until(b, part_of_forces(when[island] / options_.time_step, surfaces_->rebounds));
     }
     for (Point& point : points_) {
         if (point.toi < 0.0) continue;
-        const int body = solver_index_[point.contact.first] >= 0 ? point.contact.first : point.contact.second;
+        const int body =
+            bodies_->solver_index[point.contact.first] >= 0 ? point.contact.first : point.contact.second;
         point.event = event_time_[body] >= 0.0;
         if (point.event) point.contact.point.gap = std::max(0.0, point.meeting_gap);
     }
@@ -106,9 +110,9 @@ void ContactStage::apply_forces_until(std::size_t b, double part) {
 
 /// Where bodies may rebound, free ones that are not moved to the time of an impact have half of the forces before any.
 void ContactStage::apply_half_of_forces() {
-    for (std::size_t b = 0; rebounds_ && b < solver_index_.size(); ++b)
-        if (solver_index_[b] >= 0 && is_free(b) && event_time_[b] < 0.0)
-            apply_forces_until(b, part_of_forces(0.0, rebounds_));
+    for (std::size_t b = 0; surfaces_->rebounds && b < bodies_->solver_index.size(); ++b)
+        if (bodies_->solver_index[b] >= 0 && is_free(b) && event_time_[b] < 0.0)
+            apply_forces_until(b, part_of_forces(0.0, surfaces_->rebounds));
 }
 
 /// Bodies that forces would bring together again in the rest of the step, so soon after their impact, lie on each other: what is
@@ -121,7 +125,8 @@ void ContactStage::lay_down() {
         const double left = 1.0 - point.toi / options_.time_step;
         if (!(std::abs(apart) < 0.5 * left * -push)) continue;
         for (const int b : {point.contact.first, point.contact.second})
-            if (solver_index_[b] >= 0 && toi_fraction_[b] > 1.0) dv_ext_[b] = Vec6{}, toi_fraction_[b] = 1.0;
+            if (bodies_->solver_index[b] >= 0 && toi_fraction_[b] > 1.0)
+                dv_ext_[b] = Vec6{}, toi_fraction_[b] = 1.0;
     }
 }
 
@@ -138,7 +143,7 @@ void ContactStage::order_points() {
         point.compression_before = cached[old].compression;
         if (point.solved) continue;
         std::copy_n(cached[old].tangent, 2, point.tangents);
-        if (resists_turning_) std::copy_n(cached[old].turning, 3, own_extras(point).turning);
+        if (surfaces_->resists_turning) std::copy_n(cached[old].turning, 3, own_extras(point).turning);
     }
     ordered_ = points_.size();
 }
@@ -157,9 +162,9 @@ void ContactStage::measure_points() {
         const Contact& contact = point.contact;
         const double gap = contact.point.gap;
         measure(point);
-        const double psi = material(contact).restitution, speed = -point.approach;
+        const double psi = surfaces_->pair(contact).restitution, speed = -point.approach;
         point.bounce = -1.0;
-        if (is_closed(contact)) {
+        if (bodies_->is_closed(contact)) {
             point.bounce = speed > 0.0 ? psi : 0.0;
         } else if (plastic_first_ &&
                    point.impact > 0.0) {  // an impact of this step has brought them together

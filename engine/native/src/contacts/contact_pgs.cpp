@@ -20,7 +20,8 @@ using namespace tolerances::contact_pgs;
 void ContactStage::hand_over() {
     const double h = options_.time_step;
     for (std::size_t k = handed_over_; k < points_.size(); ++k)
-        pgs_.announce(solver_index_[points_[k].contact.first], solver_index_[points_[k].contact.second]);
+        pgs_.announce(bodies_->solver_index[points_[k].contact.first],
+                      bodies_->solver_index[points_[k].contact.second]);
     pgs_.arrange();
     for (; handed_over_ < points_.size(); ++handed_over_) {
         Point& point = points_[handed_over_];
@@ -29,11 +30,11 @@ void ContactStage::hand_over() {
             for (const int body : {later.first, later.second})
                 prefetch(velocity_[body]), prefetch(dv_ext_[body]);
         }
-        const PairMaterial material = this->material(point.contact);
+        const PairMaterial material = surfaces_->pair(point.contact);
         const ContactExtras& extras = this->extras(point);
         PgsContact row;
-        row.first = solver_index_[point.contact.first];
-        row.second = solver_index_[point.contact.second];
+        row.first = bodies_->solver_index[point.contact.first];
+        row.second = bodies_->solver_index[point.contact.second];
         row.normal = point.contact.point.normal;
         row.tangent = extras.axis_scale[0] * point.tangent;
         row.across = extras.axis_scale[1] * cross(row.normal, point.tangent);
@@ -46,9 +47,10 @@ void ContactStage::hand_over() {
         row.normal_before = point.before;
         row.impulse[0] = point.solved ? point.normal : std::max(0.0, point.before);
         for (int i = 0; i < 2; ++i) row.impulse[i + 1] = point.tangents[i] / extras.axis_scale[i];
-        if (conveys_ || row.first < 0 || row.second < 0) {
+        if (surfaces_->conveys || row.first < 0 || row.second < 0) {
             const Vec3 directions[3] = {row.normal, row.tangent, row.across};
-            for (int i = 0; i < 3; ++i) row.right[i] = -relative(point, directions[i], prescribed_, true);
+            for (int i = 0; i < 3; ++i)
+                row.right[i] = -relative(point, directions[i], drive_.prescribed(), true);
             for (int i = 1; i < 3; ++i) row.right[i] -= surface_speed(point, directions[i]);
         }
         row.right[0] += resting_right(point);
@@ -75,16 +77,16 @@ bool ContactStage::find_more(bool over) {
     if (first) next_ = velocity_;
     // On the way bodies are skipped at the sides of others that they do meet in the end, and need not have changed since.
     const bool was_settling = std::exchange(iterating_, !over);
-    const bool all = first || (was_settling && over && swings_);
-    changed_.assign(solver_index_.size(), all);
+    const bool all = first || (was_settling && over && bodies_->swings);
+    changed_.assign(bodies_->solver_index.size(), all);
     pgs_.visit_moved([&](int moving) {
-        const int b = body_of_[moving];
+        const int b = bodies_->body_of[moving];
         const Vec6& now = pgs_.velocity(moving);
         changed_[b] = all || next_[b] != now;
         next_[b] = now;
     });
     if (outrun(next_)) find_open_again();
-    if (swings_) predict_sinking();
+    if (bodies_->swings) predict_sinking();
     const std::size_t known = points_.size();
     const bool turned = find_turned(next_);
     const std::size_t dissipated_energy = points_.size();
@@ -119,7 +121,8 @@ bool ContactStage::is_settled(MixedSystem& system) {
     joint_is_worst_ = joint.residual > contact.residual;
     if (contact.row >= 0 && contact.residual >= joint.residual) {
         const Contact& pair = points_[contact.row].contact;
-        blame(contact.residual, std::max(solver_index_[pair.first], solver_index_[pair.second]));
+        blame(contact.residual,
+              std::max(bodies_->solver_index[pair.first], bodies_->solver_index[pair.second]));
     } else if (!system.rows.empty()) {
         const RowBlock& block = system.rows[joint.row];
         blame(joint.residual, std::max(block.first, block.second));
@@ -131,11 +134,11 @@ bool ContactStage::is_settled(MixedSystem& system) {
 /// contact that it stems from, each iteration's may be larger than the one before.
 bool ContactStage::runs_away(const MixedSystem& system) const {
     double speed = 0.0, had = 0.0, has = 0.0;  // of what moves as it is told, or along itself
-    for (std::size_t b = 0; has_external_drive_ && b < prescribed_.size(); ++b)
-        speed = std::max(speed, norm(linear(prescribed_[b])) +
-                                    radius(static_cast<int>(b)) * norm(angular(prescribed_[b])));
+    for (std::size_t b = 0; drive_.any() && b < drive_.prescribed().size(); ++b)
+        speed = std::max(speed, norm(linear(drive_.prescribed()[b])) +
+                                    bodies_->radius[b] * norm(angular(drive_.prescribed()[b])));
     for (const Point& point : points_)
-        if (conveys_)
+        if (surfaces_->conveys)
             speed =
                 std::max({speed, std::abs(surface_speed(point, point.tangent)),
                           std::abs(surface_speed(point, cross(point.contact.point.normal, point.tangent)))});
@@ -145,12 +148,12 @@ bool ContactStage::runs_away(const MixedSystem& system) const {
             for (int j = 0; j < 6; ++j) sum += 0.5 * v[i] * mass[6 * i + j] * v[j];
         return sum;
     };
-    for (std::size_t b = 0; b < solver_index_.size(); ++b) {
-        if (solver_index_[b] < 0) continue;
-        const Mat6& mass = system.mass[solver_index_[b]];
+    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b) {
+        if (bodies_->solver_index[b] < 0) continue;
+        const Mat6& mass = system.mass[bodies_->solver_index[b]];
         had += energy(mass, velocity_[b]) + energy(mass, sum(velocity_[b], dv_ext_[b])) +
                mass[0] * speed * speed;
-        has += energy(mass, pgs_.velocity(solver_index_[b]));
+        has += energy(mass, pgs_.velocity(bodies_->solver_index[b]));
     }
     return !(has <= too_much * had);
 }
@@ -159,7 +162,8 @@ bool ContactStage::runs_away(const MixedSystem& system) const {
 const ContactStage::Unanswered& ContactStage::find_unanswered(std::size_t bodies, std::size_t known) {
     arrays_.connected.begin(static_cast<int>(bodies));
     for (const Point& point : points_)
-        arrays_.connected.tie(solver_index_[point.contact.first], solver_index_[point.contact.second]);
+        arrays_.connected.tie(bodies_->solver_index[point.contact.first],
+                              bodies_->solver_index[point.contact.second]);
     const Islands& islands = arrays_.connected.find();
     Unanswered& found = unanswered_;
     found.open.assign(islands.count, 0);
@@ -180,7 +184,7 @@ const ContactStage::Unanswered& ContactStage::find_unanswered(std::size_t bodies
 /// nearly all of them at a fraction of the cost, and the next solve starts from where they end. Islands that an earlier
 /// solve has answered, and no new point ties to others, stay as they are to the last bit.
 void ContactStage::warm_start_by_pgs(MixedSystem& system, std::size_t known, int round) {
-    if (resists_turning_) return;  // PGS over contacts knows no such friction
+    if (surfaces_->resists_turning) return;  // PGS over contacts knows no such friction
     if (points_.size() <= few_points && round < many_rounds) return;
     if (find_unanswered(system.mass.size(), known).largest <= few_points && round < many_rounds) return;
     double speed = 0.0;
@@ -248,9 +252,9 @@ bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
             break;
         }
         late_impact_ = false;  // it was one by velocities on the way
-        for (std::size_t b = 0; b < solver_index_.size(); ++b)
-            if (solver_index_[b] >= 0) next_[b] = pgs_.velocity(solver_index_[b]);
-        changed_.assign(solver_index_.size(), 1);
+        for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b)
+            if (bodies_->solver_index[b] >= 0) next_[b] = pgs_.velocity(bodies_->solver_index[b]);
+        changed_.assign(bodies_->solver_index.size(), 1);
         const std::size_t known = points_.size();
         if (find_impacts(next_, true) > 0) move_impacts_to_start(known, next_);
         if (needs_plastic_impact() || needs_stop_impact(system, begun, next_)) return true;
@@ -278,8 +282,8 @@ bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
         shorten_unsettled(system, system.rows.size(), pushes, share);
     }
     mark_rows(system);  // by joints; of contacts those that push, or did in an impact
-    for (std::size_t b = 0; b < solver_index_.size(); ++b)
-        if (solver_index_[b] >= 0 && event_time_[b] >= 0.0) has_rows_[solver_index_[b]] = 1;
+    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b)
+        if (bodies_->solver_index[b] >= 0 && event_time_[b] >= 0.0) has_rows_[bodies_->solver_index[b]] = 1;
     state_.cache.points.clear();
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
@@ -287,14 +291,15 @@ bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
         std::copy_n(pgs_.impulse(static_cast<int>(k)), 3, impulse);
         if (!share.empty())
             for (double& z : impulse)
-                z *= share[std::max(solver_index_[point.contact.first], solver_index_[point.contact.second])];
+                z *= share[std::max(bodies_->solver_index[point.contact.first],
+                                    bodies_->solver_index[point.contact.second])];
         const Vec3 across = cross(point.contact.point.normal, point.tangent);
         const double* const axis_scale = extras(point).axis_scale;
         cache_contact(system, point, impulse[0],
                       (impulse[1] * axis_scale[0]) * point.tangent + (impulse[2] * axis_scale[1]) * across);
         if (impulse[0] == 0.0 && impulse[1] == 0.0 && impulse[2] == 0.0) continue;
         for (const int body : {point.contact.first, point.contact.second})
-            if (solver_index_[body] >= 0) has_rows_[solver_index_[body]] = 1;
+            if (bodies_->solver_index[body] >= 0) has_rows_[bodies_->solver_index[body]] = 1;
     }
     if (report.finite) correct_events(system);
     order_by_key(state_.cache.points, unordered_, places_);

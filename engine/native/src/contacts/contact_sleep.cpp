@@ -8,23 +8,12 @@ namespace spook {
 
 void ContactStage::put_to_sleep(const std::vector<int>& bodies) {
     for (const int body : bodies) detection_.set_asleep(body, true);
-    state_.cache.put_to_sleep(bodies, solver_index_.size());
+    state_.cache.put_to_sleep(bodies, bodies_->solver_index.size());
 }
 
 void ContactStage::wake(const std::vector<int>& bodies) {
     for (const int body : bodies) detection_.set_asleep(body, false);
     state_.cache.wake(bodies);
-}
-
-bool ContactStage::conveys(const Contact& contact) const {
-    if (!conveys_) return false;
-    return norm(materials_[contact.first].surface_velocity) > 0.0 ||
-           norm(materials_[contact.second].surface_velocity) > 0.0;
-}
-
-void ContactStage::wake_sleepers(const Contact& contact) {
-    for (const int body : {contact.first, contact.second})
-        if (state_.cache.sleeps(body)) woken_.push_back(body);
 }
 
 void ContactStage::sleep_through() {
@@ -37,7 +26,7 @@ void ContactStage::sleep_through() {
 void ContactStage::lie_as(const State& state) {
     woken_.clear();
     if (state_.cache.asleep.empty() && state.cache.asleep.empty()) return;
-    for (std::size_t b = 0; b < solver_index_.size(); ++b) {
+    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b) {
         const int body = static_cast<int>(b);
         if (const bool slept = state.cache.sleeps(body); slept != state_.cache.sleeps(body))
             detection_.set_asleep(body, slept);

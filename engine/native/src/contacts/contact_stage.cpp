@@ -13,119 +13,51 @@ namespace {
 
 using namespace tolerances::contact_stage;
 
-FrictionReport iterate(const ContactOptions& o, FrictionModel model, MixedSystem& island,
-                       std::vector<FrictionPoint>& points, DirectSolver& solver) {
-    return o.solver == SolverKind::iterative
-               ? solve_iterative(island, points, model, o.iterations, o.residual_tolerance)
-               : solve_hybrid(island, points, model, solver.pivot, solver.backoff, o.iterations,
-                              o.residual_tolerance);
-}
-
-/// Whether an answer is one: an island on which next to nothing acts may have none to rounding.
-bool is_finite(const MixedSystem& system) {
-    const auto finite = [](double x) { return std::isfinite(x); };
-    for (const Vec6& v : system.velocity)
-        if (!std::all_of(v.begin(), v.end(), finite)) return false;
-    for (const RowBlock& block : system.rows)
-        for (int i = 0; i < block.size; ++i) {
-            const bool good =
-                finite(block.right[i]) && finite(block.multiplier[i]) &&
-                std::all_of(block.first_jacobian[i].begin(), block.first_jacobian[i].end(), finite) &&
-                std::all_of(block.second_jacobian[i].begin(), block.second_jacobian[i].end(), finite);
-            if (!good) return false;
-        }
-    return true;
-}
-
-/// PGS; where it stops with few rows off by more than `enough`, as in the rough impact of an end whose pushing and
-/// rubbing turn it alike, more of them go in circles, and a direct solve costs little.
-FrictionReport pgs_or_direct(const ContactOptions& o, FrictionModel model, double enough, MixedSystem& island,
-                             std::vector<FrictionPoint>& points, DirectSolver& solver) {
-    static thread_local MixedSystem start;  // their memory outlives a solve
-    static thread_local std::vector<FrictionPoint> fresh;
-    start = island, fresh = points;
-    FrictionReport report = iterate(o, model, island, points, solver);
-    if (!report.finite || report.converged) return report;
-    const double left = rows_residual(island, points, model).residual;
-    if (!(left > enough)) return report;
-    const FrictionReport direct = solve_friction_direct(start, fresh, model, solver);
-    if (direct.finite && is_finite(start) && rows_residual(start, fresh, model).residual < left) {
-        island = start, points = fresh;
-        for (const FrictionPoint& point : points)  // what is left is the direct solver's own
-            for (int i = point.row; i < point.row + point.size; ++i)
-                island.rows[point.block].softness[i] = point.slip_softness;
-        report.converged = direct.converged;
-    }
-    report.rounds += direct.rounds, report.pivots += direct.pivots,
-        report.pgs_iterations += direct.pgs_iterations;
-    return report;
-}
-
 }  // namespace
 
 ContactStage::ContactStage(Detection detection, const std::vector<SurfaceMaterial>& materials,
                            std::vector<int> unknown, const ContactOptions& options,
                            std::vector<IndexPair> joints, std::vector<char> yielding)
     : detection_(std::move(detection)),
-      materials_(materials),
-      solver_index_(std::move(unknown)),
+      bodies_(std::make_shared<ContactBodies>(detection_, std::move(unknown), std::move(joints))),
+      surfaces_(std::make_shared<ContactSurfaces>(materials)),
       options_(options),
-      joints_(std::move(joints)),
-      yielding_(std::move(yielding)) {
+      projector_(bodies_, surfaces_, options, std::move(yielding)) {
     if (options.threads > 1) team_ = std::make_shared<Team>(options.threads);
-    for (IslandSolver* solver : {&resting_solver_, &impact_solver_, &projection_solver_}) {
+    for (IslandSolver* solver : {&resting_solver_, &impact_solver_}) {
         solver->floor = options.floor;
         solver->refinements = options.refinements;
         solver->team = team_.get();
     }
     detection_.help(team_.get());
     pgs_.help(team_.get());
-    projection_pgs_.help(team_.get());
-    for (const SurfaceMaterial& material : materials_.distinct()) {
-        conveys_ = conveys_ || norm(material.surface_velocity) > 0.0;
-        oriented_ = oriented_ || material.is_oriented();
-        resists_turning_ = resists_turning_ || material.resists_turning();
-        rebounds_ = rebounds_ || material.restitution > 0.0;
-    }
-    const std::size_t bodies = solver_index_.size();
-    for (std::size_t b = 0; b < bodies; ++b) {
-        if (solver_index_[b] < 0) continue;
-        body_of_.resize(std::max(body_of_.size(), static_cast<std::size_t>(solver_index_[b]) + 1));
-        body_of_[solver_index_[b]] = static_cast<int>(b);
-    }
+    projector_.help(team_.get());
+    const std::size_t bodies = bodies_->count();
     margin_.assign(bodies, 0.0);
-    prescribed_.assign(bodies, Vec6{});
-    jointed_.assign(bodies, 0);
     supported_.assign(bodies, 0);
     depth_.assign(bodies, 0.0);
     predicted_sinking_.assign(bodies, 0.0);
     toi_fraction_.assign(bodies, 0.0);
     event_time_.assign(bodies, -1.0);
-    ball_ = detection_.balls();
-    swings_ = !detection_.single_points();
-    for (const auto& [a, b] : joints_) {
-        if (a >= 0) jointed_[a] = 1;
-        if (b >= 0) jointed_[b] = 1;
-    }
 }
 
 double ContactStage::relative(const Point& point, Vec3 direction, const std::vector<Vec6>& velocity,
                               bool only_prescribed) const {
     const Contact& contact = point.contact;
     double total = 0.0;
-    if (!only_prescribed || solver_index_[contact.first] < 0)
+    if (!only_prescribed || bodies_->solver_index[contact.first] < 0)
         total += dot(contact_row(direction, point.first_arm), velocity[contact.first]);
-    if (!only_prescribed || solver_index_[contact.second] < 0)
+    if (!only_prescribed || bodies_->solver_index[contact.second] < 0)
         total -= dot(contact_row(direction, point.second_arm), velocity[contact.second]);
     return total;
 }
 
 /// How fast the surfaces move along themselves, the first against the second, along `direction`, m/s.
 double ContactStage::surface_speed(const Point& point, Vec3 direction) const noexcept {
-    if (!conveys_) return 0.0;
+    if (!surfaces_->conveys) return 0.0;
     const int a = point.contact.first, b = point.contact.second;
-    return dot(direction, poses_[a].rotation * materials_[a].surface_velocity -
-                              poses_[b].rotation * materials_[b].surface_velocity);
+    return dot(direction, poses_[a].rotation * (*surfaces_)[a].surface_velocity -
+                              poses_[b].rotation * (*surfaces_)[b].surface_velocity);
 }
 
 /// The first `rows` of normal, tangents and turning: 1, 3 or 6.
@@ -133,8 +65,8 @@ RowBlock ContactStage::row_block(const Point& point, int rows) const {
     const Contact& contact = point.contact;
     RowBlock block;
     block.is_contact = true;
-    block.first = solver_index_[contact.first];
-    block.second = solver_index_[contact.second];
+    block.first = bodies_->solver_index[contact.first];
+    block.second = bodies_->solver_index[contact.second];
     block.size = std::min(rows, 3);
     const double* const axis_scale = extras(point).axis_scale;
     const Vec3 directions[3] = {contact.point.normal, axis_scale[0] * point.tangent,
@@ -142,7 +74,7 @@ RowBlock ContactStage::row_block(const Point& point, int rows) const {
     for (int i = 0; i < block.size; ++i) {
         if (block.first >= 0) block.first_jacobian[i] = contact_row(directions[i], point.first_arm);
         if (block.second >= 0) block.second_jacobian[i] = contact_row(-directions[i], point.second_arm);
-        block.right[i] = -relative(point, directions[i], prescribed_, true);
+        block.right[i] = -relative(point, directions[i], drive_.prescribed(), true);
         if (i > 0) block.right[i] -= surface_speed(point, directions[i]);
     }
     block.lower[0] = 0.0;
@@ -153,7 +85,7 @@ RowBlock ContactStage::row_block(const Point& point, int rows) const {
 /// Rolling about both tangents and turning about the normal, as speeds at the larger body's radius: what is left of
 /// them then compares with that of other rows.
 void ContactStage::add_turning_rows(const Point& point, RowBlock& block) const {
-    const double scale = size(point.contact);
+    const double scale = bodies_->size(point.contact);
     const Vec3 n = point.contact.point.normal;
     const Vec3 axes[3] = {point.tangent, cross(n, point.tangent), n};
     for (int i = 0; i < 3; ++i) {
@@ -161,8 +93,8 @@ void ContactStage::add_turning_rows(const Point& point, RowBlock& block) const {
         const Vec6 row{0.0, 0.0, 0.0, axis.x, axis.y, axis.z};
         if (block.first >= 0) block.first_jacobian[3 + i] = row;
         if (block.second >= 0) block.second_jacobian[3 + i] = {0.0, 0.0, 0.0, -axis.x, -axis.y, -axis.z};
-        block.right[3 + i] = -dot(
-            axis, angular(prescribed_[point.contact.first]) - angular(prescribed_[point.contact.second]));
+        block.right[3 + i] = -dot(axis, angular(drive_.prescribed()[point.contact.first]) -
+                                            angular(drive_.prescribed()[point.contact.second]));
         block.lower[3 + i] = block.upper[3 + i] = 0.0;  // until its friction bounds it
     }
     block.size = 6;
@@ -170,8 +102,8 @@ void ContactStage::add_turning_rows(const Point& point, RowBlock& block) const {
 
 /// The rows of a block that friction bounds.
 void ContactStage::add_friction(const Point& point, int block, std::vector<FrictionPoint>& friction) const {
-    const PairMaterial material = this->material(point.contact);
-    const double soft = material.slip_compliance / options_.time_step, scale = size(point.contact);
+    const PairMaterial material = surfaces_->pair(point.contact);
+    const double soft = material.slip_compliance / options_.time_step, scale = bodies_->size(point.contact);
     double normal = point.before;
     if (options_.friction == FrictionModel::box) normal = normal < 0.0 ? extras(point).guessed : normal;
     else if (point.solved) normal = point.normal;
@@ -183,32 +115,10 @@ void ContactStage::add_friction(const Point& point, int block, std::vector<Frict
     if (material.torsional > 0.0) friction.push_back({block, material.torsional / scale, 0.0, normal, 5, 1});
 }
 
-FrictionReport ContactStage::run(MixedSystem& system, std::vector<FrictionPoint>& points,
-                                 IslandSolver& islands, FrictionModel model,
-                                 const std::vector<char>* answered) {
-    const ContactOptions& o = options_;
-    if (o.solver == SolverKind::direct && system.velocity.size() == system.mass.size() &&
-        still_right(system, points, model))
-        return {};
-    // What a resting solve leaves, the next step sees; what an impact leaves stays.
-    const bool exact = &islands == &impact_solver_ || state_.by_rows;
-    const double enough = exact ? o.residual_tolerance : o.unsettled_residual;
-    const bool warm_started = warm_started_ && &islands == &resting_solver_;
-    const bool direct = o.solver == SolverKind::direct;
-    const std::size_t most = direct ? system.rows.size() : ran_away_ ? not_too_large : 0;
-    const auto solve = [&o, model, enough, warm_started, most](
-                           MixedSystem& island, std::vector<FrictionPoint>& own, DirectSolver& solver) {
-        solver.warm_started = warm_started;
-        if (island.rows.size() <= most) return solve_friction_direct(island, own, model, solver);
-        if (island.rows.size() > few_rows) return iterate(o, model, island, own, solver);
-        return pgs_or_direct(o, model, enough, island, own, solver);
-    };
-    const FrictionReport report = islands.run(system, points, std::cref(solve), answered);
-    state_.counters.friction_rounds += report.rounds;
-    state_.counters.pivots += report.pivots;
-    state_.counters.pgs_iterations += report.pgs_iterations;
-    state_.counters.unsettled += !report.converged;
-    return report;
+IslandRules ContactStage::rules_of(FrictionModel model, bool exact) const noexcept {
+    return {.friction = model,
+            .enough = exact ? options_.residual_tolerance : options_.unsettled_residual,
+            .few_enough = ran_away_ ? not_too_large : 0};
 }
 
 /// What is left of the step after a point's event, s.
@@ -218,38 +128,18 @@ double ContactStage::time_left(const Point& point) const noexcept {
 }
 
 double ContactStage::elastic_depth(const Point& point) const noexcept {
-    return point.compression_before + slack(point.contact);
-}
-
-/// The radius of the smaller of two bodies, of those that move by themselves, m.
-double ContactStage::moving_size(const Contact& contact) const noexcept {
-    const std::vector<double>& radius = detection_.radius();
-    const int a = contact.first, b = contact.second;
-    if (solver_index_[a] < 0) return radius[b];
-    return solver_index_[b] < 0 ? radius[a] : std::min(radius[a], radius[b]);
-}
-
-/// A depth that is rounding: it may come back as a speed, which gives a billionth of a body's height at most.
-double ContactStage::slack(const Contact& contact) const noexcept {
-    return slack_share * moving_size(contact);
-}
-
-/// A gap no larger than the rounding of the places it was found at is none. Answered with a speed it would come back
-/// as another of its kind, step after step: what rests would never be found at rest.
-double ContactStage::gap(const Contact& contact) const noexcept {
-    const double gap = contact.point.gap;
-    return std::abs(gap) <= rounding * (norm(contact.point.position) + size(contact)) ? 0.0 : gap;
+    return point.compression_before + bodies_->slack(point.contact);
 }
 
 /// What the normal's resting row adds to the right side of the bodies that do not move by themselves, m/s.
 double ContactStage::resting_right(Point& point) const {
-    const double h = options_.time_step, gap = this->gap(point.contact);
+    const double h = options_.time_step, gap = bodies_->gap(point.contact);
     measure(point);
-    const bool touching = is_closed(point.contact);
+    const bool touching = bodies_->is_closed(point.contact);
     if (point.event)  // another point of a pair that meets may still be open
         return -(touching ? 0.0 : gap / time_left(point));
     if (!touching) return -gap / h;
-    const PairMaterial material = this->material(point.contact);
+    const PairMaterial material = surfaces_->pair(point.contact);
     const Regularisation row = regularise(material.compliance, material.damping, h);
     const double depth = -row.violation_gain * std::max(gap, -elastic_depth(point));
     // A rigid contact that opens is not pushed after its own speed.
@@ -262,13 +152,13 @@ bool ContactStage::is_pressed(const Point& point) const noexcept {
     if (point.solved) return point.normal > 0.0;
     return point.before > 0.0 || point.toi >= 0.0 ||
            (point.before < 0.0 &&
-            (is_closed(point.contact) || gap + h * (point.resting_approach() + point.dv_ext) < 0.0));
+            (bodies_->is_closed(point.contact) || gap + h * (point.resting_approach() + point.dv_ext) < 0.0));
 }
 
 /// The resting row of a point; the tangents' bounds are left to the friction law.
 RowBlock ContactStage::resting_row(Point& point) const {
     const double h = options_.time_step;
-    const PairMaterial material = this->material(point.contact);
+    const PairMaterial material = surfaces_->pair(point.contact);
     const bool turning = material.resists_turning();
     RowBlock block = row_block(point, turning ? 6 : point.friction > 0.0 ? 3 : 1);
     if (turning && !(point.friction > 0.0))
@@ -290,7 +180,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
     const std::size_t joints = system.rows.size();
     velocity_ = velocity;
     warm_started_ = ends_passed_ = ran_away_ = false;
-    if (options_.solver == SolverKind::iterative && !resists_turning_) {
+    if (options_.solver == SolverKind::iterative && !surfaces_->resists_turning) {
         bool unfinished = false;
         const bool finite = solve_by_pgs(system, unfinished);
         if (!unfinished) return finite;
@@ -311,12 +201,16 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         }
         if (round == 0) {  // at rest, the velocities before are those after
             system.velocity.resize(system.mass.size());
-            for (std::size_t b = 0; b < solver_index_.size(); ++b)
-                if (solver_index_[b] >= 0) system.velocity[solver_index_[b]] = velocity_[b];
+            for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b)
+                if (bodies_->solver_index[b] >= 0) system.velocity[bodies_->solver_index[b]] = velocity_[b];
         }
         const FrictionReport before = report;
         const bool late = round > 0 && options_.solver == SolverKind::direct;
-        report = run(system, friction, resting_solver_, options_.friction, late ? &answered : nullptr);
+        // What a resting solve leaves, the next step sees; what an impact leaves stays.
+        IslandRules rules = rules_of(options_.friction, state_.by_rows);
+        rules.warm_started = warm_started_;
+        report = solve_islands(system, friction, resting_solver_, options_, rules, state_.counters,
+                               late ? &answered : nullptr);
         report.rounds += before.rounds, report.pgs_iterations += before.pgs_iterations;
         report.converged = report.converged && before.converged;  // islands may have been left as they were
         if (options_.friction == FrictionModel::box)
@@ -381,7 +275,7 @@ Vec3 ContactStage::store_solution(const RowBlock& block, Point& point) {
         else turning += sign * angular(row);
     }
     const Vec3 n = point.contact.point.normal, t = point.tangent;
-    const double scale = 1.0 / size(point.contact);
+    const double scale = 1.0 / bodies_->size(point.contact);
     point.solved = point.answered = true;
     point.normal = block.multiplier[0];
     point.tangents[0] = dot(along, t);
@@ -399,7 +293,24 @@ Vec3 ContactStage::store_solution(const RowBlock& block, Point& point) {
 bool ContactStage::is_stopped(const Point& point, double normal) const {
     const double fall = std::abs(relative(point, point.contact.point.normal, whole_dv_ext_, false));
     return normal > 0.0 && point.approach < -(point.rounding + fall) &&
-           material(point.contact).restitution > 0.0;
+           surfaces_->pair(point.contact).restitution > 0.0;
+}
+
+/// How far a compliant contact is pressed in at the end of the step: where it was, and the way its bodies go.
+double ContactStage::compression(const MixedSystem& system, const Point& point) const {
+    if (!(surfaces_->pair(point.contact).compliance > 0.0)) return 0.0;
+    const Contact& contact = point.contact;
+    double speed = 0.0;
+    for (const int b : {contact.first, contact.second}) {
+        const Vec6& v =
+            bodies_->solver_index[b] < 0 ? velocity_[b] : system.velocity[bodies_->solver_index[b]];
+        const bool first = b == contact.first;
+        speed += dot(contact_row(first ? contact.point.normal : -contact.point.normal,
+                                 first ? point.first_arm : point.second_arm),
+                     v);
+    }
+    const double before = std::min(point.compression_before, -contact.point.gap);  // an open gap comes first
+    return std::max(0.0, before - time_left(point) * speed);
 }
 
 /// Takes down what a point did: its normal impulse, and that along the surface.
@@ -416,7 +327,7 @@ CachedContact& ContactStage::cache_contact(const MixedSystem& system, const Poin
     cached.tangent[0] = dot(along, point.tangent);
     cached.tangent[1] = dot(along, cross(n, point.tangent));
     cached.friction = extras(point).axis_scale[0] * point.friction;
-    cached.active = cached.normal > 0.0 || cached.impact > 0.0 || is_closed(point.contact);
+    cached.active = cached.normal > 0.0 || cached.impact > 0.0 || bodies_->is_closed(point.contact);
     return cached;
 }
 
@@ -432,9 +343,9 @@ void ContactStage::mark_rows(const MixedSystem& system) {
 /// Velocities of all bodies after a solve; those without rows fly freely.
 void ContactStage::move_on(const MixedSystem& system, std::vector<Vec6>& next) {
     mark_rows(system);
-    next.resize(solver_index_.size());
-    for (std::size_t b = 0; b < solver_index_.size(); ++b) {
-        const int u = solver_index_[b];
+    next.resize(bodies_->solver_index.size());
+    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b) {
+        const int u = bodies_->solver_index[b];
         next[b] = u >= 0 && has_rows_[u] ? system.velocity[u] : sum(velocity_[b], dv_ext_[b]);
     }
 }
@@ -457,12 +368,12 @@ bool ContactStage::outrun(const std::vector<Vec6>& velocity) {
 
 /// An event's bodies went with v₋ until its time: with v₊ for the whole step they would end elsewhere.
 void ContactStage::correct_events(const MixedSystem& system) {
-    for (std::size_t b = 0; b < solver_index_.size(); ++b) {
-        const int u = solver_index_[b];
+    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b) {
+        const int u = bodies_->solver_index[b];
         if (u < 0 || event_time_[b] < 0.0 || !has_rows_[u]) continue;
         if (correction_.empty()) correction_.assign(system.mass.size(), Vec6{});
         // What a joint holds turns as it goes, or the joint would answer the difference with a speed.
-        for (int i = 0; i < (jointed_[b] ? 6 : 3); ++i)
+        for (int i = 0; i < (bodies_->jointed[b] ? 6 : 3); ++i)
             correction_[u][i] +=
                 event_time_[b] / options_.time_step * (predicted_[b][i] - system.velocity[u][i]);
         const Vec3 more = free_fall_correction(static_cast<int>(b), linear(system.velocity[u]));
@@ -471,9 +382,27 @@ void ContactStage::correct_events(const MixedSystem& system) {
     apply_support_impulses(system);
 }
 
+const PositionProjection* ContactStage::project_positions(const MixedSystem& system, std::size_t joints,
+                                                          const std::vector<Pose>& poses, bool again) {
+    const StepEnd end{detection_, poses_, poses, search_, state_.cache, state_.initial_penetration};
+    return projector_.project({system, joints, pgs_}, end, drive_, again, state_.initial_penetration,
+                              state_.counters, woken_);
+}
+
+void ContactStage::apply_balancing_impulse(const Islands& islands, int island, Vec3 momentum) noexcept {
+    for (CachedContact& cached : state_.cache.points) {
+        const int first = bodies_->solver_index[cached.contact.first],
+                  second = bodies_->solver_index[cached.contact.second];
+        if (std::min(first, second) >= 0 || islands.of_body[std::max(first, second)] != island) continue;
+        if (!cached.pushes()) continue;
+        cached.impulse += first >= 0 ? -momentum : momentum;
+        return;
+    }
+}
+
 BlockLdlt::Counters ContactStage::factor_counters() const noexcept {
     BlockLdlt::Counters sum = resting_solver_.counters();
-    for (const IslandSolver* solver : {&impact_solver_, &projection_solver_}) {
+    for (const IslandSolver* solver : {&impact_solver_, &projector_.solver()}) {
         const BlockLdlt::Counters more = solver->counters();
         sum.factorisations += more.factorisations;
         sum.block_operations += more.block_operations;

@@ -49,45 +49,19 @@
 
 #include "collision/detection.hpp"
 #include "contacts/contact_arrays.hpp"
+#include "contacts/contact_bodies.hpp"
 #include "contacts/contact_cache.hpp"
 #include "contacts/contact_islands.hpp"
-#include "contacts/contact_material.hpp"
-#include "contacts/friction_direct.hpp"
-#include "contacts/friction_pgs.hpp"
+#include "contacts/contact_options.hpp"
+#include "contacts/external_drive.hpp"
 #include "contacts/pgs_solver.hpp"
+#include "contacts/position_projection.hpp"
+#include "contacts/solve_islands.hpp"
 #include "contacts/step_contact.hpp"
 #include "linear/large_array.hpp"
-#include "run/named_enum.hpp"
 #include "run/team.hpp"
 
 namespace spook {
-
-SPOOK_NAMED_ENUM(SolverKind, direct, iterative, hybrid)
-
-/// What bodies that touch but do not approach each other do while an impact passes. simultaneous: they take part in
-/// it. successive: only points that are approached take part, again and again until none is: an impact runs through a
-/// row of touching balls, and the last one leaves. Of open ones the next to close comes next, with those closed by then.
-SPOOK_NAMED_ENUM(ImpactOrder, simultaneous, successive)
-
-struct ContactOptions {
-    double time_step = 0.0;
-    FrictionModel friction = FrictionModel::cone;
-    SolverKind solver = SolverKind::direct;
-    int iterations = 50;
-    double residual_tolerance = 1e-10;  // m/s
-    double floor = 1e-12;               // of pivots, in the factor only
-    int refinements = 1;
-    ImpactOrder impacts = ImpactOrder::simultaneous;
-    double unsettled_residual = 0.1;  // m/s; a solve that leaves more has no answer
-    int threads = 1;
-};
-
-struct ContactCounters {  // exact, equal on every machine
-    std::uint64_t contacts = 0, impacts = 0, corrections = 0, friction_rounds = 0, pivots = 0,
-                  pgs_iterations = 0,
-                  unsettled = 0,  // solves that stopped at a limit of rounds
-        stopped = 0;              // impacts that were to rebound and did not
-};
 
 /// All state from one step to the next is in plain members: copy the stage to save it.
 class ContactStage {
@@ -103,7 +77,7 @@ public:
     bool possible() const noexcept { return detection_.possible(); }
 
     /// Impacts of this body are met at the start of the step, like the stops of its joints, never at their own time.
-    void leave_at_start(int body) noexcept { ball_[body] = 0; }
+    void leave_at_start(int body) noexcept { bodies_->ball[body] = 0; }
 
     /// Finds this step's contacts. `velocity` is v and `free_velocity` v + h M⁻¹ f, one per body of the scene.
     /// False if there is none: nothing else need be called in this step, but meets() where there are joints.
@@ -142,33 +116,15 @@ public:
     /// bodies to where they are at the step's end.
     const std::vector<Vec6>& correction() const noexcept { return correction_; }
 
-    /// How overlapping bodies are to be displaced at the end of the step.
-    struct PositionProjection {
-        std::vector<Vec6> velocity;  // per moving body; empty when none is
-        Islands islands;             // of bodies that push each other, or are connected by joints
-        std::vector<char> grounded;  // per island: something that does not move by itself took part
-        std::vector<char>
-            externally_driven;  // per island: what moves it, or a first overlap, may do work on it
-        std::vector<double> overlap, overlap_before;  // per island: deepest where the step ends, and began, m
-        double deepest = 0.0;                         // overlap that nothing explains, m
-    };
-    const PositionProjection& projection() const noexcept { return projection_; }
-    /// Whether displacements come by PGS: cheap, and as exact as the next step will need.
-    bool projects_by_pgs() const noexcept {
-        return options_.solver == SolverKind::iterative && !resists_turning_;
-    }
+    /// The displacements by which overlapping bodies part, which are at `poses`, where the step ends; null if there are none.
+    /// `system` is that of solve(), with `joints` rows of joints. To be asked `again` when bodies are displaced.
+    const PositionProjection* project_positions(const MixedSystem& system, std::size_t joints,
+                                                const std::vector<Pose>& poses, bool again);
 
-    /// Looks among the pairs of this step's points for overlaps with the bodies at `poses`, where the step ends, and
-    /// fills projection(); false if there is none. `system` is that of solve(), with `joints` rows of joints. To be asked
-    /// `again` when the bodies are displaced: what is linear in the displacement is not all. Then it is false, too, where
-    /// the displacement before was of no use, or by PGS so small that nothing comes of it.
-    bool project_positions(const MixedSystem& system, std::size_t joints, const std::vector<Pose>& poses,
-                           bool again);
-
-    /// Books the momentum [N s] that an island of projection() lost when it paid for its displacement as an impulse at
+    /// Books the momentum [N s] that an island of a projection lost when it paid for its displacement as an impulse at
     /// the first pushing contact with what does not move by itself: there forces keep adding up to the momentum, not
     /// moments to the angular one. An island that only joints tie to such a thing has nothing to book it at.
-    void apply_balancing_impulse(int island, Vec3 momentum) noexcept;
+    void apply_balancing_impulse(const Islands& islands, int island, Vec3 momentum) noexcept;
 
     /// Whether a moving body (by its index in MixedSystem) had rows in the last solve; others fly freely.
     bool has_rows(int index) const noexcept { return has_rows_[index] != 0; }
@@ -187,9 +143,8 @@ public:
     const std::vector<int>& woken() const noexcept { return woken_; }
     /// A step that all bodies sleep through.
     void sleep_through();
-    /// Whether a surface of the contact moves along itself.
-    bool conveys(const Contact& contact) const;
-    double radius(int body) const noexcept { return detection_.radius()[body]; }  // m, of its surface
+    const ContactBodies& bodies() const noexcept { return *bodies_; }
+    const ContactSurfaces& surfaces() const noexcept { return *surfaces_; }
 
     /// What a later step depends on: copying it back goes back.
     struct State {
@@ -208,14 +163,14 @@ public:
         kept.state = state_;
         resting_solver_.backoff(kept.resting);
         impact_solver_.backoff(kept.impact);
-        projection_solver_.backoff(kept.projection);
+        projector_.solver().backoff(kept.projection);
     }
     void go_back(const Snapshot& kept) {
         lie_as(kept.state);
         state_ = kept.state;
         resting_solver_.set_backoff(kept.resting);
         impact_solver_.set_backoff(kept.impact);
-        projection_solver_.set_backoff(kept.projection);
+        projector_.solver().set_backoff(kept.projection);
     }
 
     ContactCounters counters() const noexcept { return state_.counters; }
@@ -232,11 +187,7 @@ private:
     using Point = StepContact;
     void add_point(const Contact& contact, const Pose& first, const Pose& second, double toi);
     void lie_as(const State& state);
-    void wake_sleepers(const Contact& contact);
     void orient(Point& point, const Pose& first, const Pose& second);
-    PairMaterial material(const Contact& contact) const noexcept {
-        return combined(materials_[contact.first], materials_[contact.second]);
-    }
     const ContactExtras& extras(const Point& point) const noexcept {
         static constexpr ContactExtras none{};
         return point.extras < 0 ? none : extras_[point.extras];
@@ -265,7 +216,7 @@ private:
     bool add_toi_point_at_start(const OpenPair& open, double time, const std::vector<Vec6>& velocity);
     void move_impacts_to_start(std::size_t from, const std::vector<Vec6>& velocity);
     void find_events();
-    bool is_free(std::size_t b) const noexcept { return !supported_[b] && !jointed_[b]; }
+    bool is_free(std::size_t b) const noexcept { return !supported_[b] && !bodies_->jointed[b]; }
     void apply_forces_until(std::size_t body, double part);
     void apply_half_of_forces();
     void lay_down();
@@ -289,8 +240,7 @@ private:
     double surface_speed(const Point& point, Vec3 direction) const noexcept;
     double relative(const Point& point, Vec3 direction, const std::vector<Vec6>& velocity,
                     bool only_prescribed) const;
-    FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, IslandSolver& solver,
-                       FrictionModel model, const std::vector<char>* answered = nullptr);
+    IslandRules rules_of(FrictionModel model, bool exact) const noexcept;
     const Islands& connected(const MixedSystem& system, std::size_t joints) const;
     int island_of(const Islands& islands, const Point& point) const noexcept;
     bool is_hit(const RowBlock& block) const noexcept;
@@ -359,67 +309,23 @@ private:
     void shorten_unsettled(MixedSystem& system, std::size_t joints, const std::vector<char>& pushes,
                            std::vector<double>& share) const;
     void correct_events(const MixedSystem& system);
-    // position_projection.cpp
     void note_initial_penetrations();
-    void update_initial_penetrations();
-    double way(int body, const std::vector<Pose>& poses) const;
-    void find_neighbours(const std::vector<Pose>& poses, double margin);
-    void add_penetration(const Contact& contact, const std::vector<Pose>& poses, double excess);
-    double find_overlaps(const std::vector<Pose>& poses, bool again);
-    double look_for_overlaps(const std::vector<Pose>& poses, double margin, bool again);
-    double find_neighbour_overlaps(const std::vector<Pose>& poses, double margin);
-    bool keep_projected(const std::vector<Pose>& poses);
-    bool moves_far(const PenetrationRecord& record) const noexcept;
-    void mark_far_islands();
-    bool is_reconsidered(int a, int b) const noexcept {
-        return reconsidered_.empty() || reconsidered_[a] != 0 || reconsidered_[b] != 0;
-    }
-    bool is_deep(const Contact& contact) const noexcept { return contact.point.gap <= -slack(contact); }
-    double separation_speed(const PenetrationRecord& record, bool again) const;
-    bool project_directly(MixedSystem& projection, bool again);
-    bool project_by_pgs(MixedSystem& projection, bool again);
-    void find_body_compliance(const MixedSystem& projection);
-    double compliance_of(const Contact& contact, const std::vector<double>& compliances) const noexcept;
-    void hold_joints(MixedSystem& projection, double least) const;
-    void note_projected(const MixedSystem& projection);
-    bool is_externally_driven(const Contact& contact) const;
     double time_left(const Point& point) const noexcept;
     double elastic_depth(const Point& point) const noexcept;
-    double moving_size(const Contact& contact) const noexcept;
-    double slack(const Contact& contact) const noexcept;
-    double size(const Contact& contact) const noexcept;
-    double gap(const Contact& contact) const noexcept;
-    bool is_closed(const Contact& contact, double gap) const noexcept;
-    bool is_closed(const Contact& contact) const noexcept { return is_closed(contact, contact.point.gap); }
 
     State state_;
     Detection detection_;
     std::shared_ptr<Team> team_;  // of several threads, or none
-    SharedValues<SurfaceMaterial> materials_;
-    std::vector<int> solver_index_, body_of_;  // index of a body in MixedSystem, or −1; and back
+    std::shared_ptr<ContactBodies> bodies_;
+    std::shared_ptr<ContactSurfaces> surfaces_;
     ContactOptions options_;
-    std::vector<IndexPair> joints_;
-    std::vector<char> jointed_;        // bodies with rows of joints
-    bool conveys_ = false;             // some surface moves along itself
-    bool has_external_drive_ = false;  // or, in this step, something that does not move by itself
-    bool oriented_ = false;            // some surface has a friction that differs with the direction
-    bool resists_turning_ = false, rebounds_ = false;  // some surface does
-    bool swings_ = false;     // some surface has sides: what turns on it may meet elsewhere
-    std::vector<char> ball_;  // bodies whose only surface is a sphere round their centre
-    IslandSolver resting_solver_, impact_solver_, projection_solver_;
-    PgsSolver pgs_, projection_pgs_;
-    MixedSystem projection_system_;
-    PositionProjection projection_;
-    std::vector<char> yielding_;
-    std::vector<double> body_compliance_;  // of contacts of jointed bodies, see find_body_compliance(), 1/kg
-    double expected_overlap_ = 0.0;        // of the last step: how near to look at balls, no more
-    LargeArray<PenetrationRecord> penetrations_, projected_;  // of the step's end; of all its projections
-    std::vector<Pose> projected_poses_;                       // where bodies were at the last of them
-    bool moved_far_ = false;          // the last may not have been enough, see moves_far()
-    std::vector<char> reconsidered_;  // which bodies are, by body; empty: for every body
-    bool ran_away_ = false;           // in this solve: islands that are not too large are solved directly
-    std::vector<Vec6> next_;          // velocities between iterations, per body of the scene
-    std::vector<char> changed_;       // bodies with another than at the look before: the rest was judged then
+    ExternalDrive drive_;
+    IslandSolver resting_solver_, impact_solver_;
+    PgsSolver pgs_;
+    PositionProjector projector_;
+    bool ran_away_ = false;      // in this solve: islands that are not too large are solved directly
+    std::vector<Vec6> next_;     // velocities between iterations, per body of the scene
+    std::vector<char> changed_;  // bodies with another than at the look before: the rest was judged then
     std::size_t handed_over_ = 0, ordered_ = 0;  // points the PGS solver has; points in order
     Unanswered unanswered_;
     std::vector<CachedContact> unordered_;
@@ -433,12 +339,11 @@ private:
     int met_ = 0;                         // of them
     std::vector<IndexPair> open_bodies_;  // of each, to look through many that did not move; empty: not yet
     std::vector<Separation> apart_;       // of pairs, found on several threads
-    std::vector<std::vector<Meeting>> meetings_;            // found by each thread
-    std::vector<MeetingOf> meetings_of_;                    // by body and time
-    std::vector<IndexPair> neighbours_, initial_overlaps_;  // pairs without points, where others part; let in
-    std::vector<IndexPair> near_;                           // where the search was widened
-    std::vector<int> grown_;                                // the bodies it was widened for
-    std::vector<char> supported_;                           // bodies that closed contacts carry
+    std::vector<std::vector<Meeting>> meetings_;  // found by each thread
+    std::vector<MeetingOf> meetings_of_;          // by body and time
+    std::vector<IndexPair> near_;                 // where the search was widened
+    std::vector<int> grown_;                      // the bodies it was widened for
+    std::vector<char> supported_;                 // bodies that closed contacts carry
     std::vector<SupportPair> support_pairs_;
     std::vector<Vec6> support_impulse_dv_;   // what supports took of a body's kick until they let it go
     std::vector<double> depth_;              // of a body's closed contacts, m
@@ -452,12 +357,11 @@ private:
     std::vector<Vec6> path_;     // and that way, m and rad
     std::vector<signed char> in_order_;  // bodies: 1 if impacts come one by one in this step, −1 if not
     LargeArray<Point> points_, toi_points_;
-    std::vector<ContactExtras> extras_;                                             // of points, in no order
-    std::vector<std::pair<std::uint64_t, std::size_t>> places_, projected_places_;  // of points, by key
-    std::vector<int> woken_;               // sleepers met in this step
+    std::vector<ContactExtras> extras_;                          // of points, in no order
+    std::vector<std::pair<std::uint64_t, std::size_t>> places_;  // of points, by key
+    std::vector<int> woken_;                                     // sleepers met in this step
     std::vector<double> margin_, search_;  // where bodies may get, and where they are looked for, m
     std::vector<char> has_rows_;           // moving bodies with rows, by unknown
-    std::vector<Vec6> prescribed_;  // velocities of bodies that do not move by themselves, zero for the rest
     std::vector<Vec6> correction_;
     bool impact_needed_ = false;
     bool warm_started_ = false;   // the step's next solve starts from warm_start_by_pgs()

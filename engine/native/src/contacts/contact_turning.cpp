@@ -43,7 +43,7 @@ bool ContactStage::is_known(const Contact& contact, std::size_t from, std::size_
 
 /// Looks where `velocity` leads the pairs that have points; true if some feature swings in and got a row.
 bool ContactStage::find_turned(const std::vector<Vec6>& velocity) {
-    if (!swings_) return false;
+    if (!bodies_->swings) return false;
     const double h = options_.time_step;
     const std::size_t known = points_.size();
     for (std::size_t from = 0, end = 0; from < ordered_; from = end) {
@@ -55,9 +55,9 @@ bool ContactStage::find_turned(const std::vector<Vec6>& velocity) {
         const Collider::View one = detection_.collider(pair.first), two = detection_.collider(pair.second);
         if (points_[from].event || (is_single(one.shape) && is_single(two.shape))) continue;
         const int a = one.body, b = two.body;
-        const double size = std::max(detection_.radius()[a], detection_.radius()[b]);
-        const double turning = norm(angular(velocity[a])) * detection_.radius()[a] +
-                               norm(angular(velocity[b])) * detection_.radius()[b];
+        const double size = std::max(bodies_->radius[a], bodies_->radius[b]);
+        const double turning =
+            norm(angular(velocity[a])) * bodies_->radius[a] + norm(angular(velocity[b])) * bodies_->radius[b];
         const double sliding = norm(linear(velocity[a]) - linear(velocity[b]));
         if (h * (sliding + turning) < deep * size) continue;
         const Mover first{one.shape, one.part, poses_[a], linear(velocity[a]), angular(velocity[a])};

@@ -58,7 +58,7 @@ Mover ContactStage::mover(int collider, const Pose& pose, const std::vector<Vec6
 int ContactStage::find_impacts(const std::vector<Vec6>& velocity, bool late) {
     meetings_.resize(team_ ? static_cast<std::size_t>(team_->size()) : 1);
     for (auto& meetings : meetings_) meetings.clear();
-    if (swings_ && !open_.empty()) index_points();
+    if (bodies_->swings && !open_.empty()) index_points();
     if (open_bodies_.size() != open_.size() || met_ > most_met * static_cast<double>(open_.size())) {
         std::erase_if(open_, [](const OpenPair& open) { return open.has_met(); });
         met_ = 0;
@@ -130,7 +130,7 @@ int ContactStage::find_impacts(const std::vector<Vec6>& velocity, bool late) {
 bool ContactStage::meets(const std::vector<Vec6>& next, bool stop_hit, bool rebounds) {
     plastic_first_ = rebounds;  // impacts that a stop's rebound leads to are found again after it
     late_impact_ = false;
-    changed_ = jointed_;  // others have been cast along what they fly with
+    changed_ = bodies_->jointed;  // others have been cast along what they fly with
     if (outrun(next)) find_open_again();
     const std::size_t closed_points = points_.size();
     int found = find_impacts(next, true);
@@ -151,12 +151,12 @@ bool ContactStage::meets(const std::vector<Vec6>& next, bool stop_hit, bool rebo
 /// met than is faced at the start, or if the point of the start does not stop them.
 bool ContactStage::add_toi_point_at_start(const OpenPair& open, double time,
                                           const std::vector<Vec6>& velocity) {
-    bool elsewhere = std::min(solver_index_[open.first], solver_index_[open.second]) < 0;
+    bool elsewhere = std::min(bodies_->solver_index[open.first], bodies_->solver_index[open.second]) < 0;
     for (const int collider : {open.pair.first, open.pair.second}) {
         const Collider::View own = detection_.collider(collider);
         const bool flat = own.shape.kind == ShapeKind::plane;
         if (!flat && own.shape.kind != ShapeKind::sphere) return false;
-        if (!plastic_first_ && materials_[own.body].restitution > 0.0) return false;
+        if (!plastic_first_ && (*surfaces_)[own.body].restitution > 0.0) return false;
         if (flat && angular(velocity[own.body]) == Vec3{}) elsewhere = false;
     }
     if (elsewhere) return false;
@@ -177,7 +177,7 @@ bool ContactStage::add_toi_point_at_start(const OpenPair& open, double time,
 bool ContactStage::add_toi_points(IndexPair pair, const Pose& first, const Pose& second, double time,
                                   const std::vector<Vec6>& velocity, bool late) {
     const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
-    const double radius = std::max(detection_.radius()[a], detection_.radius()[b]);
+    const double radius = std::max(bodies_->radius[a], bodies_->radius[b]);
     scratch_.clear();
     detection_.collide_pair(pair, first, second, std::max(margin_[a] + margin_[b], 2.0 * closed * radius),
                             scratch_);
@@ -192,7 +192,7 @@ bool ContactStage::add_toi_points(IndexPair pair, const Pose& first, const Pose&
         const double push = std::max({std::abs(relative(point, contact.point.normal, dv_ext_, false)),
                                       std::abs(dot(contact.point.normal, linear(dv_ext_[contact.first]))),
                                       std::abs(dot(contact.point.normal, linear(dv_ext_[contact.second])))});
-        if (late && !plastic_first_ && material(contact).restitution > 0.0 && closing > 4.0 * push) {
+        if (late && !plastic_first_ && surfaces_->pair(contact).restitution > 0.0 && closing > 4.0 * push) {
             late_impact_ = true;
             points_.pop_back();
             continue;
@@ -237,7 +237,8 @@ void ContactStage::move_impacts_to_start(std::size_t from, const std::vector<Vec
         const std::size_t old = points_.size();
         bool stops = false;
         // Past an edge, another side is met than the one that is faced at the start; of two that move, surely another.
-        const bool fixed = std::min(solver_index_[meeting.first], solver_index_[meeting.second]) < 0;
+        const bool fixed =
+            std::min(bodies_->solver_index[meeting.first], bodies_->solver_index[meeting.second]) < 0;
         const double same =
             fixed ? same_side
             : have_sides(detection_.collider(pair.first).shape, detection_.collider(pair.second).shape)
@@ -251,9 +252,9 @@ void ContactStage::move_impacts_to_start(std::size_t from, const std::vector<Vec
             const Pose &one = poses_[contact.first], &two = poses_[contact.second];
             if (is_turned_through(detection_, contact, one, two, velocity, dv_ext_, h)) continue;
             add_point(contact, one, two, toi);
-            if (material(contact).restitution > 0.0)
-                put_on_mover(points_.back(), solver_index_[contact.first] >= 0,
-                             solver_index_[contact.second] >= 0);
+            if (surfaces_->pair(contact).restitution > 0.0)
+                put_on_mover(points_.back(), bodies_->solver_index[contact.first] >= 0,
+                             bodies_->solver_index[contact.second] >= 0);
             stops =
                 stops ||
                 contact.point.gap + h * relative(points_.back(), contact.point.normal, velocity, false) < 0.0;
@@ -266,9 +267,9 @@ void ContactStage::move_impacts_to_start(std::size_t from, const std::vector<Vec
         for (; k < end; ++k) {
             Point& p = points_.emplace_back(toi_points_[k]);
             const int a = p.contact.first, b = p.contact.second;
-            const bool alone =
-                std::min(solver_index_[a], solver_index_[b]) < 0;  // then its arm is that of the meeting
-            const Vec3 own = linear(velocity[solver_index_[a] < 0 ? b : a]);
+            const bool alone = std::min(bodies_->solver_index[a], bodies_->solver_index[b]) <
+                               0;  // then its arm is that of the meeting
+            const Vec3 own = linear(velocity[bodies_->solver_index[a] < 0 ? b : a]);
             p.contact.point.position -= p.toi * (alone ? own : 0.5 * (own + linear(velocity[b])));
             if (alone) continue;
             p.first_arm = p.contact.point.position - poses_[a].position;

@@ -46,11 +46,11 @@ double ContactStage::depth_at_toi(const Point& point, bool late) const {
 /// Puts the points of each body together: what holds it is asked of each that it would meet.
 void ContactStage::index_points() {
     std::vector<int>& begin = points_begin_;
-    begin.assign(solver_index_.size() + 2, 0);
+    begin.assign(bodies_->solver_index.size() + 2, 0);
     const auto both = [this](auto&& each) {
         for (std::size_t k = 0; k < points_.size(); ++k)
             for (const int b : {points_[k].contact.first, points_[k].contact.second})
-                if (solver_index_[b] >= 0) each(static_cast<std::size_t>(b), static_cast<int>(k));
+                if (bodies_->solver_index[b] >= 0) each(static_cast<std::size_t>(b), static_cast<int>(k));
     };
     both([&](std::size_t b, int) { ++begin[b + 2]; });
     for (std::size_t b = 2; b < begin.size(); ++b) begin[b] += begin[b - 1];
@@ -67,7 +67,7 @@ bool ContactStage::is_internal_edge(const Mover& moving, int body, const Mover& 
     if (!have_sides(moving.shape, other.shape)) return false;
     const double h = options_.time_step, slop = this->slop(open), least = share * slop;
     const bool by_pgs = options_.solver == SolverKind::iterative;
-    if (solver_index_[body] < 0 || !(iterating_ || by_pgs || depth_[body] > least)) return false;
+    if (bodies_->solver_index[body] < 0 || !(iterating_ || by_pgs || depth_[body] > least)) return false;
     const int end = points_begin_[static_cast<std::size_t>(body) + 1];
     for (int at = points_begin_[static_cast<std::size_t>(body)]; at < end;) {
         const std::uint64_t pair = points_[points_of_[at]].contact.key >> feature_bits;
@@ -153,11 +153,11 @@ bool ContactStage::occludes(const Meeting& earlier, const Meeting& later, int bo
 /// Of what one body meets in a step, leaves out what it would not meet if that which comes before stopped it. What it meets
 /// all the same is found again with the velocities of the solve.
 void ContactStage::remove_occluded(std::vector<Meeting>& meetings, const std::vector<Vec6>& velocity) {
-    if (!swings_ || meetings.size() < 2) return;
+    if (!bodies_->swings || meetings.size() < 2) return;
     meetings_of_.clear();
     for (std::size_t at = 0; at < meetings.size(); ++at)
         for (const int b : {open_[meetings[at].open].first, open_[meetings[at].open].second})
-            if (solver_index_[b] >= 0) meetings_of_.push_back({b, meetings[at].time, at});
+            if (bodies_->solver_index[b] >= 0) meetings_of_.push_back({b, meetings[at].time, at});
     std::sort(meetings_of_.begin(), meetings_of_.end(), [](const MeetingOf& a, const MeetingOf& b) {
         return a.body != b.body ? a.body < b.body : a.time != b.time ? a.time < b.time : a.at < b.at;
     });
@@ -184,7 +184,7 @@ void ContactStage::remove_occluded(std::vector<Meeting>& meetings, const std::ve
 /// overlap comes of it. Two bodies whose edges lie on each other touch with either face, and the one they move past is no
 /// obstacle. Whether there are such pairs: they are open then.
 bool ContactStage::skip_grazing(std::size_t from) {
-    if (!swings_ || from == points_.size()) return false;
+    if (!bodies_->swings || from == points_.size()) return false;
     const double h = options_.time_step;
     std::vector<IndexPair>& gone = arrays_.grazing;
     gone.clear();

@@ -8,10 +8,10 @@ namespace spook {
 
 /// How far a body has come since the step began, at a time from when on nothing has hit it.
 Vec6 ContactStage::path_until(std::size_t body, double time) const {
-    if (solver_index_[body] < 0) return sum(Vec6{}, prescribed_[body], time);
+    if (bodies_->solver_index[body] < 0) return sum(Vec6{}, drive_.prescribed()[body], time);
     const double on = time - clock_[body];
     const Vec6 way = sum(path_[body], velocity_[body], on);
-    return supported_[body] || jointed_[body] ? way : sum(way, dv_ext_[body], on);
+    return supported_[body] || bodies_->jointed[body] ? way : sum(way, dv_ext_[body], on);
 }
 
 /// The gap of a point at that time, with both bodies on their ways.
@@ -38,9 +38,9 @@ double ContactStage::closing_time(const Point& point) const {
 /// An open point among balls that are moved by successive impacts is moved to the time of their last one.
 void ContactStage::move_to_last_impact(Point& point) {
     for (const int body : {point.contact.first, point.contact.second})
-        if (solver_index_[body] >= 0 && event_time_[body] < 0.0) return;
+        if (bodies_->solver_index[body] >= 0 && event_time_[body] < 0.0) return;
     const double time = last_impact_time(point), gap = gap_at(point, time);
-    if (point.toi < 0.0 && is_closed(point.contact, gap)) return;
+    if (point.toi < 0.0 && bodies_->is_closed(point.contact, gap)) return;
     point.event = true;
     point.toi = time;
     point.contact.point.gap = std::max(0.0, gap);
@@ -52,9 +52,9 @@ void ContactStage::apply_forces_before(std::size_t b, double part, MixedSystem& 
     if (supported_[b] || !(part > toi_fraction_[b])) return;
     const Vec6 more = sum(Vec6{}, whole_dv_ext_[b], part - toi_fraction_[b]);
     apply_forces_until(b, part);
-    const Mat6& mass = system.mass[solver_index_[b]];
+    const Mat6& mass = system.mass[bodies_->solver_index[b]];
     for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) system.momentum[solver_index_[b]][i] += mass[6 * i + j] * more[j];
+        for (int j = 0; j < 6; ++j) system.momentum[bodies_->solver_index[b]][i] += mass[6 * i + j] * more[j];
 }
 
 /// Whether impacts come one after the other between the bodies of a point.
@@ -62,7 +62,7 @@ bool ContactStage::come_in_order(const Point& point) const {
     if (options_.impacts == ImpactOrder::successive) return true;
     if (clock_.empty()) return false;
     for (const int b : {point.contact.first, point.contact.second})
-        if (solver_index_[b] >= 0 && in_order_[b] <= 0) return false;
+        if (bodies_->solver_index[b] >= 0 && in_order_[b] <= 0) return false;
     return true;
 }
 
@@ -76,22 +76,23 @@ void ContactStage::find_orderly(const Islands& islands, const std::vector<double
     std::vector<std::uint64_t>& pairs = arrays_.impact.island_pair;
     pairs.assign(islands.count, 0);
     const auto island = [&](std::size_t b) {
-        return solver_index_[b] >= 0 ? islands.of_body[solver_index_[b]] : -1;
+        return bodies_->solver_index[b] >= 0 ? islands.of_body[bodies_->solver_index[b]] : -1;
     };
-    for (std::size_t b = 0; b < solver_index_.size(); ++b)
+    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b)
         if (island(b) >= 0)
-            orderly[island(b)] = orderly[island(b)] && ball_[b] && is_free(b) && in_order_[b] >= 0;
+            orderly[island(b)] = orderly[island(b)] && bodies_->ball[b] && is_free(b) && in_order_[b] >= 0;
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
         const int own = island_of(islands, point);
         const double now = first[own];
-        if (now == unbounded || (closing[k] > now && !is_closed(point.contact, gap_at(point, now)))) continue;
+        if (now == unbounded || (closing[k] > now && !bodies_->is_closed(point.contact, gap_at(point, now))))
+            continue;
         const std::uint64_t pair = (point.contact.key >> feature_bits) + 1;
         const bool another = pairs[own] != 0 && pairs[own] != pair;
-        if (another || !(material(point.contact).restitution > 0.0)) orderly[own] = 0;
+        if (another || !(surfaces_->pair(point.contact).restitution > 0.0)) orderly[own] = 0;
         pairs[own] = pair;
     }
-    for (std::size_t b = 0; b < solver_index_.size(); ++b)
+    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b)
         if (island(b) >= 0 && first[island(b)] < unbounded)
             in_order_[b] =
                 orderly[island(b)] ? 1 : -1;  // where they are is not followed after another impact
@@ -103,9 +104,11 @@ void ContactStage::find_earliest_impacts(MixedSystem& system, std::vector<std::s
     arrays_.connected.begin(static_cast<int>(system.mass.size()));
     for (const RowBlock& block : system.rows) arrays_.connected.tie(block);
     for (const Point& point : points_)
-        arrays_.connected.tie(solver_index_[point.contact.first], solver_index_[point.contact.second]);
+        arrays_.connected.tie(bodies_->solver_index[point.contact.first],
+                              bodies_->solver_index[point.contact.second]);
     for (const OpenPair& open : open_)
-        if (!open.has_met()) arrays_.connected.tie(solver_index_[open.first], solver_index_[open.second]);
+        if (!open.has_met())
+            arrays_.connected.tie(bodies_->solver_index[open.first], bodies_->solver_index[open.second]);
     const Islands& islands = arrays_.connected.find();
     const auto is_impact = [](const Point& point) {
         return point.bounce >= 0.0 && point.approach < -point.rounding;
@@ -121,7 +124,7 @@ void ContactStage::find_earliest_impacts(MixedSystem& system, std::vector<std::s
     find_orderly(islands, first, closing);
     const std::vector<char>& orderly = arrays_.impact.orderly;
     std::vector<char>&hit = arrays_.impact.is_hit, &balls = arrays_.impact.balls;
-    hit.assign(solver_index_.size(), 0), balls.assign(islands.count, 1);
+    hit.assign(bodies_->solver_index.size(), 0), balls.assign(islands.count, 1);
     for (std::size_t k = 0; k < points_.size(); ++k) {
         const Point& point = points_[k];
         const int own = island_of(islands, point);
@@ -130,24 +133,25 @@ void ContactStage::find_earliest_impacts(MixedSystem& system, std::vector<std::s
             if (point.bounce >= 0.0) hit_points.push_back(k);
             continue;
         }
-        if (!is_impact(point) || (closing[k] > now && !is_closed(point.contact, gap_at(point, now))))
+        if (!is_impact(point) || (closing[k] > now && !bodies_->is_closed(point.contact, gap_at(point, now))))
             continue;
         hit_points.push_back(k);
         hit[point.contact.first] = hit[point.contact.second] = 1;
     }
     const auto island = [&](std::size_t b) {
-        return solver_index_[b] >= 0 ? islands.of_body[solver_index_[b]] : -1;
+        return bodies_->solver_index[b] >= 0 ? islands.of_body[bodies_->solver_index[b]] : -1;
     };
-    for (std::size_t b = 0; b < solver_index_.size(); ++b)
-        if (island(b) >= 0) balls[island(b)] = balls[island(b)] && ball_[b] && !jointed_[b];
-    for (std::size_t b = 0; b < solver_index_.size(); ++b) {
+    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b)
+        if (island(b) >= 0) balls[island(b)] = balls[island(b)] && bodies_->ball[b] && !bodies_->jointed[b];
+    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b) {
         const int own = island(b);
         if (own < 0 || first[own] == unbounded || !orderly[own]) continue;
         if (const double time = std::min(first[own], options_.time_step); hit[b] && time > clock_[b]) {
             path_[b] = path_until(b, time);
             clock_[b] = time;
             if (balls[own])
-                apply_forces_before(b, part_of_forces(time / options_.time_step, rebounds_), system);
+                apply_forces_before(b, part_of_forces(time / options_.time_step, surfaces_->rebounds),
+                                    system);
         }
         if (!balls[own] || moves_along_forces(static_cast<int>(b))) continue;
         event_time_[b] = clock_[b];
@@ -158,7 +162,7 @@ void ContactStage::find_earliest_impacts(MixedSystem& system, std::vector<std::s
     for (const std::size_t k : hit_points) {
         Point& point = points_[k];
         point.approach = relative(point, point.contact.point.normal, velocity_, false);
-        if (point.event && come_in_order(point)) point.bounce = material(point.contact).restitution;
+        if (point.event && come_in_order(point)) point.bounce = surfaces_->pair(point.contact).restitution;
     }
 }
 

@@ -39,14 +39,15 @@ void ContactStage::note_supports(Point& point) {
     point.approach = relative(point, n, velocity_, false);
     point.dv_ext = first + second;
     const auto presses = [&](double push) { return push < -least && point.approach + push < 0.0; };
-    const bool both = solver_index_[a] >= 0 && solver_index_[b] >= 0 && presses(first + second);
+    const bool both =
+        bodies_->solver_index[a] >= 0 && bodies_->solver_index[b] >= 0 && presses(first + second);
     support_pairs_.push_back({a, b, both || presses(first), both || presses(second), both});
 }
 
 /// Leaves those in supported_ that are supported.
 void ContactStage::find_supported() {
-    for (std::size_t b = 0; b < solver_index_.size(); ++b)
-        supported_[b] = supported_[b] && (solver_index_[b] < 0 || jointed_[b]);
+    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b)
+        supported_[b] = supported_[b] && (bodies_->solver_index[b] < 0 || bodies_->jointed[b]);
     const auto carry = [this](const SupportPair& at) {
         char &first = supported_[at.first], &second = supported_[at.second];
         const bool more = (at.first_presses && !first && (second || at.both)) ||
@@ -66,24 +67,27 @@ void ContactStage::find_supported() {
 
 /// Whether a body that is supported, or jointed, moves along the forces.
 bool ContactStage::moves_along_forces(int body) const {
-    return (supported_[body] || jointed_[body]) && is_along(linear(dv_ext_[body]), linear(velocity_[body]));
+    return (supported_[body] || bodies_->jointed[body]) &&
+           is_along(linear(dv_ext_[body]), linear(velocity_[body]));
 }
 
 /// Whether a point is an impact of what stands still that pushes the other one against the forces.
 bool ContactStage::pushes_against_forces(const Point& point) const {
     const int a = point.contact.first, b = point.contact.second;
-    if (point.toi < 0.0 || std::min(solver_index_[a], solver_index_[b]) >= 0) return false;
+    if (point.toi < 0.0 || std::min(bodies_->solver_index[a], bodies_->solver_index[b]) >= 0) return false;
     const Vec3 n = point.contact.point.normal;
-    return solver_index_[a] >= 0 ? dot(n, linear(dv_ext_[a])) < 0.0 : dot(n, linear(dv_ext_[b])) > 0.0;
+    return bodies_->solver_index[a] >= 0 ? dot(n, linear(dv_ext_[a])) < 0.0
+                                         : dot(n, linear(dv_ext_[b])) > 0.0;
 }
 
 /// A supported body that an impact sends along the forces, or against them: until then its support took its kick.
 void ContactStage::release_support(int body, const Vec6& velocity) {
-    if (event_time_[body] < 0.0 || toi_fraction_[body] > 0.0 || !(supported_[body] || jointed_[body])) return;
+    if (event_time_[body] < 0.0 || toi_fraction_[body] > 0.0 || !(supported_[body] || bodies_->jointed[body]))
+        return;
     const Vec3 kick = linear(dv_ext_[body]), before = linear(velocity_[body]);
     if (is_along(kick, before) || !is_along(kick, linear(velocity) - before)) return;
     supported_[body] = 0;
-    toi_fraction_[body] = part_of_forces(event_time_[body] / options_.time_step, rebounds_);
+    toi_fraction_[body] = part_of_forces(event_time_[body] / options_.time_step, surfaces_->rebounds);
     for (int i = 0; i < 6; ++i) support_impulse_dv_[body][i] = toi_fraction_[body] * dv_ext_[body][i];
     for (double& k : dv_ext_[body]) k *= 1.0 - toi_fraction_[body];
 }
@@ -105,14 +109,15 @@ void ContactStage::apply_support_impulses(const MixedSystem& system) {
                      [](const Vec6& k) { return k != Vec6{}; }))
         return;
     const Islands& islands = connected(system, 0);
-    for (std::size_t b = 0; b < solver_index_.size(); ++b) {
+    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b) {
         if (support_impulse_dv_[b] == Vec6{}) continue;
-        const Vec3 momentum = system.mass[solver_index_[b]][0] * linear(support_impulse_dv_[b]);
+        const Vec3 momentum = system.mass[bodies_->solver_index[b]][0] * linear(support_impulse_dv_[b]);
         for (CachedContact& cached : state_.cache.points) {
-            const int first = solver_index_[cached.contact.first],
-                      second = solver_index_[cached.contact.second];
-            if (std::min(first, second) >= 0 || !is_closed(cached.contact)) continue;
-            if (islands.of_body[std::max(first, second)] != islands.of_body[solver_index_[b]]) continue;
+            const int first = bodies_->solver_index[cached.contact.first],
+                      second = bodies_->solver_index[cached.contact.second];
+            if (std::min(first, second) >= 0 || !bodies_->is_closed(cached.contact)) continue;
+            if (islands.of_body[std::max(first, second)] != islands.of_body[bodies_->solver_index[b]])
+                continue;
             cached.impulse += first >= 0 ? -momentum : momentum;
             break;
         }

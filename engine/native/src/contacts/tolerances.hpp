@@ -36,6 +36,12 @@ inline constexpr double back = 10.0;      // blurs: so far away the path is soug
 inline constexpr double nearer = 0.1;     //   and kept so much nearer to
 }  // namespace tolerances::cone_newton
 
+// contact_bodies.cpp
+namespace tolerances::contact_bodies {
+inline constexpr double slack_share = 1e-10;  // of the smaller body's radius
+inline constexpr double rounding = 1e-15;     // of a place and of a size: four roundings
+}  // namespace tolerances::contact_bodies
+
 // contact_detect.cpp
 namespace tolerances::contact_detect {
 inline constexpr double vanishing = 1e-8;  // a direction so steep on the surface has no shadow
@@ -100,8 +106,6 @@ inline constexpr int many_rounds = 8;  //   unless that has been done so often
 namespace tolerances::contact_stage {
 inline constexpr std::size_t not_too_large =
     500;  // row blocks: so many are solved directly where iterations ran away
-inline constexpr double slack_share = 1e-10;  // of the smaller body's radius
-inline constexpr double rounding = 1e-15;     // of a place and of a size: four roundings
 inline constexpr int late_rounds =
     64;  // of solves that set others in motion towards a third: each finds pairs anew
 }  // namespace tolerances::contact_stage
@@ -162,6 +166,18 @@ inline constexpr double side_cosine =
     0.5;  // cosine of the normal of a meeting: no more of it is along what holds
 }  // namespace tolerances::internal_edges
 
+// overlap_search.cpp
+namespace tolerances::overlap_search {
+inline constexpr double search_factor = 4.0;  // of the deepest overlap: gaps that the projection may close
+inline constexpr double min_separation_to_propagate =
+    1e-9;  // of the smaller body's radius: a body displaced by less pushes no other
+inline constexpr double min_separation_to_propagate_pgs =
+    5e-4;  // the same for PGS, where each extra row slows fifty iterations
+inline constexpr std::size_t max_neighbours =
+    32;                             // bodies of a ring: where more part at once, the next step will tell
+inline constexpr int max_hops = 4;  // of neighbours that the projection sees
+}  // namespace tolerances::overlap_search
+
 // pgs_schedule.cpp
 namespace tolerances::pgs_schedule {
 inline constexpr double few_late = 0.1;  // of all items: so many get levels of their own
@@ -203,20 +219,8 @@ inline constexpr double joint_share = 1e-3;             // and of what the conta
 inline constexpr double min_joint_compliance =
     1e-12;  // of its row's own inertia: repeated joints share a load by it
 inline constexpr double over_relaxation = 1.25;  // of PGS that separates balls, not boxes
-inline constexpr double search_factor = 4.0;     // of the deepest overlap: gaps that the projection may close
-inline constexpr double min_separation_to_propagate =
-    1e-9;  // of the smaller body's radius: a body displaced by less pushes no other
-inline constexpr double min_separation_to_propagate_pgs =
-    5e-4;                                  // the same for PGS, where each extra row slows fifty iterations
-inline constexpr double same_place = 0.1;  // of the larger body's radius: one point, seen again
+inline constexpr double same_place = 0.1;        // of the larger body's radius: one point, seen again
 }  // namespace tolerances::position_projection
-
-// projection_neighbours.cpp
-namespace tolerances::projection_neighbours {
-inline constexpr std::size_t max_neighbours =
-    32;                             // bodies of a ring: where more part at once, the next step will tell
-inline constexpr int max_hops = 4;  // of neighbours that the projection sees
-}  // namespace tolerances::projection_neighbours
 
 // reduced_contacts.cpp
 namespace tolerances::reduced_contacts {

@@ -51,8 +51,9 @@ void RigidSystem::project_overlaps() {
         scratch_.end_poses.resize(constants_.size());
         for (int i = 0; i < bodies(); ++i)
             scratch_.end_poses[i] = {position_of(i), axes(constants_[i], live_.bodies[i])};
-        if (!contacts_->project_positions(mixed_, joints_.blocks().size(), scratch_.end_poses, round > 0))
-            return;
+        projection_ =
+            contacts_->project_positions(mixed_, joints_.blocks().size(), scratch_.end_poses, round > 0);
+        if (projection_ == nullptr) return;
         project_bodies();
     }
 }
@@ -99,7 +100,7 @@ double RigidSystem::lifting_energy(const std::vector<int>& members) const {
 
 /// The part of an island's displacement that what contacts took and its kinetic energy can pay for.
 double RigidSystem::affordable_share(int island) const {
-    const ContactStage::PositionProjection& projection = *projection_;
+    const PositionProjection& projection = *projection_;
     if (projection.externally_driven[island] != 0) return 1.0;
     double cost = 0.0, twice = 0.0;
     for (const int k : scratch_.island_members[island]) {
@@ -188,7 +189,6 @@ void RigidSystem::project_limits() {
 }
 
 void RigidSystem::project_bodies() {
-    projection_ = &contacts_->projection();
     gather_islands();
     for (int island = 0; island < projection_->islands.count; ++island) {
         if (rests(scratch_.island_members[island])) continue;
@@ -206,7 +206,7 @@ void RigidSystem::project_bodies() {
 }
 
 bool RigidSystem::project_island(int island, double share) {
-    const ContactStage::PositionProjection& projection = *projection_;
+    const PositionProjection& projection = *projection_;
     const std::vector<int>& members = scratch_.island_members[island];
     for (const int k : members) {
         const Vec6& d = projection.velocity[k];
@@ -233,7 +233,7 @@ bool RigidSystem::take_back(int island) {
 
 /// Momenta and energy of an island whose places have changed; false if they cannot be kept.
 bool RigidSystem::keep_energy(int island) {
-    const ContactStage::PositionProjection& projection = *projection_;
+    const PositionProjection& projection = *projection_;
     const std::vector<int>& members = scratch_.island_members[island];
     double limit = 0.0, now = 0.0;
     for (const int k : members)
@@ -256,7 +256,8 @@ bool RigidSystem::keep_energy(int island) {
         s.angular_momentum *= left;
         if (!constants_[constrained_[k]].particle) refresh(constants_[constrained_[k]], s);
     }
-    if (projection_ != &limit_projection_) contacts_->apply_balancing_impulse(island, lost);
+    if (projection_ != &limit_projection_)
+        contacts_->apply_balancing_impulse(projection_->islands, island, lost);
     return true;
 }
 

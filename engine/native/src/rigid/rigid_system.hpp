@@ -408,8 +408,8 @@ private:
     std::optional<ContactStage> contacts_, fresh_contacts_;
     std::vector<double> share_;  // of a body's forces that is still to act in this step; empty: all of it
     bool touching_ = false;      // whether the step had any
-    ContactStage::PositionProjection limit_projection_;             // of bodies beyond their joints' limits
-    const ContactStage::PositionProjection* projection_ = nullptr;  // what is at hand
+    PositionProjection limit_projection_;             // of bodies beyond their joints' limits
+    const PositionProjection* projection_ = nullptr;  // what is at hand
     StepScratch scratch_;
     PivotSolver holding_pivot_;
     SleepRules sleep_rules_;

@@ -58,7 +58,7 @@ void RigidSystem::take_sleep(const RigidScene& scene) {
                 rules.ties.emplace_back(spring.ends[0].body, spring.ends[1].body);
     for (int i = 0; i < bodies(); ++i) {
         const BodyConstants& body = constants_[i];
-        double reach = fresh_contacts_->radius(i);
+        double reach = fresh_contacts_->bodies().radius[i];
         if (body.motion == Motion::kinematic && reach == 0.0) reach = far;  // a plane
         if (body.moves() && !body.particle)
             reach = std::max(
@@ -149,7 +149,7 @@ void RigidSystem::sleep() {
     for (const auto& [a, b] : sleep_rules_.ties) tie(a, b);
     for (const CachedContact& cached : contacts_->cache().points) {
         tie(cached.contact.first, cached.contact.second);
-        if (contacts_->conveys(cached.contact))
+        if (contacts_->surfaces().is_conveyed(cached.contact))
             kept_up[cached.contact.first] = kept_up[cached.contact.second] = 1;
     }
     for (const int i : constrained_) scratch_.finder.tie(i, i);

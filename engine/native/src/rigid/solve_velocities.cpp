@@ -11,6 +11,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "contacts/friction_pgs.hpp"
 #include "rigid/rigid_system.hpp"
 
 namespace spook {

@@ -1,0 +1,51 @@
+#include "contacts/contact_bodies.hpp"
+
+#include <cmath>
+#include <utility>
+
+namespace spook {
+
+namespace {
+
+using namespace tolerances::contact_bodies;
+
+}  // namespace
+
+ContactBodies::ContactBodies(const Detection& detection, std::vector<int> solver_indices,
+                             std::vector<IndexPair> joint_pairs)
+    : solver_index(std::move(solver_indices)),
+      joints(std::move(joint_pairs)),
+      jointed(solver_index.size(), 0),
+      ball(detection.balls()),
+      radius(detection.radius()),
+      swings(!detection.single_points()) {
+    for (std::size_t b = 0; b < count(); ++b) {
+        if (solver_index[b] < 0) continue;
+        body_of.resize(std::max(body_of.size(), static_cast<std::size_t>(solver_index[b]) + 1));
+        body_of[solver_index[b]] = static_cast<int>(b);
+    }
+    for (const auto& [a, b] : joints) {
+        if (a >= 0) jointed[a] = 1;
+        if (b >= 0) jointed[b] = 1;
+    }
+}
+
+double ContactBodies::slack(const Contact& contact) const noexcept {
+    return slack_share * moving_size(contact);
+}
+
+double ContactBodies::gap(const Contact& contact) const noexcept {
+    const double gap = contact.point.gap;
+    return std::abs(gap) <= rounding * (norm(contact.point.position) + size(contact)) ? 0.0 : gap;
+}
+
+ContactSurfaces::ContactSurfaces(const std::vector<SurfaceMaterial>& materials) : of(materials) {
+    for (const SurfaceMaterial& material : of.distinct()) {
+        conveys = conveys || norm(material.surface_velocity) > 0.0;
+        oriented = oriented || material.is_oriented();
+        resists_turning = resists_turning || material.resists_turning();
+        rebounds = rebounds || material.restitution > 0.0;
+    }
+}
+
+}  // namespace spook

@@ -1,0 +1,69 @@
+// The bodies of a scene and their surfaces, as contacts see them: nothing of it changes once a scene is compiled.
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "collision/detection.hpp"
+#include "contacts/contact_material.hpp"
+#include "contacts/tolerances.hpp"
+#include "linear/shared_values.hpp"
+
+namespace spook {
+
+struct ContactBodies {
+    /// solver_index[b] is the body's index in MixedSystem, or −1 if it does not move by itself (static, kinematic).
+    /// `joints` are the pairs of bodies that rows of joints tie.
+    ContactBodies(const Detection& detection, std::vector<int> solver_indices,
+                  std::vector<IndexPair> joint_pairs);
+
+    std::size_t count() const noexcept { return solver_index.size(); }
+    bool moves(int body) const noexcept { return solver_index[body] >= 0; }
+    /// The larger of a contact's bodies, and the smaller of those that move by themselves, by their radius, m.
+    double size(const Contact& contact) const noexcept {
+        return std::max(radius[contact.first], radius[contact.second]);
+    }
+    double moving_size(const Contact& contact) const noexcept {
+        const int a = contact.first, b = contact.second;
+        if (!moves(a)) return radius[b];
+        return moves(b) ? std::min(radius[a], radius[b]) : radius[a];
+    }
+    /// A depth that is rounding: it may come back as a speed, which gives a billionth of a body's height at most, m.
+    double slack(const Contact& contact) const noexcept;
+    bool is_deep(const Contact& contact) const noexcept { return contact.point.gap <= -slack(contact); }
+    /// A gap no larger than the rounding of the places it was found at is none. Answered with a speed it would come back
+    /// as another of its kind, step after step: what rests would never be found at rest.
+    double gap(const Contact& contact) const noexcept;
+    bool is_closed(const Contact& contact, double gap) const noexcept {
+        return gap <= closed * size(contact);
+    }
+    bool is_closed(const Contact& contact) const noexcept { return is_closed(contact, contact.point.gap); }
+
+    std::vector<int> solver_index, body_of;  // and back
+    std::vector<IndexPair> joints;
+    std::vector<char> jointed;   // bodies with rows of joints
+    std::vector<char> ball;      // whose only surface is a sphere round their centre, and that no stop holds
+    std::vector<double> radius;  // m
+    bool swings = false;         // some surface has sides: what turns on it may meet elsewhere
+};
+
+struct ContactSurfaces {
+    explicit ContactSurfaces(const std::vector<SurfaceMaterial>& materials);
+
+    const SurfaceMaterial& operator[](int body) const noexcept { return of[body]; }
+    PairMaterial pair(const Contact& contact) const noexcept {
+        return combined(of[contact.first], of[contact.second]);
+    }
+    /// Whether a surface of the contact moves along itself.
+    bool is_conveyed(const Contact& contact) const noexcept {
+        return conveys && (norm(of[contact.first].surface_velocity) > 0.0 ||
+                           norm(of[contact.second].surface_velocity) > 0.0);
+    }
+
+    SharedValues<SurfaceMaterial> of;                // by body
+    bool conveys = false;                            // some surface moves along itself
+    bool oriented = false;                           // some friction differs with the direction
+    bool resists_turning = false, rebounds = false;  // some surface does
+};
+
+}  // namespace spook

@@ -1,0 +1,43 @@
+// How contacts are solved, and what solving them has cost.
+#pragma once
+
+#include <cstdint>
+
+#include "contacts/friction_point.hpp"
+#include "run/named_enum.hpp"
+
+namespace spook {
+
+SPOOK_NAMED_ENUM(SolverKind, direct, iterative, hybrid)
+
+/// What bodies that touch but do not approach each other do while an impact passes. simultaneous: they take part in
+/// it. successive: only points that are approached take part, again and again until none is: an impact runs through a
+/// row of touching balls, and the last one leaves. Of open ones the next to close comes next, with those closed by then.
+SPOOK_NAMED_ENUM(ImpactOrder, simultaneous, successive)
+
+struct ContactOptions {
+    double time_step = 0.0;
+    FrictionModel friction = FrictionModel::cone;
+    SolverKind solver = SolverKind::direct;
+    int iterations = 50;
+    double residual_tolerance = 1e-10;  // m/s
+    double floor = 1e-12;               // of pivots, in the factor only
+    int refinements = 1;
+    ImpactOrder impacts = ImpactOrder::simultaneous;
+    double unsettled_residual = 0.1;  // m/s; a solve that leaves more has no answer
+    int threads = 1;
+};
+
+struct ContactCounters {  // exact, equal on every machine
+    std::uint64_t contacts = 0, impacts = 0, corrections = 0, friction_rounds = 0, pivots = 0,
+                  pgs_iterations = 0,
+                  unsettled = 0,  // solves that stopped at a limit of rounds
+        stopped = 0;              // impacts that were to rebound and did not
+    void add(const FrictionReport& report) noexcept {
+        friction_rounds += static_cast<std::uint64_t>(report.rounds);
+        pivots += static_cast<std::uint64_t>(report.pivots);
+        pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
+    }
+};
+
+}  // namespace spook
