@@ -9,7 +9,7 @@ import pytest
 
 from spook_tracker.scalar_tests import arm_path, robot_arm
 from spook_tracker.scalar_tests.bracket import break_point
-from tests.limits import measurement
+from tests.limits import band, measurement
 
 STILL = np.zeros(6)
 
@@ -123,7 +123,6 @@ def weight(pose: Any) -> Any:
 
 def test_the_arm_is_held_down_to_the_slope_of_its_energy() -> None:
     pose = np.array(robot_arm.POSES[1])
-    (study,) = robot_arm.TEST.stability
     needed = weight(pose)
     np.testing.assert_allclose(robot_arm.inverse_dynamics(pose, STILL, STILL)[0], needed, atol=1e-6)
 
@@ -134,7 +133,7 @@ def test_the_arm_is_held_down_to_the_slope_of_its_energy() -> None:
         spins = robot_arm.inverse_dynamics(pose, speeds, STILL)[2]
         return float(np.abs(spins).max()) < robot_arm.SLOWEST
 
-    low, high = study.expected or (0.0, 0.0)
+    low, high = band("robot_arm", "weakest")
     found = break_point(stays, 3.0, 0.3, resolution=1e-4, walk=5)
 
     assert not stays(low) and stays(1.0)
@@ -142,7 +141,6 @@ def test_the_arm_is_held_down_to_the_slope_of_its_energy() -> None:
 
 
 def test_a_correction_once_a_step_breaks_where_its_polynomial_and_steps_of_the_joints_do() -> None:
-    (study,) = arm_path.TEST.stability
     h, pose = arm_path.TIME_STEP, np.array(robot_arm.POSES[1])
 
     def largest(rate: float) -> float:
@@ -161,7 +159,7 @@ def test_a_correction_once_a_step_breaks_where_its_polynomial_and_steps_of_the_j
             off = off + turned
         return bool(np.abs(off).max() <= arm_path.NUDGE)
 
-    low, high = study.expected or (0.0, 0.0)
+    low, high = band("arm_path", "stiffest")
 
     assert largest(low) < 1.0 < largest(high) and comes_back(low) and not comes_back(high)
     assert largest(arm_path.FASTEST) == pytest.approx(1.0, abs=1e-12)

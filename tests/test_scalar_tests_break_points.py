@@ -19,6 +19,7 @@ from spook_tracker.scalar_tests.n_pendulum import stability as chain
 from spook_tracker.scalar_tests.pendulum import stability as pendulum
 from spook_tracker.scalar_tests.planetarium.scene import GAUSS, PERIOD, SPEED
 from tests import oracle_chain, oracle_simulate
+from tests.limits import band
 from tests.loop_theory import off
 
 STUDIES = [
@@ -26,12 +27,6 @@ STUDIES = [
     for name, test in CATALOGUE.items()
     for study in test.stability
 ]
-
-
-def band(test: str, name: str) -> tuple[float, float]:
-    study = next(study for study in CATALOGUE[test].stability if study.name == name)
-    assert study.expected is not None
-    return study.expected
 
 
 @pytest.mark.parametrize("study", STUDIES)

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.multibody import four_bars, governor, simple_pendulum, squeezer
 from spook_tracker.scalar_tests.multibody.library import GRAVITY, LOW
 from tests import oracle_squeezer
+from tests.limits import band
 
 KAHAN_LI_8 = (  # Math. Comp. 66 (1997) 1089: seventeen stages, which read the same backwards
     0.13020248308889008088,
@@ -24,12 +24,6 @@ KAHAN_LI_8 = (  # Math. Comp. 66 (1997) 1089: seventeen stages, which read the s
     0.29501172360931029887,
     -0.60550853383003451170,
 )
-
-
-def band(test: str, study: str) -> tuple[float, float]:
-    found = next(one.expected for one in CATALOGUE[test].stability if one.name == study)
-    assert found is not None
-    return found
 
 
 def growth(turn: float) -> float:
