@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -204,6 +205,19 @@ def fastest_impact(simulate: Simulate) -> BreakPoint:
     return break_point(holds, 0.1, 1e6, resolution=0.05, walk=15)
 
 
+def leaves(simulate: Simulate, speed: float) -> bool:
+    """Whether a ball that touches the floor at `speed` [m/s] is on its way up after a step."""
+    observe = {"speed": Final(quantity=Velocity("ball"))}
+    result = simulate(scene(gap=0.0, speed=speed), time_step=TIME_STEP, steps=1, observe=observe)
+    return result.completed and float(result["speed"][2]) > 0.0
+
+
+def gentlest_impact(simulate: Simulate) -> BreakPoint:
+    """Lowest speed [m/s] from which a ball rebounds."""
+    return break_point(functools.partial(leaves, simulate), 1.0, 1e-6, resolution=1e-3, walk=7)
+
+
+GENTLEST = GRAVITY * TIME_STEP / RESTITUTION  # m/s: what is left of it, gravity takes in the same step
 TEST = ScalarTest(
     title="Bouncing ball",
     question="Does a ball bounce as high as its restitution allows, and come to rest in time?",
@@ -341,6 +355,17 @@ TEST = ScalarTest(
             unit="m/s",
             expected=(1e6, 1e6),
             expected_source="contacts are looked for as far away as a body gets in one step, so no speed passes; the search ends at 1e6 m/s",
+        ),
+        StabilityStudy(
+            name="gentlest-impact",
+            title="Slowest ball that rebounds at h = 1e-3 s",
+            configuration="plain",
+            definition="a ball that touches the floor is on its way up after a step",
+            study=gentlest_impact,
+            unit="m/s",
+            better="smaller",
+            expected=(GENTLEST, 1.002 * GENTLEST),
+            expected_source="the step that bounces also falls for one step: e v > g h; the search ends within a thousandth",
         ),
     ),
 )

@@ -157,6 +157,23 @@ def heaviest(simulate: Simulate) -> BreakPoint:
     )
 
 
+LIFTS = LOAD * GRAVITY * DRUM  # N m
+
+
+def lifted(simulate: Simulate, torque: float) -> bool:
+    """Whether a motor of that torque [N m] has its load on the way up after half a second."""
+    observe = {"v": Final(quantity=Velocity("load"))}
+    result = simulate(winch(torque), time_step=TIME_STEP, steps=30, observe=observe)
+    return result.completed and float(result["v"][2]) > 0.0
+
+
+def weakest(simulate: Simulate) -> BreakPoint:
+    """The least torque that lifts the load."""
+    return break_point(
+        functools.partial(lifted, simulate), 3.0 * LIFTS, 0.25 * LIFTS, resolution=1e-4, walk=5
+    )
+
+
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Place of the heavy weight after half a second against ½ a t² [m]."""
     observe = {"x": Final(quantity=Position("heavy"))}
@@ -300,6 +317,17 @@ TEST = ScalarTest(
             unit="kg",
             expected=(0.9999 * HOLDS * LIGHT, 1.0001 * HOLDS * LIGHT),
             expected_source="e^(0.3 · 3π) = 16.90 kg; the search ends within a part in ten thousand",
+        ),
+        StabilityStudy(
+            name="weakest",
+            title="Least torque of a winch that lifts its load",
+            configuration="winch",
+            definition="after half a second the load moves up",
+            study=weakest,
+            unit="N m",
+            better="smaller",
+            expected=(LIFTS, 1.0002 * LIFTS),
+            expected_source="m g r = 19.62 N m; the search ends within a part in ten thousand",
         ),
     ),
     figures=(Figure(name="ratio", title="Pull behind over pull in front", draw=draw),),

@@ -23,7 +23,7 @@ from spook_tracker.engine import (
 )
 from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests import leaning_cards as cards
-from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.bracket import break_count, break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
@@ -41,6 +41,7 @@ from spook_tracker.scalar_tests.sweep import line, told
 DECK, DECK_MASS = 0.02, 1.0  # m thick, kg: a board between two storeys
 STOREYS = 5
 FRICTION = 0.5
+SMOOTHER = 0.4  # µ that does not hold every house
 TIME_STEP = 1.0 / 60.0  # s
 DURATION = 0.25  # s
 ARM, RISE = cards.LENGTH * math.sin(cards.LEAN), cards.LENGTH * math.cos(cards.LEAN)  # m, from foot to top
@@ -108,6 +109,11 @@ def least(simulate: Simulate, storeys: int = 3, resolution: float = 0.002) -> Br
     """The least friction on which so many storeys stand."""
     asked = functools.partial(stands, simulate, storeys)
     return break_point(asked, 1.2 * need(storeys), 0.8 * need(storeys), resolution=resolution)
+
+
+def tallest(simulate: Simulate) -> BreakPoint:
+    """The most storeys that stand with SMOOTHER."""
+    return break_count(functools.partial(stands, simulate, friction=SMOOTHER), (1, 2, 3, 4, 5))
 
 
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
@@ -221,6 +227,16 @@ TEST = ScalarTest(
             unit="1",
             expected=(0.997 * need(5), 1.003 * need(5)),
             expected_source=f"statics: {told(need(5), 4)}; the search ends within 0.2 %",
+        ),
+        StabilityStudy(
+            name="tallest",
+            title="Most storeys that stand with µ = 0.4",
+            configuration="plain",
+            definition="nothing moves by a tenth of a millimetre in a quarter of a second",
+            study=tallest,
+            unit="1",
+            expected=(3.0, 3.0),
+            expected_source=f"statics: three need {told(need(3), 4)}, four {told(need(4), 4)}",
         ),
     ),
     ladders=(

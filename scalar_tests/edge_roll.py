@@ -42,11 +42,15 @@ SLOW, FAST = 0.3, 1.2  # m/s; the centre leaves in a straight line above √(g r
 ROUGH = 50.0  # coefficient of friction: no slip until the force has all but ended
 DURATION = 0.9  # s
 PUSHED = 0.01  # of the level speed
+KEPT, COARSE = 0.8, 1e-3  # of a rolling ball's spin in flight; s
+# µ at which a ball of SLOW flies off with KEPT of that spin, less and more g COARSE/r: its equations of motion, integrated
+# in tests/test_scalar_tests_contact_breaks.py
+SMOOTHEST = (0.2157, 0.2532)
 
 
-def scene(speed: float, rolling: bool) -> Scene:
-    """A ball near the edge of a table, rolling on a rough one or sliding on a smooth one."""
-    surface = Material(friction=ROUGH if rolling else 0.0)
+def scene(speed: float, rolling: bool, rough: float = ROUGH) -> Scene:
+    """A ball near the edge of a table, rolling on a `rough` one or sliding on a smooth one."""
+    surface = Material(friction=rough if rolling else 0.0)
     table = RigidBody(
         name="table",
         motion="static",
@@ -153,6 +157,19 @@ def expected_pushed() -> tuple[float, float]:
             low, high = (middle, high) if gain(middle) > wanted else (low, middle)
         bounds.append(low * (0.995 if shift > 0.0 else 1.005))
     return bounds[0], bounds[1]
+
+
+def smoothest(simulate: Simulate) -> BreakPoint:
+    """The least friction with which the edge spins a ball up to KEPT of what rolling does."""
+    wanted = KEPT * departure(SLOW, True)[1] / RADIUS
+
+    def spun(friction: float) -> bool:
+        observe = {"w": Final(quantity=AngularVelocity("ball"))}
+        asked = scene(SLOW, True, friction)
+        result = simulate(asked, time_step=COARSE, duration=0.65, observe=observe)
+        return result.completed and float(result["w"][1]) > wanted
+
+    return break_point(spun, 0.5, 0.1, resolution=0.02, walk=4)
 
 
 def _draw(simulate: Simulate) -> Drawing:
@@ -263,6 +280,18 @@ TEST = ScalarTest(
             unit="m/s",
             expected=expected_pushed(),
             expected_source="energy and the end of the contact force; g h of level speed for the last hop, and the half per cent of the search",
+        ),
+        StabilityStudy(
+            name="smoothest",
+            title="Least friction with which the edge spins a ball up to 0.8 of what rolling does",
+            configuration="plain",
+            definition="its spin in flight, in steps of 1e-3 s",
+            study=smoothest,
+            unit="1",
+            better="smaller",
+            expected=(SMOOTHEST[0], 1.02 * SMOOTHEST[1]),
+            expected_source="it slips from 2/7 sin θ = µ N/(m g) on, and µ N turns it until it leaves: 0.2334; g h/r of spin for the last hop, "
+            "and the two per cent of the search",
         ),
     ),
 )

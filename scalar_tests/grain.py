@@ -22,7 +22,7 @@ from spook_tracker.engine import (
     Trace,
     Velocity,
 )
-from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
@@ -199,6 +199,18 @@ def steepest(simulate: Simulate) -> BreakPoint:
     return break_point(lambda t: stands(simulate, t), 0.5 * bound, 2.0 * bound, resolution=1e-3)
 
 
+def slows(simulate: Simulate, times: float) -> bool:
+    """Whether ten steps take of a throw so many times as fast what they must, to a millionth of that."""
+    fast = (times * THROW[0], times * THROW[1])
+    observe = {"v": Final(quantity=Velocity("box"))}
+    result = simulate(scene(throw=fast), time_step=TIME_STEP, steps=10, observe=observe)
+    right = fast
+    for _ in range(10):
+        right = slid(right, TIME_STEP * GRAVITY)
+    found = grain_axes(float(result["v"][0]), float(result["v"][1]))
+    return result.completed and math.dist(found, right) < 1e-6 * math.dist(fast, right)
+
+
 def draw_throw(simulate: Simulate) -> Drawing:
     """The velocity across the grain against that along it, until the box rests."""
     observe = {"v": Trace(quantity=Velocity("box"))}
@@ -352,6 +364,18 @@ TEST = ScalarTest(
             unit="1",
             expected=(0.998 * least_slope(WAY), least_slope(WAY)),
             expected_source="where the ellipse ends, to the resolution of the search",
+        ),
+        unbroken(
+            slows,
+            1.0,
+            1e6,
+            name="fastest",
+            title="How many times as fast the box may be thrown",
+            definition="what ten steps take of its velocity is the method's own solution to a millionth",
+            source="friction knows the slip's direction only; rounding of a speed leaves 1e-9 of what ten steps take",
+            unit="1",
+            configuration="thrown",
+            walk=4,
         ),
     ),
     figures=(

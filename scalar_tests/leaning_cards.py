@@ -54,8 +54,8 @@ def need(lean: float = LEAN) -> float:
     return 0.5 * LENGTH * math.sin(lean) / (0.5 * THICK + LENGTH * math.cos(lean))
 
 
-def scene(lean: float = LEAN, friction: float = FRICTION) -> Scene:
-    """Two boards that stand on the round ends of their rails and touch with the upper ones."""
+def scene(lean: float = LEAN, friction: float = FRICTION, times: float = 1.0) -> Scene:
+    """Two boards that stand on the round ends of their rails and touch with the upper ones, the right one `times` as heavy."""
     rough = Material(friction=friction)
     table = RigidBody(name="table", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
     rails = tuple(
@@ -65,9 +65,9 @@ def scene(lean: float = LEAN, friction: float = FRICTION) -> Scene:
     boards = [
         RigidBody(
             name=name,
-            mass=CARD,
+            mass=heavier * CARD,
             shape=Compound(rails),
-            inertia=INERTIA,
+            inertia=tuple(heavier * moment for moment in INERTIA),
             position=(
                 side * (0.5 * THICK + 0.5 * LENGTH * math.sin(lean)),
                 0.0,
@@ -76,7 +76,7 @@ def scene(lean: float = LEAN, friction: float = FRICTION) -> Scene:
             orientation=(math.cos(0.5 * lean), 0.0, -side * math.sin(0.5 * lean), 0.0),
             material=rough,
         )
-        for name, side in SIDES.items()
+        for (name, side), heavier in zip(SIDES.items(), (1.0, times), strict=True)
     ]
     return Scene(bodies=(table, *boards), gravity=(0.0, 0.0, -GRAVITY))
 
@@ -98,10 +98,20 @@ def measure(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def stands(simulate: Simulate, friction: float) -> bool:
+def most_unequal() -> float:
+    """The heaviest right board, over the left one, by moments about the feet: the push between the tops is
+    H = (W + W') ℓ sin θ/(4 z), the friction that the heavier one hangs on V = (W' − W) ℓ sin θ/(4 x), of at most µ H."""
+    share = FRICTION * (0.5 * THICK + LENGTH * math.sin(LEAN)) / (0.5 * THICK + LENGTH * math.cos(LEAN))
+    return (1.0 + share) / (1.0 - share)
+
+
+UNEQUAL = most_unequal()
+
+
+def stands(simulate: Simulate, friction: float = FRICTION, times: float = 1.0) -> bool:
     """Whether they have not slipped by a tenth of a millimetre in half a second."""
     observe = {"x": MaximumAbsolute(quantity=Position("left"), from_start=True)}
-    asked = scene(friction=friction)
+    asked = scene(friction=friction, times=times)
     result = simulate(asked, time_step=TIME_STEP, duration=DURATION, observe=observe)
     return result.completed and float(np.abs(result["x"]).max()) < 1e-4
 
@@ -109,6 +119,11 @@ def stands(simulate: Simulate, friction: float) -> bool:
 def least(simulate: Simulate) -> BreakPoint:
     """The least friction on which they stand."""
     return break_point(functools.partial(stands, simulate), 1.5 * need(), 0.5 * need(), resolution=0.002)
+
+
+def heaviest(simulate: Simulate) -> BreakPoint:
+    """How many times as heavy as the left board the right one may be."""
+    return break_point(lambda times: stands(simulate, times=times), 1.0, 4.0, resolution=0.002, walk=5)
 
 
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
@@ -205,6 +220,16 @@ TEST = ScalarTest(
             unit="1",
             expected=(0.997 * need(), 1.003 * need()),
             expected_source=f"statics: {told(need(), 4)}; the search ends within 0.2 %, and what lacks 0.1 % slips a millimetre",
+        ),
+        StabilityStudy(
+            name="most-unequal",
+            title="How many times as heavy one of two cards may be",
+            configuration="plain",
+            definition="nothing slips by a tenth of a millimetre in half a second",
+            study=heaviest,
+            unit="1",
+            expected=(0.997 * UNEQUAL, 1.002 * UNEQUAL),
+            expected_source=f"the heavier card hangs on friction of the tops: {told(UNEQUAL, 4)} by statics; the search ends within 0.2 %",
         ),
     ),
     figures=(Figure(name="thrust", title="Thrust of leaning cards", draw=draw),),

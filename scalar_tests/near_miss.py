@@ -19,7 +19,7 @@ from spook_tracker.engine import (
     Velocity,
 )
 from spook_tracker.engine.bodies import Material
-from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Curve,
@@ -81,6 +81,11 @@ def fastest_pass(simulate: Simulate) -> BreakPoint:
         return pass_change(simulate, SHAPES["box"], speed, 1e-3) == 0.0
 
     return break_point(holds, 1.0, 1e6, resolution=0.1, walk=7)
+
+
+def passes(simulate: Simulate, gap: float) -> bool:
+    """Whether boxes of 100 m/s each pass so near [m] and keep every bit."""
+    return pass_change(simulate, SHAPES["box"], 100.0, gap) == 0.0
 
 
 def tiles(
@@ -259,6 +264,16 @@ TEST = ScalarTest(
             unit="m/s",
             expected=(1e6, 1e6),
             expected_source="a direction keeps them apart for the whole way, however long; the search ends at 1e6 m/s",
+        ),
+        unbroken(
+            passes,
+            1e-3,
+            1e-15,
+            name="narrowest-pass",
+            title="Narrowest gap between boxes that pass at 100 m/s",
+            definition="no bit of a velocity changes",
+            source="bodies that touch, but do not approach each other, have no impulse to exchange",
+            unit="m",
         ),
     ),
 )

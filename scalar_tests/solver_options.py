@@ -20,7 +20,7 @@ from spook_tracker.engine import (
     Trace,
     Velocity,
 )
-from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Drawing,
@@ -41,7 +41,7 @@ from spook_tracker.scalar_tests.sweep import line
 GRAVITY = 9.81  # m/s²
 TIME_STEP = 1.0 / 60.0  # s
 EDGE = 0.5  # m, of boxes of the heap
-HEAPED = 30
+HEAPED, FEW = 30, 8
 MANY, SIDE = 216, 6  # so many that threads share them: more than 512 contacts
 FALLING = 0.25  # s: while the heap falls together
 THREADS = (2, 4)
@@ -132,6 +132,13 @@ def tightest(simulate: Simulate) -> BreakPoint:
     return break_point(
         lambda cap: bool((_swung(simulate, cap) == usual).all()), 1.0, 1e-5, resolution=SEARCHED, walk=6
     )
+
+
+def told(simulate: Simulate, threshold: float) -> bool:
+    """Whether a run of few boxes is called unsettled if it has left more than its threshold [m/s], and only then."""
+    method = Method(solver="iterative", iterations=10, unsettled_residual=threshold)
+    result = simulate(heap(FEW), time_step=TIME_STEP, duration=FALLING, method=method)
+    return result.completed == (result.residual <= threshold)
 
 
 def _draw(simulate: Simulate) -> Drawing:
@@ -251,6 +258,17 @@ TEST = ScalarTest(
             expected=((1.0 - BEND) * BEND, (1.0 + BEND + 1.1 * SEARCHED) * BEND),
             expected_source="(v h)²/(2 l) with v² = 2 g l at the bottom, more or less by what is left of its next order, g h²/l of it; "
             "the search ends 0.1 % above it at most",
+        ),
+        unbroken(
+            told,
+            0.3,
+            1e-9,
+            name="strictest",
+            title="Smallest threshold by which a run is judged",
+            definition="eight boxes are called unsettled where they have left more, and only there",
+            source="a comparison of two numbers, whatever they are",
+            unit="m/s",
+            configuration="thresholds",
         ),
     ),
 )

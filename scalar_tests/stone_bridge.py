@@ -19,7 +19,7 @@ from spook_tracker.engine import (
     Scene,
     Table,
 )
-from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
@@ -187,6 +187,11 @@ def heaviest(simulate: Simulate) -> BreakPoint:
     )
 
 
+def carries(simulate: Simulate, load: float) -> bool:
+    """Whether the keystone sinks by no more than it can under so many times the weight."""
+    return sinking(simulate, STONES // 2, load, duration=SHORT) < most_sinking(load, SHORT)
+
+
 def draw(simulate: Simulate) -> Drawing:
     """Sinking of the loaded stone against the load over its limit."""
     ratios = (0.9, 0.97, 0.99, 1.01, 1.03)
@@ -324,6 +329,17 @@ TEST = ScalarTest(
             expected=(0.995 * LIMIT[2], 1.002 * LIMIT[2]),
             expected_source="limit analysis: 0.7517; the resolution of the search, and what half a second of a fall that has "
             "hardly begun hides",
+        ),
+        unbroken(
+            carries,
+            1.0,
+            100.0,
+            name="keystone-load",
+            title="Heaviest load that the keystone carries, over the weight",
+            definition="in a tenth of a second it sinks by less than a standing bridge can",
+            source="limit analysis: a line of thrust fits whatever lies on the keystone, and stone does not crush",
+            unit="1",
+            walk=3,
         ),
     ),
     figures=(Figure(name="load", title="Sinking of the loaded stone against the load", draw=draw),),

@@ -5,7 +5,6 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Iterable
-from dataclasses import replace
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -45,15 +44,15 @@ TIME_STEP = 1.0 / 60.0  # s
 DURATION = 0.6  # s, just before it comes down again
 
 
-def scene() -> Scene:
+def scene(size: tuple[float, float, float] = SIZE, spin: tuple[float, float, float] = SPIN) -> Scene:
     """The die as it leaves the hand."""
     die = RigidBody(
         name="die",
         mass=MASS,
-        shape=Box(SIZE),
+        shape=Box(size),
         position=(0.0, 0.0, 0.0),
         velocity=VELOCITY,
-        angular_velocity=SPIN,
+        angular_velocity=spin,
     )
     return Scene(bodies=(die,), gravity=(0.0, 0.0, -GRAVITY))
 
@@ -94,10 +93,15 @@ def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
 
 
+def apart(result: Result, right: np.ndarray) -> float:
+    """The angle [rad] between where it points at the end and where it should."""
+    turn = result.final_state["die"][3:7]
+    return float(2.0 * np.linalg.norm(turn * np.sign(turn @ right) - right))
+
+
 def turn_error(simulate: Simulate, time_step: float = TIME_STEP, method: Method = PLAIN) -> float:
     """By how much it has turned wrongly at the end [rad]."""
-    right, turn = landing(), ladder_run(simulate, time_step, method).final_state["die"][3:7]
-    return float(2.0 * np.linalg.norm(turn * np.sign(turn @ right) - right))
+    return apart(ladder_run(simulate, time_step, method), landing())
 
 
 def fastest(simulate: Simulate) -> BreakPoint:
@@ -107,21 +111,47 @@ def fastest(simulate: Simulate) -> BreakPoint:
     def keeps(times: float) -> bool:
         spin = np.array(SPIN) * times
         x, y, z = spin.tolist()
-        die = RigidBody(
-            name="die",
-            mass=MASS,
-            shape=Box(SIZE),
-            position=(0.0, 0.0, 0.0),
-            velocity=VELOCITY,
-            angular_velocity=(x, y, z),
-        )
         observe = {"e": MaximumAbsolute(quantity=Energy(), from_start=True)}
-        result = simulate(
-            replace(scene(), bodies=(die,)), time_step=TIME_STEP, duration=DURATION, observe=observe
-        )
+        asked = scene(spin=(x, y, z))
+        result = simulate(asked, time_step=TIME_STEP, duration=DURATION, observe=observe)
         return abs(float(result["e"]) - parabola) < 1e-9 * 0.5 * float(moments() @ spin**2)
 
     return break_point(keeps, 1.0, 1e4, resolution=0.1, walk=9)
+
+
+def needle(thickness: float) -> np.ndarray:
+    """Where a needle as long as the die and so thick [m] points at the end (w, x, y, z): it turns about its momentum at
+    L/I, I across it, and about itself at what of its spin is not in that."""
+    length, spin = SIZE[0], np.array(SPIN)
+    across, along = (length**2 + thickness**2) / 12.0, thickness**2 / 6.0
+    turn = np.array((along / across, 1.0, 1.0)) * spin
+    half = 0.5 * DURATION * float(np.linalg.norm(turn))
+    own = 0.5 * DURATION * (1.0 - along / across) * spin[0]
+    w, (x, y, z) = math.cos(half), turn * math.sin(half) / np.linalg.norm(turn)
+    c, s = math.cos(own), math.sin(own)
+    return np.array((w * c - x * s, x * c + w * s, y * c + z * s, z * c - y * s))
+
+
+def thinnest(simulate: Simulate) -> BreakPoint:
+    """The thinnest needle [m] that turns rightly."""
+    return break_point(functools.partial(turns, simulate), SIZE[1], 1e-8, resolution=0.05, walk=6)
+
+
+# What a rounding of the momentum does to the spin about a needle itself, ε L/I₁, turns it wrongly for a step at least; at
+# worst all steps' roundings add up and last until the end.
+WRONG = 1e-10  # rad
+ROUNDED = 2.0**-53 * math.hypot(*SPIN[1:]) * TIME_STEP  # rad, times I/I₁ = ½ (length/thickness)²
+THIN = (
+    SIZE[0] * math.sqrt(0.5 * ROUNDED / WRONG),
+    SIZE[0] * math.sqrt(0.5 * (DURATION / TIME_STEP) ** 2 * ROUNDED / WRONG),
+)
+
+
+def turns(simulate: Simulate, thickness: float) -> bool:
+    """Whether a needle of that thickness [m] has turned rightly."""
+    asked = scene(size=(SIZE[0], thickness, thickness))
+    result = simulate(asked, time_step=TIME_STEP, duration=DURATION)
+    return result.completed and apart(result, needle(thickness)) < WRONG
 
 
 def measure(simulate: Simulate) -> dict[str, float]:
@@ -223,6 +253,18 @@ TEST = ScalarTest(
             unit="1",
             expected=(1e4, 1e4),
             expected_source="a turn has no limit; the search ends at 1e4, 18 600 radians a step",
+        ),
+        StabilityStudy(
+            name="thinnest",
+            title="Thinnest needle that turns as it must",
+            configuration="plain",
+            definition="after 0.6 s it has turned rightly to 1e-10 rad",
+            study=thinnest,
+            unit="m",
+            better="smaller",
+            expected=THIN,
+            expected_source="a rounding of the momentum, 2^-53 L, is I/I₁ times as much of the spin about the needle: 1e-10 rad from one "
+            "that lasts a step, and from those of all 36 steps that last to the end",
         ),
     ),
 )

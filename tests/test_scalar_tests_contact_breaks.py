@@ -9,14 +9,20 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 from scipy.optimize import linprog
 
 from spook_tracker.scalar_tests import (
     between_walls,
     blow,
+    bouncing_ball,
+    bowl,
     cradle,
+    edge_roll,
     falling_pile,
     gears,
+    grain,
+    leaning_cards,
     overhang,
     pile,
     resting_ball,
@@ -27,19 +33,14 @@ from spook_tracker.scalar_tests import (
     sinking_sphere,
     vehicle,
 )
-from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.inclined_plane import force_ratio, slip_angle
 from spook_tracker.scalar_tests.inclined_plane import friction as plane
 from spook_tracker.scalar_tests.inclined_plane.scene import EDGE, FRICTION
-from spook_tracker.scalar_tests.measured import oblique_impact
+from spook_tracker.scalar_tests.measured import last_bounce, oblique_impact, rolling_beats
+from tests.limits import band
 
-TOLERANCES = Path(__file__).parent.parent / "engine/native/src/contacts/tolerances.hpp"
-
-
-def band(test: str, study: str) -> tuple[float, float]:
-    found = next(one.expected for one in CATALOGUE[test].stability if one.name == study)
-    assert found is not None
-    return found
+CONTACTS = Path(__file__).parent.parent / "engine/native/src/contacts"
+TOLERANCES = CONTACTS / "tolerances.hpp"
 
 
 def rear_share(drag: float) -> float:
@@ -267,3 +268,127 @@ def test_a_heavy_carrier_starts_by_the_energy_of_all_its_wheels() -> None:
     inertia = g.INERTIA["sun"] * sun**2 + g.INERTIA["planet"] * planet**2 + g.PLANET_MASS * g.ORBIT**2
     assert g.reduced_inertia() == pytest.approx(inertia + g.INERTIA["carrier"], rel=1e-14)
     assert inertia / g.HEAVIEST > 2.0**-52, "the light wheels are still there in a sum of doubles"
+
+
+def test_a_ball_rebounds_that_keeps_more_than_gravity_takes_in_a_step() -> None:
+    b = bouncing_ball
+    low, high = band("bouncing_ball", "gentlest-impact")
+    for speed, rises in ((0.999 * low, False), (high, True)):
+        after = Fraction(speed) * Fraction(b.RESTITUTION) - Fraction(b.TIME_STEP) * Fraction(b.GRAVITY)
+        assert (after > 0) == rises
+
+
+def unequal_cards_stand(times: float) -> bool:
+    """Whether forces in their cones hold two leaning boards: of each foot load and thrust, between the tops push and rub."""
+    c = leaning_cards
+    out, up = c.LENGTH * math.sin(c.LEAN), c.LENGTH * math.cos(c.LEAN)
+    far, high = 0.5 * c.THICK + out, 0.5 * c.THICK + up  # of the tops' point from a foot's
+    balance = [
+        [1.0, 0.0, 0.0, 0.0, 0.0, 1.0],  # upward, of the left board: the right one lifts it by the last
+        [0.0, 0.0, 1.0, 0.0, 0.0, -1.0],
+        [0.0, 1.0, 0.0, 0.0, -1.0, 0.0],  # inward
+        [0.0, 0.0, 0.0, 1.0, -1.0, 0.0],
+        [0.0, 0.0, 0.0, 0.0, high, far],  # about their feet
+        [0.0, 0.0, 0.0, 0.0, high, -far],
+    ]
+    loads = [1.0, times, 0.0, 0.0, 0.5 * out, 0.5 * out * times]
+    cones = []
+    for push, rub in ((0, 1), (2, 3), (4, 5)):
+        for sign in (1.0, -1.0):
+            row = np.zeros(6)
+            row[push], row[rub] = -c.FRICTION, sign
+            cones.append(row)
+    free = [(0.0, None), (None, None)] * 3
+    return bool(linprog(np.zeros(6), cones, np.zeros(6), balance, loads, free).status == 0)
+
+
+def test_a_card_is_held_by_one_as_heavy_as_friction_of_the_tops_lets_it_be() -> None:
+    low, high = band("leaning_cards", "most-unequal")
+    assert unequal_cards_stand(low) and not unequal_cards_stand(high)
+    assert unequal_cards_stand(0.9999 * leaning_cards.UNEQUAL)
+    assert not unequal_cards_stand(1.0001 * leaning_cards.UNEQUAL)
+
+
+def test_friction_on_a_grain_takes_by_the_slips_direction_however_fast_it_is() -> None:
+    g = grain
+    assert band("grain", "fastest") == (1e6, 1e6)
+    kick = g.TIME_STEP * g.GRAVITY
+    fast = (1e6 * g.THROW[0], 1e6 * g.THROW[1])
+    steepest = math.hypot(g.ALONG * fast[0], g.ACROSS * fast[1])
+    for before, after, mu in zip(fast, g.slid(fast, kick), (g.ALONG, g.ACROSS), strict=True):
+        assert before - after == pytest.approx(kick * mu**2 * before / steepest, rel=1e-6)
+    assert 10 * math.ulp(fast[0]) < 1e-6 * kick, "what rounding may take in ten steps"
+
+
+def spin_in_flight(friction: float) -> float:
+    """Of a ball that rolls slowly over an edge [rad/s]: it slips where µ N cannot turn it, and leaves where N ends."""
+    e = edge_roll
+
+    def load(_: float, state: np.ndarray) -> float:
+        return float(e.GRAVITY * math.cos(state[0]) - state[1] ** 2 / e.RADIUS)
+
+    def slopes(time: float, state: np.ndarray) -> tuple[float, float, float]:
+        pull, most = e.GRAVITY * math.sin(state[0]), friction * load(time, state)
+        rubs = min(2.0 / 7.0 * pull, most) if state[2] * e.RADIUS > state[1] - 1e-9 else most
+        return state[1] / e.RADIUS, pull - rubs, 2.5 * rubs / e.RADIUS
+
+    load.terminal = True  # type: ignore[attr-defined]
+    start = (0.0, e.SLOW, e.SLOW / e.RADIUS)
+    found = solve_ivp(slopes, (0.0, 3.0), start, events=load, rtol=1e-9, atol=1e-11, max_step=2e-3)
+    return float(found.y[2, -1])
+
+
+def test_an_edge_spins_a_ball_up_by_what_friction_there_is() -> None:
+    e = edge_roll
+    wanted, off = e.KEPT * e.departure(e.SLOW, True)[1] / e.RADIUS, e.GRAVITY * e.COARSE / e.RADIUS
+    low, high = e.SMOOTHEST
+    assert spin_in_flight(low) == pytest.approx(wanted - off, abs=0.005)
+    assert spin_in_flight(high) == pytest.approx(wanted + off, abs=0.005)
+    assert band("edge_roll", "smoothest")[0] == low
+
+
+def test_a_ball_stays_in_its_bowl_while_its_energy_does_not_lift_it_to_the_rim() -> None:
+    b = bowl
+    width, start = b.facet(b.FACETS)
+    path = b.BOWL * math.cos(0.5 * width) - b.BALL
+    rim = b.BOWL * (1.0 - math.cos(b.REACH)) + b.BALL * math.cos(b.REACH - 0.5 * width)
+    square = 10.0 / 7.0 * b.GRAVITY * (rim - b.BOWL + path * math.cos(start))
+    corners = round((b.REACH - 0.5 * width - start) / width)
+    kept = ((math.cos(width) + 0.4) / 1.4) ** (2 * corners)
+    assert math.sqrt(square) < b.PUSH < math.sqrt(square / kept)
+    low, high = band("bowl", "hardest-push")
+    assert low < b.PUSH < high < 1.011 * b.PUSH
+
+
+def bounce(restitution: float, late: float) -> float:
+    """The height [m] of the second bounce, in steps of which `late` is left when the ball meets the table."""
+    b = last_bounce
+    h, speed, place = b.TIME_STEP, 0.5 * b.GRAVITY * b.FIRST, 0.0
+    while place + h * (speed - h * b.GRAVITY) >= 0.0 or speed > 0.0:
+        speed -= h * b.GRAVITY
+        place += h * speed
+    speed = -restitution * (speed - (1.0 - late) * h * b.GRAVITY) - late * h * b.GRAVITY
+    place, highest = late * h * speed, 0.0
+    while speed > 0.0:
+        highest = max(highest, place)
+        speed -= h * b.GRAVITY
+        place += h * speed
+    return max(highest, place)
+
+
+@pytest.mark.parametrize("late", [0.0, 0.5, 1.0])
+def test_a_dull_ball_comes_up_again_as_restitution_says(late: float) -> None:
+    low, high = band("last_bounce", "dullest")
+    assert bounce(low, late) < last_bounce.LIFT < bounce(high, late)
+    newton = (low * 0.5 * last_bounce.GRAVITY * last_bounce.FIRST) ** 2 / (2.0 * last_bounce.GRAVITY)
+    assert newton == pytest.approx(last_bounce.LIFT)
+
+
+def test_a_slope_is_felt_that_unbalances_impulses_by_what_the_core_calls_balanced() -> None:
+    """A step from velocities that stay: friction is the last step's, 2/7 of the pull; the rest of the pull is missing."""
+    low, high = band("rolling_beats", "gentlest")
+    (pushes,) = re.findall(r"pushes = (\S+);", (CONTACTS / "friction_direct.cpp").read_text())
+    assert float(pushes) == rolling_beats.SAME
+    for slope, felt in ((0.999 * low, False), (high, True)):
+        pull, load = math.sin(slope), math.cos(slope)
+        assert (pull - 2.0 / 7.0 * pull > float(pushes) * load) == felt

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -26,7 +27,7 @@ from spook_tracker.scalar_tests import (
     vehicle,
 )
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
-from tests.limits import measurement
+from tests.limits import band, measurement
 
 
 def test_the_ball_on_a_turntable_lags_by_the_tangent_of_its_turn() -> None:
@@ -88,9 +89,7 @@ def test_lanes_and_thrown_boxes_of_the_sorters_by_integration() -> None:
 
     grown = abs(1.0 + 1j * s.RATE * s.TABLE_STEP) ** s.TABLE_STEPS - 1.0
     assert grown == pytest.approx(0.009, abs=5e-4) and grown < min(x for x in s.SHARES if x > 1.0) - 1.0
-    (study,) = CATALOGUE["sorting"].stability
-    assert study.expected is not None
-    assert study.expected[1] / s.LEAST == pytest.approx((1.0 + grown) ** 0.5 + 1e-3, abs=5e-4)
+    assert band("sorting", "friction")[1] / s.LEAST == pytest.approx((1.0 + grown) ** 0.5 + 1e-3, abs=5e-4)
 
 
 def test_a_slow_slide_on_a_grain_is_known_as_well_as_the_solver_stops() -> None:
@@ -113,7 +112,9 @@ def test_a_slow_slide_on_a_grain_is_known_as_well_as_the_solver_stops() -> None:
     assert isinstance(metric.limit, float) and open_by < metric.limit < 2.0 * open_by
 
 
-@pytest.mark.parametrize("motion", [rolling_coin.COIN, rolling_coin.DISK])
+@pytest.mark.parametrize(
+    "motion", [rolling_coin.COIN, rolling_coin.DISK, rolling_coin.Steady(math.radians(0.01), 0.0)]
+)
 def test_the_coin_rolls_steadily_by_the_equations_of_motion(motion: rolling_coin.Steady) -> None:
     """Newton's and Euler's equations with a contact that does not slip, solved for the accelerations at the start."""
     (body,) = [b for b in rolling_coin.scene(motion).bodies if b.name == "coin"]
@@ -274,6 +275,46 @@ def test_an_arch_is_as_thin_as_limit_analysis_allows() -> None:
         assert thrust == pytest.approx(masonry_arch.THRUST[count], abs=2e-5)
 
 
+def arch_needs(count: int, thickness: float) -> tuple[float, float]:
+    """The least friction with which any forces in their cones hold an arch, and the largest that any which hold it need."""
+    balance, load = ring_balance([math.pi * k / count for k in range(count + 1)], thickness)
+    size = balance.shape[1]
+    bounds = [(0.0, None), (None, None)] * (size // 2)
+
+    def held(rows: list[np.ndarray]) -> bool:
+        found = linprog(np.zeros(size), rows, np.zeros(len(rows)), balance, load, bounds)
+        return bool(found.status == 0)
+
+    def sliding(places: list[int], sign: float, share: float) -> np.ndarray:
+        """`sign` times what slides there, less that share of what presses: no more than 0."""
+        row = np.zeros(size)
+        row[places], row[[place + 1 for place in places]] = -share, sign
+        return row
+
+    def least(fits: Callable[[float], bool]) -> float:
+        low, high = 0.0, 1.0
+        for _ in range(24):
+            middle = 0.5 * (low + high)
+            low, high = (low, middle) if fits(middle) else (middle, high)
+        return high
+
+    edges = [2 * edge for edge in range(size // 2)]
+    enough = least(lambda mu: held([sliding([one], sign, mu) for one in edges for sign in (1.0, -1.0)]))
+    most = max(
+        least(lambda mu, j=joint, s=sign: not held([-sliding([4 * j, 4 * j + 2], s, mu)]))  # type: ignore[misc]
+        for joint in range(count + 1)
+        for sign in (1.0, -1.0)
+    )
+    return enough, most
+
+
+def test_an_arch_slides_where_no_forces_in_their_cones_hold_it() -> None:
+    m = masonry_arch
+    assert arch_needs(5, 1.02 * m.LEAST[5]) == pytest.approx(m.SMOOTHEST, abs=1e-5)
+    gives = (m.COMPLIANCE + m.CREEP * m.SOON) * m.weight(5, 1.02 * m.LEAST[5])
+    assert gives < 0.3 * m.SLID
+
+
 def bridge_limit(shares: dict[int, float]) -> tuple[float, float]:
     """The largest load over the weight, shared so by the stones, and the steepest force in a joint then: sliding over
     pressing."""
@@ -311,6 +352,9 @@ def test_a_bridge_carries_what_limit_analysis_allows() -> None:
             press[[4 * joint, 4 * joint + 2]] = -1.0
             most = linprog(press, A_eq=balance, b_eq=asked, bounds=[(0.0, None), (None, None)] * edges)
             assert most.status == 0 and -most.fun < asked.sum()
+    middle = ring_balance(b.joints()[::-1], b.THICKNESS)
+    middle[1][3 * (b.STONES // 2) + 1] += band("stone_bridge", "keystone-load")[1] * middle[1].sum()
+    assert thrusts(*middle, b.joints()[-1]) is not None
     crossing = [
         bridge_limit({stone: 1.0 - part, stone + 1: part})[0]
         for stone in range(4)  # nearer to the keystone it carries more and more
@@ -367,6 +411,13 @@ def least_friction_of_a_house(storeys: int) -> float:
 @pytest.mark.parametrize("storeys", [1, 2, 3, 5, 12])
 def test_a_house_of_cards_needs_the_friction_that_no_sharing_of_forces_undercuts(storeys: int) -> None:
     assert card_house.need(storeys) == pytest.approx(least_friction_of_a_house(storeys), rel=1e-9)
+
+
+def test_a_house_is_as_high_as_its_lowest_feet_have_friction() -> None:
+    low, high = band("card_house", "tallest")
+    assert low == high
+    assert least_friction_of_a_house(int(high)) < card_house.SMOOTHER
+    assert least_friction_of_a_house(int(high) + 1) > card_house.SMOOTHER
 
 
 def test_what_rolls_needs_the_friction_that_spins_it_up_or_bends_its_way() -> None:

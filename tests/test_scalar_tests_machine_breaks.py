@@ -7,14 +7,17 @@ import math
 import numpy as np
 import pytest
 
-from spook_tracker.scalar_tests import climb, shaken_block, sorting, suspension, taut_rope, turntable
-from spook_tracker.scalar_tests.catalogue import CATALOGUE
-
-
-def band(test: str, study: str) -> tuple[float, float]:
-    found = next(one.expected for one in CATALOGUE[test].stability if one.name == study)
-    assert found is not None
-    return found
+from spook_tracker.scalar_tests import (
+    capstan,
+    climb,
+    scissor_lift,
+    shaken_block,
+    sorting,
+    suspension,
+    taut_rope,
+    turntable,
+)
+from tests.limits import band
 
 
 def rolled(time_step: float) -> np.ndarray:
@@ -106,3 +109,16 @@ def test_boxes_slow_down_alike_however_fast_they_come(times: float) -> None:
         way = times * s.SLIP * s.TIME_STEP * np.concatenate(((0.0,), np.cumsum(speeds)))
         found = s.ride(0.0, times * s.SLIP, friction, 0.0, s.TIME_STEP, 60)
         assert np.abs(found - way).max() < 1e-11 * np.abs(way).max()
+
+
+def test_a_winch_lifts_what_its_torque_has_work_for() -> None:
+    """A radian of the drum, and what the load gains in height by it."""
+    low, high = band("capstan", "weakest")
+    gains = capstan.LOAD * capstan.GRAVITY * capstan.DRUM
+    assert 0.9999 * low < gains < high
+
+
+def test_a_tall_lift_is_right_to_more_than_is_asked() -> None:
+    s = scissor_lift
+    assert band("scissor_lift", "tallest") == (s.TALL[-1], s.TALL[-1])
+    assert s.TALL[-1] ** 2 * 2.0**-52 < 1e-9 and s.loaded(s.LOAD / s.ARM) < 1e-9

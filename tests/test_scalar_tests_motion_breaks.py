@@ -17,20 +17,15 @@ from spook_tracker.scalar_tests import (
     motor,
     rotating_box,
     steady_turns,
+    thrown_die,
 )
 from spook_tracker.scalar_tests.cantilever import stability as column
 from spook_tracker.scalar_tests.cantilever.scene import DENSITY, deflection
-from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.measured import bar_pendulum, seconds_pendulum
 from spook_tracker.scalar_tests.oscillator import filter as low_pass
 from spook_tracker.scalar_tests.oscillator.scene import MASS, START, TIME_STEP, stiffness_of_period
 from spook_tracker.scalar_tests.planetarium import measure as planetarium
-
-
-def band(test: str, study: str) -> tuple[float, float]:
-    found = next(one.expected for one in CATALOGUE[test].stability if one.name == study)
-    assert found is not None
-    return found
+from tests.limits import band
 
 
 def test_a_fall_keeps_the_printed_limit_up_to_its_longest_step() -> None:
@@ -342,3 +337,29 @@ def test_blows_between_walls_are_counted_by_their_flights() -> None:
     for count in w.COUNTS:
         way = count * w.FLIGHT * w.UP  # m, across; the first wall is half a room away
         assert math.floor(way / (w.ROOM - 2.0 * w.RADIUS) + 0.5 + 1e-9) == count
+
+
+def test_a_needle_turns_as_eulers_equations_say_until_its_momentum_is_rounded() -> None:
+    d = thrown_die
+    length = d.SIZE[0]
+    low, high = band("thrown_die", "thinnest")
+    for thickness in (d.SIZE[1], high, low):
+        moments = np.array((2.0 * thickness**2, length**2 + thickness**2, length**2 + thickness**2)) / 12.0
+
+        def slopes(_: float, state: np.ndarray, moments: np.ndarray = moments) -> np.ndarray:
+            spin, w, v = state[:3], state[3], state[4:]
+            turn = 0.5 * (w * spin + np.cross(v, spin))
+            return np.concatenate((np.cross(moments * spin, spin) / moments, [-0.5 * v @ spin], turn))
+
+        start = (*d.SPIN, 1.0, 0.0, 0.0, 0.0)
+        found = solve_ivp(slopes, (0.0, d.DURATION), start, "DOP853", rtol=1e-12, atol=1e-13).y[3:, -1]
+        right = d.needle(thickness)
+        assert np.abs(found * np.sign(found @ right) - right).max() < 1e-7
+        rounded = (
+            2.0**-53 * moments[1] * math.hypot(*d.SPIN[1:]) / moments[0]
+        )  # rad/s of the spin about itself
+        steps = round(d.DURATION / d.TIME_STEP)
+        if thickness == low:
+            assert rounded * d.TIME_STEP == pytest.approx(d.WRONG, rel=1e-3)
+        if thickness == high:
+            assert steps * rounded * d.DURATION == pytest.approx(d.WRONG, rel=2e-3)

@@ -93,6 +93,29 @@ def liveliest(simulate: Simulate) -> BreakPoint:
     return break_point(holds, 0.5, 1.0, resolution=1e-3, walk=6)
 
 
+LIFT = 0.01  # m, of a bounce that is one
+
+
+def dullest(simulate: Simulate) -> BreakPoint:
+    """The least restitution with which the ball comes up again, by LIFT."""
+
+    def bounces(restitution: float) -> bool:
+        observe = {"place": Trace(quantity=Position("ball"))}
+        result = simulate(scene(restitution), time_step=TIME_STEP, duration=1.25 * FIRST, observe=observe)
+        after = result.sample_times["place"] > FIRST + 2.0 * TIME_STEP
+        return bool((result["place"][after, 2] - RADIUS).max() > LIFT)
+
+    return break_point(bounces, 0.9, 0.01, resolution=1e-3, walk=5)
+
+
+def dull(worst: float = 0.0) -> float:
+    """That restitution by Newton's law: e v is √(2 g LIFT). Steps at their `worst`, 1, take g h off v and ½ e v h off the rise."""
+    lost = worst * GRAVITY * TIME_STEP
+    return (0.5 * lost + math.hypot(0.5 * lost, math.sqrt(2.0 * GRAVITY * LIFT))) / (
+        0.5 * GRAVITY * FIRST - lost
+    )
+
+
 def _draw(simulate: Simulate) -> Drawing:
     observe = {"place": Trace(quantity=Position("ball"), every=5)}
     result = simulate(scene(), time_step=TIME_STEP, duration=7.0, observe=observe)
@@ -162,6 +185,18 @@ TEST = readings.measured_test(
             unit="1",
             expected=(1.0, 1.0),
             expected_source="an impact keeps e² ≤ 1 of its energy; the search ends at 1",
+        ),
+        StabilityStudy(
+            name="dullest",
+            title="Least restitution with which the ball comes up again by a centimetre",
+            configuration="plain",
+            definition="after its first bounce it is seen higher than that",
+            study=dullest,
+            unit="1",
+            better="smaller",
+            expected=(dull(), 1.0015 * dull(1.0)),
+            expected_source="Newton: e² of 0.487 m is a centimetre at e = 0.1433; steps come down slower by up to g h and rise lower by up "
+            "to ½ v h, and the search has a thousandth",
         ),
     ),
 )

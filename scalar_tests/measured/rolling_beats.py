@@ -18,7 +18,15 @@ from spook_tracker.engine import (
 )
 from spook_tracker.engine.bodies import Material
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import BreakPoint, Drawing, Example, Figure, Metric, Simulate
+from spook_tracker.scalar_tests.case import (
+    BreakPoint,
+    Drawing,
+    Example,
+    Figure,
+    Metric,
+    Simulate,
+    StabilityStudy,
+)
 from spook_tracker.scalar_tests.measured import readings
 from spook_tracker.scalar_tests.measured.readings import Reading, deviation
 from spook_tracker.scalar_tests.sweep import line
@@ -44,6 +52,7 @@ READINGS = tuple(
 )
 PULL = 5.0 / 7.0 * GRAVITY * math.sin(SLOPE)  # m/s², of a ball that rolls
 SEARCHED = 2e-3
+SAME = 1e-13  # of the largest impulse: so well balanced, the velocities of the step before are the answer
 LADDER_DURATION = BEAT * BEATS  # s
 
 
@@ -93,6 +102,21 @@ def steepest_rolled(simulate: Simulate) -> BreakPoint:
         return abs(speed - RADIUS * float(result["w"][1])) <= 1e-9 * speed
 
     return break_point(rolls, 0.1, 4.0, resolution=SEARCHED, walk=6)
+
+
+GENTLEST = 7.0 / 5.0 * SAME  # rad: less changes an impulse of m g h by 5/7 of the slope
+
+
+def gentlest(simulate: Simulate) -> BreakPoint:
+    """The gentlest slope [rad] down which the ball rolls as it must."""
+
+    def rolls(slope: float) -> bool:
+        observe = {"place": Final(quantity=Position("ball"))}
+        result = simulate(scene(slope), time_step=TIME_STEP, steps=40, method=HALF_STEP, observe=observe)
+        way = 0.5 * 5.0 / 7.0 * GRAVITY * math.sin(slope) * (40.0 * TIME_STEP) ** 2
+        return result.completed and abs(float(result["place"][0]) / way - 1.0) < 1e-9
+
+    return break_point(rolls, SLOPE, 1e-16, resolution=1e-3, walk=8)
 
 
 def _draw(simulate: Simulate) -> Drawing:
@@ -156,14 +180,28 @@ TEST = readings.measured_test(
         unit="m",
         target_error=0.01,
     ),
-    stability=readings.breaks_at(
-        3.5 * FRICTION,
-        SEARCHED,
-        steepest_rolled,
-        "tan θ = 3.5 µ of a solid ball",
-        name="steepest-rolled",
-        title="Steepest slope down which the ball rolls",
-        definition="speed and spin agree to 1e-9 after 40 steps",
-        unit="1",
+    stability=(
+        *readings.breaks_at(
+            3.5 * FRICTION,
+            SEARCHED,
+            steepest_rolled,
+            "tan θ = 3.5 µ of a solid ball",
+            name="steepest-rolled",
+            title="Steepest slope down which the ball rolls",
+            definition="speed and spin agree to 1e-9 after 40 steps",
+            unit="1",
+        ),
+        StabilityStudy(
+            name="gentlest",
+            title="Gentlest slope down which the ball rolls",
+            configuration="half-step",
+            definition="way after 40 steps right to 1e-9",
+            study=gentlest,
+            unit="rad",
+            better="smaller",
+            expected=(GENTLEST, 1.002 * GENTLEST),
+            expected_source="the method's own: velocities are kept that leave 1e-13 of the largest impulse; a step asks for 5/7 sin θ of "
+            "it. The search ends within a thousandth",
+        ),
     ),
 )
