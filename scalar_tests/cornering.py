@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+from dataclasses import replace
 
 import numpy as np
 
@@ -193,6 +194,31 @@ def fastest(simulate: Simulate) -> BreakPoint:
     )
 
 
+NEEDED = SPEED * yaw(SPEED) / GRAVITY  # µ of the understeering bend: V r/g, of both axles alike
+
+
+def holds(simulate: Simulate, friction: float) -> bool:
+    """Whether the understeering vehicle is in its bend after a second and a half, to one per cent."""
+    asked = scene(SPEED)
+    tyres = tuple(
+        replace(one, friction=friction) if isinstance(one, Tyre) else one for one in asked.constraints
+    )
+    result = simulate(
+        replace(asked, constraints=tyres),
+        time_step=2.0 * TIME_STEP,
+        steps=90,
+        observe={"w": Final(quantity=AngularVelocity("chassis"))},
+    )
+    return result.completed and abs(float(result["w"][2]) / yaw(SPEED) - 1.0) < 0.01
+
+
+def slipperiest(simulate: Simulate) -> BreakPoint:
+    """The least friction that holds the bend."""
+    return break_point(
+        functools.partial(holds, simulate), 4.0 * NEEDED, 0.5 * NEEDED, resolution=5e-3, walk=3
+    )
+
+
 def linear(time: float) -> float:
     """Yaw rate [rad/s] of the bicycle model that starts straight: d/dt (v, r) = A (v, r) + b δ, solved in closed form."""
     front, rear = 2.0 * SOFT, 2.0 * HARD
@@ -338,6 +364,18 @@ TEST = ScalarTest(
             unit="m/s",
             expected=(0.97 * CRITICAL, 1.03 * CRITICAL),
             expected_source="V² = −L/K; within one per cent of the search and two of V² by the slow motion's start",
+        ),
+        StabilityStudy(
+            name="slipperiest",
+            title="Least friction that holds the bend",
+            configuration="plain",
+            definition="the yaw rate after a second and a half is that of the bend to 1 %",
+            study=slipperiest,
+            unit="1",
+            better="smaller",
+            expected=(0.98 * NEEDED, 1.01 * NEEDED),
+            expected_source="V r/g: side forces are to loads as the sideways acceleration to g, on both axles; less by the 1 % that "
+            "is asked, and the search's half",
         ),
     ),
     figures=(Figure(name="gain", title="Yaw rate per steering angle", draw=draw),),

@@ -29,6 +29,8 @@ struct JointState {
     double angle = 0.0;    // unwrapped coordinate of a hinge that needs it
     // N s: of an eye's row; of a tyre's rows along and across; of a joint's friction, as far as it follows the load
     std::array<double, 2> bound{};
+    double slides =
+        1.0;  // a tyre: by how much softer than its slip stiffness its rows are, for its ellipse to hold them
 };
 
 /// A joint that broke: in which step of h, and under what.

@@ -12,16 +12,20 @@ void LoadDependentBounds::take(const JointSet& joints, bool eyes, bool tyres, bo
     for (int k = 0; eyes && k < static_cast<int>(joints.eyes().size()); ++k) eyes_.push_back(k);
     for (int k = 0; tyres && k < static_cast<int>(joints.tyres().size()); ++k) tyres_.push_back(k);
     for (int k = 0; bearings && k < static_cast<int>(joints.bearings().size()); ++k) bearings_.push_back(k);
-    last_.resize(eyes_.size());
+    last_.resize(eyes_.size() + tyres_.size());
 }
 
-double LoadDependentBounds::follow(MixedSystem& solved, JointSet& joints) {
+LoadDependentBounds::Followed LoadDependentBounds::follow(MixedSystem& solved, JointSet& joints, bool late) {
     off_ = 0.0;
+    bool same_matrix = true;
     for (int k = 0; k < static_cast<int>(eyes_.size()); ++k) follow_eye(k, solved, joints);
-    for (int k : tyres_) follow_tyre(k, solved, joints);
+    for (int k = 0; k < static_cast<int>(tyres_.size()); ++k) {
+        if (late) follow_tyre_late(k, solved, joints);
+        else if (follow_tyre(k, solved, joints)) same_matrix = false;
+    }
     for (int k : bearings_) follow_bearing(k, solved, joints);
     ++round_;
-    return off_;
+    return {off_, same_matrix};
 }
 
 void LoadDependentBounds::follow_eye(int eye, MixedSystem& solved, JointSet& joints) {
@@ -46,28 +50,74 @@ void LoadDependentBounds::follow_eye(int eye, MixedSystem& solved, JointSet& joi
     joints.states[joints.blocks()[row.block].joint].bound[0] = next;
 }
 
-void LoadDependentBounds::follow_tyre(int tyre, MixedSystem& solved, JointSet& joints) {
-    const TyreRows& of = joints.tyres()[tyre];
+namespace {
+
+/// What a tyre's rows along and across have: the load N h, what the slip asks of them at their full stiffness, and that over µ.
+struct Slip {
+    double load = 0.0, asked[2] = {}, share[2] = {}, total = 0.0;  // N s
+
+    Slip(const TyreRows& of, const RowBlock& rows, double slides, const std::vector<Vec6>& velocity) noexcept
+        : load(std::max(0.0, rows.multiplier[0])) {
+        for (int k = 0; k < 2; ++k) {
+            asked[k] =
+                slides * (rows.right[1 + k] - row_velocity(rows, 1 + k, velocity)) / rows.softness[1 + k];
+            share[k] = of.friction[k] > 0.0 ? asked[k] / of.friction[k] : 0.0;
+        }
+        total = length(share[0], share[1]);
+    }
+};
+
+/// |F| of a tyre over µ, as its rows carry it.
+double length_over(const RowBlock& rows, const std::array<double, 2>& friction) noexcept {
+    return length(friction[0] > 0.0 ? rows.multiplier[1] / friction[0] : 0.0,
+                  friction[1] > 0.0 ? rows.multiplier[2] / friction[1] : 0.0);
+}
+
+}  // namespace
+
+/// Whether the factor of its rows has changed.
+bool LoadDependentBounds::follow_tyre(int tyre, MixedSystem& solved, JointSet& joints) {
+    const TyreRows& of = joints.tyres()[tyres_[tyre]];
     RowBlock& rows = solved.rows[of.block];
-    const double load = std::max(0.0, rows.multiplier[0]);
-    double asked[2], share[2];
-    for (int k = 0; k < 2; ++k) {
-        asked[k] = (rows.right[1 + k] - row_velocity(rows, 1 + k, solved.velocity)) / rows.softness[1 + k];
-        share[k] = of.friction[k] > 0.0 ? asked[k] / of.friction[k] : 0.0;
-    }
-    const double total = length(share[0], share[1]);
     JointSet::State& state = joints.states[joints.blocks()[of.block].joint];
-    for (int k = 0; k < 2; ++k) {
-        double next = total > 0.0 ? of.friction[k] * load * std::abs(share[k]) / total : 0.0;
-        const double right = std::clamp(asked[k], -next, next);
-        if (load > 0.0 || rows.multiplier[1 + k] != 0.0)
-            see(std::abs(right - rows.multiplier[1 + k]) / std::max(load, std::abs(rows.multiplier[1 + k])),
-                of.block);
-        if (round_ > 8) next = 0.5 * (next + state.bound[k]);  // two directions may take turns
-        state.bound[k] = next;
-        rows.lower[1 + k] = -next;
-        rows.upper[1 + k] = next;
+    Guess& last = last_[eyes_.size() + static_cast<std::size_t>(tyre)];
+    const Slip slip(of, rows, state.slides, solved.velocity);
+    const bool free = rows.upper[1] == unbounded || rows.upper[2] == unbounded;
+    const double now = free && slip.total > 0.0 ? state.slides / slip.total : 0.0;  // 1/|F|
+    double may = slip.load,
+           next = 1.0;  // |F| that it may have; a wheel that its own friction lifts goes half the way
+    if (round_ > PATIENT) may = 0.5 * (may + length_over(rows, of.friction));
+    if (may > 0.0 && slip.total > may) {
+        next = slip.total / may;
+        const double rise = round_ > 0 && last.answer > 0.0 && now > 0.0
+                                ? (now - last.answer) / (state.slides - last.bound)
+                                : 0.0;
+        if (rise > 0.0 && rise < unbounded) next = std::max(1.0, state.slides + (1.0 / may - now) / rise);
     }
+    last = {state.slides, now};
+    const double part = slip.total > slip.load ? slip.load / slip.total : 1.0;
+    for (int k = 0; k < 2; ++k) {
+        const double own = rows.multiplier[1 + k], right = of.friction[k] > 0.0 ? part * slip.asked[k] : 0.0;
+        if (slip.load > 0.0 || own != 0.0)
+            see(std::abs(right - own) / std::max(slip.load, std::abs(own)), of.block);
+        rows.softness[1 + k] *= next / state.slides;
+        state.bound[k] = may > 0.0 && of.friction[k] > 0.0 ? unbounded : 0.0;
+        rows.lower[1 + k] = -state.bound[k];
+        rows.upper[1 + k] = state.bound[k];
+    }
+    const bool changed = next != state.slides;
+    state.slides = next;
+    return changed;
+}
+
+void LoadDependentBounds::follow_tyre_late(int tyre, MixedSystem& solved, JointSet& joints) {
+    const TyreRows& of = joints.tyres()[tyres_[tyre]];
+    JointSet::State& state = joints.states[joints.blocks()[of.block].joint];
+    const Slip slip(of, solved.rows[of.block], state.slides, solved.velocity);
+    for (int k = 0; k < 2; ++k)
+        state.bound[k] =
+            slip.total > 0.0 ? of.friction[k] * slip.load * std::abs(slip.share[k]) / slip.total : 0.0;
+    state.slides = 1.0;
 }
 
 void LoadDependentBounds::follow_bearing(int bearing, MixedSystem& solved, JointSet& joints) {
@@ -94,17 +144,21 @@ void LoadDependentBounds::follow_bearing(int bearing, MixedSystem& solved, Joint
 /// Rows with bounds and without contacts: solved again while bounds that follow other rows move.
 bool RigidSystem::pivot_rows() {
     load_dependent_.begin();
+    bool same_matrix = false;
     for (int round = 0;; ++round) {
-        const PivotReport report = pivot_.solve(mixed_, round > 0);
+        const PivotReport report = pivot_.solve(mixed_, same_matrix);
         rounds_ += static_cast<std::uint64_t>(report.rounds);
         if (!report.finite || load_dependent_.empty()) return report.finite;
-        const double off = load_dependent_.follow(mixed_, joints_);
+        const auto [off, same] = load_dependent_.follow(mixed_, joints_);
+        same_matrix = same;
         if (off <= LoadDependentBounds::AGREED) return true;
         if (round < LoadDependentBounds::MOST_ROUNDS) continue;
         // In speeds: what the missing impulse would have given the lightest of its bodies.
         const RowBlock& rows = mixed_.rows[load_dependent_.worst()];
         const int body = constrained_[rows.second >= 0 ? rows.second : rows.first];
-        const double missed = off * std::abs(rows.multiplier[0]) / constants_[body].mass;
+        double most = 0.0;
+        for (int i = 0; i < rows.size; ++i) most = std::max(most, std::abs(rows.multiplier[i]));
+        const double missed = off * most / constants_[body].mass;
         if (missed > method_.unsettled_residual) note_unsettled(body, missed);
         return true;
     }

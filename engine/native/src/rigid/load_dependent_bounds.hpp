@@ -5,7 +5,8 @@
 //   tyre   (F_x/µ_x)² + (F_y/µ_y)² <= N², see tyre_rows.hpp
 //   bearing   |F| <= F₀ + c |N|, N the force that the joint's own rows hold
 //
-// Solve, bound anew, solve again, until both agree. An eye's bound b = y(b) is a contraction: more friction takes from
+// Solve, bound anew, solve again, until both agree. A tyre that slides has softer rows instead of bounds: 1/|F| is affine in that
+// factor, of one tyre by itself, and the third round a secant's. An eye's bound b = y(b) is a contraction: more friction takes from
 // T₁ what it gives to T₂ or less, so |y'| <= tanh(½µφ) < 1; two rounds tell y', and the third is a secant's. Only rows
 // that are at a bound, or would be, have a say.
 #pragma once
@@ -20,6 +21,7 @@ namespace spook {
 class LoadDependentBounds {
 public:
     static constexpr int MOST_ROUNDS = 100;
+    static constexpr int PATIENT = 8;        // rounds, before steps are halved
     static constexpr double AGREED = 1e-11;  // of the pull or the load
 
     /// Which rows there are; the first step begins with bounds of zero.
@@ -28,25 +30,30 @@ public:
 
     /// A new step.
     void begin() noexcept { round_ = 0; }
-    /// Bounds from a solution, for the rows and for the next step. Returns by how much they were off: the largest
-    /// difference of a row to its law, relative to what bounds it.
-    double follow(MixedSystem& solved, JointSet& joints);
+    struct Followed {
+        double off = 0.0;         // the largest difference of a row to its law, relative to what bounds it
+        bool same_matrix = true;  // bounds have changed alone
+    };
+    /// Bounds from a solution, for the rows and for the next step. `late`: for the next step alone; then tyres have bounds only.
+    Followed follow(MixedSystem& solved, JointSet& joints, bool late = false);
     /// The block of the row that was furthest off.
     int worst() const noexcept { return worst_; }
 
 private:
     struct Guess {
-        double bound = 0.0, answer = 0.0;
+        double bound = 0.0,
+               answer = 0.0;  // of a tyre that slides: the factor and 1/|F|, zero if there is none
     };
     void see(double off, int block) noexcept {
         if (off > off_) off_ = off, worst_ = block;
     }
     void follow_eye(int eye, MixedSystem& solved, JointSet& joints);
-    void follow_tyre(int tyre, MixedSystem& solved, JointSet& joints);
+    bool follow_tyre(int tyre, MixedSystem& solved, JointSet& joints);
+    void follow_tyre_late(int tyre, MixedSystem& solved, JointSet& joints);
     void follow_bearing(int bearing, MixedSystem& solved, JointSet& joints);
 
     std::vector<int> eyes_, tyres_, bearings_;  // indices into those of the joints
-    std::vector<Guess> last_;                   // per eye, of the round before
+    std::vector<Guess> last_;                   // per eye and tyre, of the round before
     int round_ = 0, worst_ = 0;
     double off_ = 0.0;
 };

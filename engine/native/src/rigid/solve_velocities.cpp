@@ -67,7 +67,7 @@ void RigidSystem::solve_mixed(bool touching) {
     }
     if (!load_dependent_.empty() && (touching || solver_ == RigidSolver::iterative)) {
         load_dependent_.begin();
-        load_dependent_.follow(mixed_, joints_);  // for the next step: here bounds are a step late
+        load_dependent_.follow(mixed_, joints_, true);  // for the next step: here bounds are a step late
     }
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         if (rests(static_cast<int>(k))) continue;

@@ -53,7 +53,7 @@ void JointSet::assemble_tyre(const Joint& joint, State& state, std::span<const B
     const double speed = std::abs(dot(at.forward, wheel.velocity - under)) + CREEP;
     form.softness[0] = blocks_[joint.block].softness[0];
     for (int k = 0; k < 2; ++k) {
-        form.softness[1 + k] = speed / (form.slip_stiffness[k] * time_step_);
+        form.softness[1 + k] = state.slides * speed / (form.slip_stiffness[k] * time_step_);
         right.right[1 + k] = 0.0;
         right.lower[1 + k] = -state.bound[k];
         right.upper[1 + k] = state.bound[k];

@@ -5,7 +5,8 @@
 //   across   F_y = −C_y s_y/V     its heading: s_x/V is the slip, s_y/V the (tangent of the) slip angle
 //   slides   (F_x/µ_x)² + (F_y/µ_y)² <= N²; beyond, the forces go on in the same ratio F_x/µ_x : F_y/µ_y
 //
-// As velocity rows: s + V/(C h) λ = 0 with λ = h F, implicit in s, so that a slow or light wheel is not stiff. Below a
+// As velocity rows: s + V/(C h) λ = 0 with λ = h F, implicit in s, so that a slow or light wheel is not stiff. Sliding, both rows
+// are softer by one factor, for which (λ_x/µ_x)² + (λ_y/µ_y)² = (h N)²: the ratio of the forces is then that of the slip. Below a
 // millimetre a second V is that, and the wheel creeps instead of rolling.
 #pragma once
 
