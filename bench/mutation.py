@@ -63,6 +63,8 @@ MUTANTS = (
     mutant("one-slow-night-is-a-move", "level", "np.clip(forties, middle - far, middle + far)", "forties"),
     mutant("a-walk-is-long-remembered", "level", "len(moves) - REACHED", "len(moves) - 2 * REACHED"),
     mutant("no-memory", "shifts", "return min(strongest, 0.98)", "return 0.0"),
+    mutant("what-was-once-remembered-stays", "shifts", "abs(once - found) <= CHANCE", "abs(once - found) <= 99.0"),
+    mutant("each-segment-learns-anew", "shifts", "if spread > 0.0 and len(earlier) > lag:", "if False:"),
     mutant("no-permutations", "shifts", "if probability < enough else None", "if probability < 1.0 else None"),
     mutant("no-t-test", "shifts", "rise <= standard_error(base, len(last), memory)", "False"),
     mutant(

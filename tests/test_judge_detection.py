@@ -331,6 +331,31 @@ def test_nights_that_remember_each_other_need_more_to_be_a_shift() -> None:
     assert math.isclose(standard_error(white, 4), expected)
 
 
+def test_earlier_nights_tell_what_few_remember_unless_these_tell_otherwise() -> None:
+    """Of a segment of forty nights: nights cut off it, and a wandering before a level that stands still."""
+    alone = together = contradicted = 0
+    for series in range(100):
+        draws = battery.generator("earlier", series)
+        nights = battery.autoregressive(0.5, 0.02)(draws, 200)
+        alone += remembered(nights[160:]) > 0.0
+        together += remembered(nights[160:], list(nights[:160] - 1.0)) > 0.0
+        walk = np.cumsum(draws.standard_normal(160))
+        contradicted += remembered(battery.gauss(0.01)(draws, 40), list(walk - np.mean(walk))) > 0.0
+
+    assert alone < 75
+    assert together >= 95
+    assert contradicted <= 5
+
+
+def test_nights_cut_off_a_segment_still_tell_what_nights_remember() -> None:
+    """What is left of a segment may look as if nights did not remember each other: then 8 alarms."""
+    raised = 0
+    for series in range(1000, 1100):
+        raised += battery.starts(red(battery.noise("AR(1) .5, 2 %", series, 560)))
+
+    assert raised <= 5
+
+
 def test_no_shift_below_one_per_cent_is_told() -> None:
     values = [*(1.0 + 1e-5 * (night % 3) for night in range(60)), *[1.009] * 6]
 

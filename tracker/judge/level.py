@@ -15,7 +15,15 @@ from typing import TYPE_CHECKING
 from spook_tracker.tracker.document.middle import median, median_of_sorted
 from spook_tracker.tracker.judge.normal_nights import exceeded
 from spook_tracker.tracker.judge.segments import NORMAL, Boundary, Standing, inner_split
-from spook_tracker.tracker.judge.shifts import BASE, CLIP, FEWEST_BASE, clusters, remembered, standard_error
+from spook_tracker.tracker.judge.shifts import (
+    BASE,
+    CLIP,
+    FEWEST_BASE,
+    REACHED,
+    clusters,
+    remembered,
+    standard_error,
+)
 from spook_tracker.tracker.judge.slower import LEAST, worse_by
 
 if TYPE_CHECKING:
@@ -30,7 +38,6 @@ CLEAR = 8.0  # noises, below the floor: the noise of few nights may be told too 
 SIGMAS = 4.0
 REACH = 1.25  # times the second largest deviation of nights that hold
 UNSEEN = 25  # nights: of fewer, as much again may be reached by those to come
-REACHED = 200  # nights of which that is remembered
 SECOND = 2.5  # standard deviations that the second largest of two hundred nights reaches
 ROOM = 400  # powers of two about one: squares of so large values, summed, are doubles
 CREEP = 5  # nights in each median that is compared for drift
@@ -73,6 +80,7 @@ class PresentLevel:
     now: Growing = field(default_factory=lambda: Growing([]))
     better: bool = False  # the side on which the last nights stand clear
     remembers: list[float] = field(default_factory=list)  # relative deviations of nights before the segment
+    earlier: list[float] = field(default_factory=list)  # the same, more of them, also of segments not told
     reached: list[float] = field(
         default_factory=list
     )  # the same of its own when they joined it; worse is positive
@@ -142,10 +150,14 @@ class PresentLevel:
         import numpy as np
 
         base = self._base()
-        if len(base) < FEWEST_BASE or not math.isfinite(change) or not remembered(base):
+        if (
+            len(base) < FEWEST_BASE
+            or not math.isfinite(change)
+            or not (memory := remembered(base, self._earlier()))
+        ):
             return True
         far = RANGES * float(np.max(base) - np.min(base))  # whatever they remember
-        return change * median_of_sorted(np.sort(base)) > min(standard_error(base, 1), far)
+        return change * median_of_sorted(np.sort(base)) > min(standard_error(base, 1, memory), far)
 
     def _reach_down(self, threshold: float) -> float:
         """What stands clear for the better: of where nights that hold have been."""
@@ -221,6 +233,7 @@ class PresentLevel:
         memory = remembered(np.concatenate([low - low.mean(), high - high.mean()]))
         if memory and inner_split(costs, (1.0 - memory) / (1.0 + memory)) is None:
             return
+        self.earlier = [*self.earlier, *(low / low.mean() - 1.0)][-REACHED:]
         nights = self.now.places
         cut = len(nights) - len(base) + split
         self.now.places = nights[cut:]
@@ -242,6 +255,12 @@ class PresentLevel:
         far = CLIP * NORMAL * median_of_sorted(np.sort(np.abs(base - middle)))
         return np.minimum(np.maximum(base, middle - far), middle + far) if far > 0.0 else base
 
+    def _earlier(self) -> list[float]:
+        """How far nights before those of `_base` lay off their own level, for what they remember."""
+        own = self._costs(self.now.places[-REACHED:-BASE])
+        level = sum(own) / len(own) if own else 0.0
+        return [*self.earlier, *(value / level - 1.0 for value in own)] if level else self.earlier
+
     def _wanders(self) -> float:
         """How far medians of a few nights lie apart by chance: where nights remember each other, or are of two clusters.
 
@@ -254,8 +273,8 @@ class PresentLevel:
             return 0.0
         nights = np.arange(len(base))
         level = base - np.polyval(np.polyfit(nights, base, 1), nights)
-        if remembered(level):
-            return math.sqrt(2.0) * standard_error(level, CREEP)
+        if memory := remembered(level, self._earlier()):
+            return math.sqrt(2.0) * standard_error(level, CREEP, memory)
         split = clusters(base)
         return APART_BY_CHANCE * (split[1] - split[0]) if split else 0.0
 

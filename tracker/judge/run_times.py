@@ -33,6 +33,7 @@ from spook_tracker.tracker.judge.shifts import (
     BASE,
     FEWEST_BASE,
     RARE,
+    REACHED,
     SPANS,
     Shift,
     drawn_anew,
@@ -157,7 +158,8 @@ class _Walk(DriftingLevel):
         """A history that begins here."""
         self.now, self.anchor, self.start = Growing([place]), [place], place
         self.off, self.reference, self.first, self.crept = [], None, None, 0.0
-        self.remembers, self.reached, self._told, self._outer, self.runs = [], [], None, None, [[]]
+        self.remembers, self.earlier, self.reached, self.runs = [], [], [], [[]]
+        self._told = self._outer = None
 
     def _no_value(self, place: int, accepted: bool) -> Noisy:
         level = self._level()[0]
@@ -208,7 +210,7 @@ class _Walk(DriftingLevel):
             return None  # most nights: nothing to count
         nights = [*self.now.places[-BASE - LONGEST_SPAN :], *self.off]
         age = self.ages[nights[-1]] - self.ages[self.start]
-        found = shift(self._costs(nights), mean < self._level()[1], age)
+        found = shift(self._costs(nights), mean < self._level()[1], age, self._earlier())
         return (found.span, found) if found is not None and found.change > self._moves_by(found) else None
 
     def _above_both(self) -> tuple[int, Shift | None] | None:
@@ -322,8 +324,9 @@ class _Walk(DriftingLevel):
         self.over.append(
             Segment(nights[0] if began is None else began.best, before[-1], old, noise, was, began)
         )
-        off = [self._worse_by(old, self.values[i]) for i in before[-WINDOW:]]
-        self.remembers, self.reached = [*self.remembers, *off][-WINDOW:], []
+        off = [self._worse_by(old, self.values[i]) for i in before[-REACHED:]]
+        self.earlier = [*self.earlier, *off][-REACHED:]
+        self.remembers, self.reached = [*self.remembers, *off[-WINDOW:]][-WINDOW:], []
         self._outer = None
         self.now = Growing(after, "usual", before[-WINDOW:], where)
         self.off, self._told, self.crept, self.runs = [], None, 0.0, [*self.runs, []]
@@ -350,12 +353,7 @@ class _Walk(DriftingLevel):
         )
         if was == "red":
             better = replace(better, sentence=f"{words}, inside the noise")
-        return Noisy(
-            verdict=better,
-            state="green",
-            against=before[-1],
-            levels=(held.level, level),
-        )
+        return Noisy(verdict=better, state="green", against=before[-1], levels=(held.level, level))
 
     def _settle(self) -> None:
         """The boundary of a young segment again, with one more night behind it; nights change sides with it."""

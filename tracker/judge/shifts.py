@@ -31,6 +31,7 @@ BASE = 100  # nights of the level before they are compared with
 FEWEST_BASE = 16  # fewer give no probability as small as this:
 RARE = 5e-5  # of an alarm in one series on one night: of a thousand series, a night in twenty has a false one
 RAREST = 1e-5  # of what no second test has to confirm
+REACHED = 200  # nights of which is remembered what they reached, how they moved and how far off they lay
 LEARNING = 60  # nights: of a longer history, less is spent on each night
 ROUNDING = 1e-12  # relative: nights that differ by less are equal
 CLIP = 6.0  # noises: what lies further out counts as if it lay there
@@ -68,11 +69,17 @@ def spent(age: float) -> float:
     return max(RAREST, RARE * min(1.0, LEARNING / max(age, 1.0)))
 
 
-def shift(values: Sequence[float], clusters_only: bool = False, age: float = math.inf) -> Shift | None:
+def shift(
+    values: Sequence[float],
+    clusters_only: bool = False,
+    age: float = math.inf,
+    before: Sequence[float] = (),
+) -> Shift | None:
     """The most probable shift for the worse of the last nights, None if there is none. Worse is larger.
 
     Values are positive, of one level until the shift, oldest first. `clusters_only`: the last nights lie inside the
     spread of all, so that only the smaller noise inside clusters can tell. `age`: nights since the series began.
+    `before`: as in `remembered`.
     """
     import numpy as np
 
@@ -82,8 +89,8 @@ def shift(values: Sequence[float], clusters_only: bool = False, age: float = mat
         if len(base) < FEWEST_BASE or min(last) <= min(base):
             continue
         old, new = np.array(base), np.array(last)
-        every = None if clusters_only else _tried(old, new, spent(age) if span == min(SPANS) else 0.0)
-        for tried in (every, _apart_from_clusters(old, new, spent(age))):
+        every = None if clusters_only else _tried(old, new, spent(age) if span == min(SPANS) else 0.0, before)
+        for tried in (every, _apart_from_clusters(old, new, spent(age), before)):
             if tried is not None and (found is None or _tells_more(tried, found)):
                 found = tried
     return found
@@ -94,7 +101,9 @@ def _tells_more(one: Shift, other: Shift) -> bool:
     return (one.apart, -one.probability) > (other.apart, -other.probability)
 
 
-def _apart_from_clusters(base: Values, last: Values, rare: float = RAREST) -> Shift | None:
+def _apart_from_clusters(
+    base: Values, last: Values, rare: float = RAREST, before: Sequence[float] = ()
+) -> Shift | None:
     """The same where the nights before lie in two clusters: of how far each night lies off the nearer of them.
 
     Which cluster a night falls into is chance and says nothing; a change moves both, and what is left is small noise.
@@ -107,7 +116,7 @@ def _apart_from_clusters(base: Values, last: Values, rare: float = RAREST) -> Sh
     low, high = split
     near = [nights / np.where(nights - low < high - nights, low, high) for nights in (base, last)]
     tried = _tried(near[0], near[1], rare)
-    if tried is None or ((memory := remembered(base)) and tried.probability >= RAREST):
+    if tried is None or ((memory := remembered(base, before)) and tried.probability >= RAREST):
         return None  # where visits last, no second test knows of them: off the nearer cluster nothing is remembered
     return replace(tried, change=change, apart=not memory)
 
@@ -153,7 +162,7 @@ def _scatter(values: Values) -> float:
     return float(off @ off)
 
 
-def _tried(base: Values, last: Values, rare: float) -> Shift | None:
+def _tried(base: Values, last: Values, rare: float, before: Sequence[float] = ()) -> Shift | None:
     """`rare`: the probability at which normal nights need no permutation test; zero asks for one of all."""
     import numpy as np
 
@@ -168,15 +177,15 @@ def _tried(base: Values, last: Values, rare: float) -> Shift | None:
     rise = float(off.sum()) / len(off) - level
     if rise <= LEAST * level:
         return None
-    probability = _permuted(near, off, rise)
-    if probability is None and rare:
+    memory = remembered(near, before)
+    probability = _permuted(near, off, rise, memory)
+    if probability is None and rare and not memory:
         probability = by_chance if (by_chance := chance(base, last, rare)) < rare else None
     return Shift(len(last), rise / level, probability) if probability is not None else None
 
 
-def _permuted(base: Values, last: Values, rise: float) -> float | None:
+def _permuted(base: Values, last: Values, rise: float, memory: float) -> float | None:
     """The probability of such a rise whatever the noise is, None if it is not rare or nights remember each other."""
-    memory = remembered(base)
     at_random = not memory and clusters(base) is not None  # in two clusters: exchangeable indeed
     if not at_random and rise <= standard_error(base, len(last), memory):
         return None
@@ -202,19 +211,30 @@ def standard_error(base: Values, span: int, memory: float | None = None) -> floa
     return student(independent - 1.0) * math.sqrt(variance * ((1.0 + 2.0 * own) / span + together / count))
 
 
-def remembered(base: Values) -> float:
-    """Autocorrelation from one night to the next, zero unless it is told from chance; at most 0.98."""
+def remembered(base: Values, before: Sequence[float] = ()) -> float:
+    """Autocorrelation from one night to the next, zero unless it is told from chance; at most 0.98.
+
+    A hundred nights tell no weak one. `before`: how far earlier nights lay off the levels of their own segments; as many
+    help out as are missing to `REACHED`, unless the nights of the base tell that these remember each other otherwise.
+    """
     import numpy as np
 
     centred = base - base.sum() / len(base)
     total = float(centred @ centred)
     if total <= len(base) * (ROUNDING * float(np.abs(base).max())) ** 2:
         return 0.0
+    earlier = np.array(before[len(base) - REACHED :] if len(base) < REACHED else ())
+    spread = float(earlier @ earlier)
     strongest = 0.0
     for lag in MEMORY:
-        found = float(centred[lag:] @ centred[:-lag]) / total
-        if found > CHANCE / math.sqrt(len(base)):
-            found += (1.0 + 3.0 * found) / len(base)  # few nights show too little of it
+        found, count = float(centred[lag:] @ centred[:-lag]) / total, len(base)
+        if spread > 0.0 and len(earlier) > lag:
+            once = float(earlier[lag:] @ earlier[:-lag]) / spread
+            if abs(once - found) <= CHANCE / math.sqrt(count):
+                found = (count * found + len(earlier) * once) / (count + len(earlier))
+                count += len(earlier)
+        if found > CHANCE / math.sqrt(count):
+            found += (1.0 + 3.0 * found) / count  # few nights show too little of it
             strongest = max(strongest, min(found, 1.0) ** (1.0 / lag))
     return min(strongest, 0.98)
 
