@@ -38,6 +38,7 @@ def test_a_range_of_commits_is_blamed_where_not_every_commit_was_measured() -> N
 
     assert "any commit between may be the first" in blame(bad, good)
     assert blame(type(bad)(bad.id, bad.started, child, bad.machine), good).startswith("first bad commit")
+    assert blame(type(bad)(bad.id, bad.started, good.engine, bad.machine), good).endswith("no commit did it")
 
 
 def test_results_of_another_engine_are_not_our_history() -> None:

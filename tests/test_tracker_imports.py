@@ -256,6 +256,7 @@ def test_only_runs_of_a_branch(tmp_path: Path) -> None:
         ("a.jsonl", "[1]\n[2]\n", [], "cannot be read as records"),
         ("a.jsonl", "3\n", [], "record 1 is no JSON object"),
         ("a.csv", "commit,x\na\n", [], "line 2 has not as many cells"),
+        ("a.csv", "commit,x_s,x_s\na,1,2\n", [], "two columns are called 'x_s'"),
         ("a.csv", "commit,test,value,unit\na,t,fast,s\n", [], "value is 'fast' and no number"),
         (
             "a.csv",

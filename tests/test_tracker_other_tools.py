@@ -140,6 +140,7 @@ def test_times_are_judged_as_noisy_and_decide_nothing(said: Any) -> None:
         ("iter/sec", 4.0, "iter/s", "larger"),
         ("us/op", 4e-6, "s", "smaller"),
         ("B/op", 4.0, "B", "smaller"),
+        ("msec", 4e-3, "s", "smaller"),
         ("KB", 4e3, "B", "smaller"),
         ("MiB", 4 * 2.0**20, "B", "smaller"),
         ("FPS", 4.0, "frames/s", "larger"),
@@ -186,6 +187,14 @@ def test_one_name_twice_in_a_run_loses_nothing() -> None:
 def action(benches: list[dict[str, Any]], tool: str = "cargo") -> dict[str, Any]:
     entry = ACTION["entries"]["Engine"][0] | {"tool": tool, "benches": benches}
     return ACTION | {"entries": {"Engine": [entry]}}
+
+
+def test_a_benchmark_twice_in_a_file_of_pytest_is_one_with_all_its_repeats() -> None:
+    once, twice = (read(PYTEST | {"benchmarks": PYTEST["benchmarks"] * times})[0] for times in (1, 2))
+
+    assert [d.key for d in twice.series] == [d.key for d in once.series]
+    told = [len(run.samples[0].timing.seconds) for run in (once, twice) if run.samples[0].timing]
+    assert told[1] == 2 * told[0] > 0
 
 
 def test_another_version_of_an_asv_benchmark_is_another_question() -> None:
@@ -244,6 +253,35 @@ def test_a_folder_of_asv_comes_in_as_it_is(named: str, tmp_path: Path) -> None:
     assert [s["unit"] for s in drift] == ["B"], "its unit is what benchmarks.json says"
 
 
+@pytest.mark.parametrize("above", ["storage", "storage/Linux-CPython-3.12-64bit"])
+def test_a_folder_of_a_folder_for_each_machine_comes_in_as_it_is(above: str, tmp_path: Path) -> None:
+    """pytest-benchmark's storage; asv's results without the list of benchmarks are like it."""
+    folder = tmp_path / "storage" / "Linux-CPython-3.12-64bit"
+    folder.mkdir(parents=True)
+    (folder / "0001_a.json").write_text(json.dumps(PYTEST))
+    done = CliRunner().invoke(main, ["import", "--db", f"sqlite:///{tmp_path}/x.db", str(tmp_path / above)])
+
+    assert done.output == "1 runs recorded, 0 were there already\n"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("a.json", "[]", "no run is in"),
+        ("a.jsonl", "", "no run is in"),
+        ("data.js", 'window.BENCHMARK_DATA = {"repoUrl": "", "entries": {"x": []}}', "no run is in"),
+        ("a.json", '{"mean": {"point_estimate": 1.5}}', "of no tool that is known here"),
+    ],
+)
+def test_a_file_without_a_run_is_one_sentence(name: str, content: str, words: str, tmp_path: Path) -> None:
+    """What a nightly job brings in must not be lost without a word."""
+    (tmp_path / name).write_text(content)
+    done = CliRunner().invoke(main, ["import", "--db", f"sqlite:///{tmp_path}/x.db", str(tmp_path / name)])
+
+    assert (done.exit_code, done.output.count("\n")) == (2, 1)
+    assert words in done.output
+
+
 def test_engine_and_machine_can_be_named(tmp_path: Path) -> None:
     database = f"sqlite:///{tmp_path}/x.db"
     (tmp_path / "a.json").write_text(json.dumps(GOOGLE))
@@ -280,6 +318,7 @@ def test_what_is_of_no_known_tool_is_left_to_others(said: Any) -> None:
         ASV | {"result_columns": 3},
         ASV | {"date": "yesterday"},
         ASV | {"date": 1e300},
+        {name: value for name, value in ASV.items() if name != "result_columns"} | {"env_name": "older asv"},
         ACTION | {"entries": {"x": [{}]}},
         ACTION | {"entries": 3},
     ],

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import msgspec
+
+from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.measure.disappeared import LAST, Listed, with_missing
 from spook_tracker.tracker.measure.other_folders import beside
@@ -55,12 +59,23 @@ def read(
         elif is_short(content):  # only then: asv's files have results, too
             runs.append((whole(content, str(file)), Listed()))
         else:
+            _refuse_strange(file, content)
             continue
         seen.add(file)
     found = of_tables(tables, told, beside(next(iter(tables), Path()), engine, machine, branch))
     return Read(
         frozenset(seen), (*runs, *((run, Listed()) for run in found.runs)), found.unknown, found.absent
     )
+
+
+def _refuse_strange(file: Path, content: bytes) -> None:
+    """DocumentError for a JSON object of no form that is known; what is no JSON is told where it is read."""
+    with suppress(msgspec.DecodeError, UnicodeDecodeError, RecursionError):
+        msgspec.json.decode(content, type=dict[str, msgspec.Raw])
+        raise DocumentError(
+            f"{file} is no run, and of no tool that is known here; bring its values as JSON lines, CSV or a JSON list, "
+            "and say with --column what they mean"
+        )
 
 
 def record(session: Session, found: Read) -> tuple[int, int]:

@@ -87,6 +87,7 @@ def import_files(
     are given a meaning. The compressed files of `tracker export --format months` come in, too.
     """
     from spook_tracker.tracker import importing
+    from spook_tracker.tracker.document.errors import DocumentError
     from spook_tracker.tracker.measure.other_folders import files_in
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.months import import_months, is_month
@@ -100,6 +101,10 @@ def import_files(
         new, there = importing.record(session, found)
         fresh, known = import_months(session, months)
     stored, present = len(done.stored) + new + fresh, len(done.present) + there + known
+    if not stored + present:
+        of_branch = f" of the branch {branch}" if branch else ""
+        more = f" and {len(files) - 1} more" if len(files) > 1 else ""
+        raise DocumentError(f"no run{of_branch} is in {files[0]}{more}")
     click.echo(f"{stored} runs recorded, {present} were there already")
     if found.unknown:
         names = ", ".join(found.unknown)

@@ -98,6 +98,8 @@ def blame(bad: Run, good: Run | None) -> str:
     """Which commit, or which range of commits, a change came with."""
     if good is None:
         return f"first bad commit {commit_of(bad)}, last good unknown"
+    if same_commit(good, bad):
+        return f"bad since a repeated run of {commit_of(bad)}, which was good before: no commit did it"
     if bad.engine.git_hash and good.engine.git_hash not in ("", *bad.engine.parents):
         words = (
             f"bad since {commit_of(bad)}, last good {commit_of(good)}: any commit between may be the first"

@@ -19,13 +19,16 @@ SETTING = r'^\s*"{}"\s*:\s*"([^"]*)"'  # asv.conf.json has comments, so that jso
 def files_in(folder: Path) -> tuple[Path, ...]:
     """The result files of an asv repository, of its results or of one machine's; else every JSON file in a folder.
 
-    DocumentError if there are none.
+    Where it has none, those of the folders in it: asv and pytest-benchmark keep one for each machine. DocumentError if
+    there are none either.
     """
     root = folder / (_setting(folder / "asv.conf.json", "results_dir") or "results")
     inside = root if (folder / "asv.conf.json").is_file() and root.is_dir() else folder
     deep = "**/*.json" if inside is root or (inside / "benchmarks.json").is_file() else "*.json"
-    found = sorted(file for file in inside.glob(deep) if file.name not in ABOUT)
-    if not found:
+    for pattern in (deep, "*/*.json"):
+        if found := sorted(file for file in inside.glob(pattern) if file.name not in ABOUT):
+            break
+    else:
         raise DocumentError(f"{folder} holds no JSON files of runs; name the folder they are in")
     return tuple(found)
 

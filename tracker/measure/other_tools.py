@@ -111,7 +111,7 @@ def _branch_of(said: Mapping[str, Any]) -> str:
 
 
 def _reader(said: Mapping[str, Any]) -> Callable[[Mapping[str, Any], Beside], Iterator[ShortRun]] | None:
-    if "result_columns" in said and "commit_hash" in said:
+    if "commit_hash" in said and ("result_columns" in said or "env_name" in said):
         return _asv
     if "entries" in said and "repoUrl" in said:
         return _github_action
@@ -134,11 +134,11 @@ def _named(run: ShortRun, beside: Beside) -> ShortRun:
     given: dict[str, str] = {"engine": beside.engine} if beside.engine else {}
     if beside.machine:
         given |= {"machine": beside.machine, "processor": beside.machine}
-    return msgspec.structs.replace(run, **given)
+    return msgspec.structs.replace(run, results=_told_once(run.results), **given)
 
 
 def _pytest(said: Mapping[str, Any], _: Beside) -> Iterator[ShortRun]:
-    commit, machine = said["commit_info"], said["machine_info"]
+    commit, machine = said["commit_info"] or {}, said["machine_info"] or {}
     known = commit.get("id") if commit.get("id") != "unversioned" else ""
     results = []
     for one in said["benchmarks"]:
@@ -146,7 +146,7 @@ def _pytest(said: Mapping[str, Any], _: Beside) -> Iterator[ShortRun]:
         seconds = stats.get("data") or [stats["min"], stats["median"], stats["max"]]
         result = _timed(one["fullname"], [float(s) for s in seconds])
         results.append(msgspec.structs.replace(result, runs_per_repeat=int(stats.get("iterations") or 1)))
-    cpu = machine.get("cpu") if isinstance(machine.get("cpu"), dict) else {}
+    cpu = machine["cpu"] if isinstance(machine.get("cpu"), dict) else {}
     lane, cores = _lane(cpu.get("brand_raw"), cpu.get("count"))
     yield ShortRun(
         engine=commit.get("project") or "unknown",
@@ -200,6 +200,8 @@ def _asv(said: Mapping[str, Any], beside: Beside) -> Iterator[ShortRun]:
 
     asv writes null for what failed and NaN for what its set-up skipped. Its benchmark's version is its definition.
     """
+    if "result_columns" not in said:
+        raise ValueError("of an asv before 0.5, whose `asv update` brings results to today's form")
     columns, machine = said["result_columns"], said.get("params") or {}
     results = []
     for name, row in said["results"].items():
@@ -288,23 +290,23 @@ def _github_action(said: Mapping[str, Any], _: Beside) -> Iterator[ShortRun]:
                 commit_time=commit.get("timestamp") or "",
                 started=_moment(entry["date"]),
                 processor=MIXED,
-                results=_told_once([_bench(one, better) for one in entry["benches"]]),
+                results=tuple(_bench(one, better) for one in entry["benches"]),
             )
 
 
-def _told_once(results: list[ShortResult]) -> tuple[ShortResult, ...]:
+def _told_once(results: Sequence[ShortResult]) -> tuple[ShortResult, ...]:
     """Times under one name in one run are its repeats; other values there are numbered, so that none is lost."""
-    found: dict[tuple[str, str], ShortResult] = {}
+    found: dict[tuple[str, str, str], ShortResult] = {}
     for one in results:
         name, number = one.test, 1
-        while (before := found.get((one.test, one.metric))) is not None:
+        while (before := found.get((one.test, one.configuration, one.metric))) is not None:
             if one.seconds and before.seconds:
                 seconds = before.seconds + one.seconds
                 one = msgspec.structs.replace(one, value=Number(min(seconds)), seconds=seconds)
                 break
             number += 1
             one = msgspec.structs.replace(one, test=f"{name} ({number})")
-        found[one.test, one.metric] = one
+        found[one.test, one.configuration, one.metric] = one
     return tuple(found.values())
 
 

@@ -15,6 +15,7 @@ import csv
 import io
 import json
 import re
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime
@@ -163,6 +164,9 @@ def _records(file: Path, content: bytes) -> Iterator[tuple[int, dict[str, Json]]
         text = content.decode("utf-8-sig")
         if file.suffix.lower() in (".csv", ".tsv"):
             rows = csv.DictReader(io.StringIO(text), delimiter="\t" if file.suffix.lower() == ".tsv" else ",")
+            twice = [name for name, count in Counter(rows.fieldnames or ()).items() if count > 1]
+            if twice:
+                raise ValueError(f"two columns are called {twice[0]!r}")
             for row in rows:
                 if None in row or None in row.values():
                     raise ValueError(f"line {rows.line_num} has not as many cells as there are columns")

@@ -7,7 +7,8 @@ from typing import Literal
 import msgspec
 
 SECONDS = {"ns": 1e-9, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ms": 1e-3, "min": 60.0}  # s
-SECONDS |= {"milliseconds": 1e-3, "microseconds": 1e-6, "nanoseconds": 1e-9, "minutes": 60.0}
+SECONDS |= {"milliseconds": 1e-3, "microseconds": 1e-6, "nanoseconds": 1e-9, "minutes": 60.0, "hours": 3600.0}
+SECONDS |= {"msec": 1e-3, "usec": 1e-6, "nsec": 1e-9}
 SECONDS |= dict.fromkeys(("s", "sec", "secs", "second", "seconds"), 1.0)
 BYTES = {"b": 1.0, "byte": 1.0, "bytes": 1.0}  # B
 BYTES |= {f"{letter}b": 1e3**power for power, letter in enumerate("kmgt", 1)}
