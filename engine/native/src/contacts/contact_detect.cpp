@@ -21,18 +21,6 @@ using namespace tolerances::contact_detect;
 
 }  // namespace
 
-/// How far a body may get in the step with either velocity, m.
-double ContactStage::margin_of(std::size_t b, const std::vector<Vec6>& velocity,
-                               const std::vector<Vec6>& other) const {
-    const double radius = bodies_->radius[b];
-    double speed = norm(linear(velocity[b])), spin = norm(angular(velocity[b]));
-    if (&other != &velocity) {
-        speed = std::max(speed, norm(linear(other[b])));
-        spin = std::max(spin, norm(angular(other[b])));
-    }
-    return options_.time_step * (speed + spin * radius) + closed * radius;
-}
-
 bool is_turned_through(const Detection& detection, const Contact& contact, const Pose& first,
                        const Pose& second, const std::vector<Vec6>& velocity, const std::vector<Vec6>& dv_ext,
                        double h) noexcept {
@@ -71,7 +59,7 @@ bool ContactStage::reachable(const Contact& contact) const {
 
 bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6>& velocity,
                           const std::vector<Vec6>& free_velocity) {
-    const std::size_t bodies = margin_.size();
+    const std::size_t bodies = bodies_->count();
     if (team_) team_->refresh();
     poses_ = poses;
     velocity_ = velocity;
@@ -84,7 +72,6 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     arrays_.sums.reserve(bodies);
     std::fill(toi_fraction_.begin(), toi_fraction_.end(), 0.0);
     std::fill(event_time_.begin(), event_time_.end(), -1.0);
-    std::fill(supported_.begin(), supported_.end(), 0);
     std::fill(depth_.begin(), depth_.end(), 0.0);
     std::fill(predicted_sinking_.begin(), predicted_sinking_.end(), 0.0);
     correction_.clear();
@@ -97,19 +84,11 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     if (surfaces_->rebounds || options_.impacts == ImpactOrder::successive)
         clock_.assign(bodies, 0.0), path_.assign(bodies, Vec6{}), in_order_.assign(bodies, 0);
 
-    for (std::size_t b = 0; b < bodies; ++b) margin_[b] = margin_of(b, velocity, free_velocity);
-    search_ = margin_;
-    // Room for those that are only pushed in this step.
-    if (options_.solver == SolverKind::iterative || options_.impacts == ImpactOrder::successive) {
-        double squares = 0.0;
-        for (const double margin : margin_) squares += margin * margin;
-        const double room = std::sqrt(squares / static_cast<double>(margin_.size()));
-        for (double& margin : search_) margin += room;
-    }
-    support_pairs_.clear();
-    support_impulse_dv_.assign(bodies, Vec6{});
+    margins_.begin(*bodies_, options_.time_step, velocity, free_velocity,
+                   options_.solver == SolverKind::iterative || options_.impacts == ImpactOrder::successive);
+    supported_.begin(bodies);
     find_open();
-    find_supported();
+    supported_.find(*bodies_);
     predicted_.resize(bodies);
     for (std::size_t b = 0; b < bodies; ++b)
         predicted_[b] = supported_[b] || bodies_->jointed[b] || bodies_->solver_index[b] < 0
@@ -136,7 +115,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
 void ContactStage::note_initial_penetrations() {
     state_.initial_penetration_known = true;
     for (const Point& point : points_) {
-        const double excess = -point.contact.point.gap - elastic_depth(point);
+        const double excess = -point.contact.point.gap - elastic_depth(*bodies_, point);
         if (!(excess > 0.0)) continue;
         double& given = state_.initial_penetration[point.contact.key >> feature_bits];
         given = std::max(given, excess);
@@ -146,38 +125,28 @@ void ContactStage::note_initial_penetrations() {
 /// Pairs near enough to meet: the closed ones get points, the others are open. Pairs that have points are known.
 void ContactStage::find_open() {
     open_.clear();
-    met_ = 0;
-    look_at(detection_.near(poses_, search_));
+    look_at(detection_.near(poses_, margins_.search()));
 }
 
 /// The same where the search has been widened for some bodies since: what is new is theirs.
 void ContactStage::find_open_again() {
-    if (!detection_.near_again(grown_, search_, near_)) {
+    if (!detection_.near_again(margins_.grown(), margins_.search(), near_)) {
         changed_.assign(bodies_->solver_index.size(), 1);
         return find_open();
     }
-    for (const int body : grown_) changed_[body] = 1;
-    const auto in_order = [](const OpenPair& a, const OpenPair& b) { return a.pair < b.pair; };
-    std::erase_if(near_, [&](const IndexPair& pair) {
-        const auto at = std::lower_bound(open_.begin(), open_.end(), pair,
-                                         [](const OpenPair& a, const IndexPair& b) { return a.pair < b; });
-        return at != open_.end() && at->pair == pair;
-    });
-    const auto old = static_cast<std::ptrdiff_t>(open_.size());
+    for (const int body : margins_.grown()) changed_[body] = 1;
+    std::erase_if(near_, [&](const IndexPair& pair) { return open_.has(pair); });
+    const auto old = static_cast<std::ptrdiff_t>(open_.pairs.size());
     look_at(near_);
-    merged_.clear();
-    merged_.reserve(open_.capacity());
-    std::merge(open_.begin(), open_.begin() + old, open_.begin() + old, open_.end(),
-               std::back_inserter(merged_), in_order);
-    open_.swap(merged_);
+    open_.merge(old);
 }
 
 void ContactStage::look_at(const std::vector<IndexPair>& near) {
     const double h = options_.time_step;
     known_.clear();
-    open_bodies_.clear();
+    open_.bodies.clear();
     const std::size_t before = points_.size();
-    const auto unmet = static_cast<std::ptrdiff_t>(open_.size());
+    const auto unmet = static_cast<std::ptrdiff_t>(open_.pairs.size());
     for (const Point& point : points_) known_.push_back(point.contact.key >> feature_bits);
     std::sort(known_.begin(), known_.end());
     const auto separation_of = [this](const IndexPair& pair) {
@@ -201,11 +170,12 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
         if (std::binary_search(known_.begin(), known_.end(), pair_of(pair))) continue;
         const Collider::View first = detection_.collider(pair.first),
                              second = detection_.collider(pair.second);
-        const double reach = search_[first.body] + search_[second.body];
+        const double reach = margins_.search()[first.body] + margins_.search()[second.body];
         const OpenPair open = opened(pair, shared ? apart_[k] : separation_of(pair));
         const double size = std::max(bodies_->radius[first.body], bodies_->radius[second.body]);
         if (round_or_plane(first.shape) && round_or_plane(second.shape) && open.apart.gap > 1e-6 * size) {
-            if (open.apart.gap <= reach) open_.push_back(open);  // clearly apart: no need for its points
+            if (open.apart.gap <= reach)
+                open_.pairs.push_back(open);  // clearly apart: no need for its points
             continue;
         }
         scratch_.clear();
@@ -218,7 +188,7 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
                             first.shape.kind == ShapeKind::triangle ||
                             second.shape.kind == ShapeKind::triangle;
         if (!touching) {
-            if (!scratch_.empty() || solids) open_.push_back(open);
+            if (!scratch_.empty() || solids) open_.pairs.push_back(open);
             continue;
         }
         for (std::size_t i = 1; i < scratch_.size(); ++i)  // a few, nearly always in order
@@ -237,17 +207,14 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
         for (const int b : {points_[k].contact.first, points_[k].contact.second})
             depth_[b] = std::max(depth_[b], depth);
     }
-    if (skip_grazing(before))
-        std::sort(open_.begin() + unmet, open_.end(),
-                  [](const OpenPair& a, const OpenPair& b) { return a.pair < b.pair; });
+    if (skip_grazing(before)) std::sort(open_.pairs.begin() + unmet, open_.pairs.end(), OpenPairs::in_order);
     for (std::size_t k = before; k < points_.size(); ++k) {
         if (k + ahead < points_.size()) {
             const Contact& later = points_[k + ahead].contact;
             for (const int body : {later.first, later.second})
                 prefetch(velocity_[body]), prefetch(dv_ext_[body]);
         }
-        note_supports(points_[k]);
-        for (const int b : {points_[k].contact.first, points_[k].contact.second}) supported_[b] = 1;
+        supported_.note(points_[k], *bodies_, velocity_, dv_ext_);
     }
 }
 
@@ -293,7 +260,7 @@ void ContactStage::orient(Point& point, const Pose& first, const Pose& second) {
     }
     const double along = std::sqrt(across * across + (mu * mu - across * across) * length * length);
     point.friction = std::min(along, across);
-    ContactExtras& extras = own_extras(point);
+    ContactExtras& extras = extras_.own(point);
     extras.axis_scale[0] = along / point.friction;
     extras.axis_scale[1] = across / point.friction;
 }

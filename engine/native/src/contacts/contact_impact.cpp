@@ -156,7 +156,7 @@ void ContactStage::solve_impact(MixedSystem& hit, std::size_t joints, std::vecto
     }
     const double enough = options_.solver == SolverKind::direct ? 0.0 : options_.residual_tolerance;
     if (report.finite && change > std::max(enough, tolerated * fastest)) ++state_.counters.unsettled;
-    if (report.finite && !settled) judge_impact(hit, friction, model);
+    if (report.finite && !settled) judge_impact(quality_, judged(), hit, friction, model);
 }
 
 /// Whether the bodies that a plastic impact sets in motion meet others with restitution in this very step. The resting rows
@@ -280,9 +280,7 @@ bool ContactStage::is_impact(const Point& point) const noexcept {
 void ContactStage::impact(MixedSystem& system) {
     ++state_.counters.impacts;
     ++impact_rounds_;
-    residual_ = unsettled_by_ = 0.0;
-    unsettled_body_ = -1;
-    sunk_ = false;
+    quality_ = {};
     const bool in_order = !clock_.empty() && impact_rounds_ <= most_rounds(points_.size());
     ImpactArrays& work = arrays_.impact;
     std::vector<std::size_t>& hit_points = filled(work.hit_points, 0);
@@ -311,7 +309,7 @@ void ContactStage::impact(MixedSystem& system) {
         block.state[0] = point.approach < 0.0 ? RowState::free : RowState::at_lower;
         if (block.size == 3) {
             friction.push_back({static_cast<int>(hit.rows.size()), point.friction, 0.0, -1.0});
-            friction.back().anisotropic = extras(point).is_anisotropic();
+            friction.back().anisotropic = extras_.of(point).is_anisotropic();
             const double slip = point.bounce > 0.0 && is_impact(point)
                                     ? std::max((*surfaces_)[point.contact.first].tangential_restitution,
                                                (*surfaces_)[point.contact.second].tangential_restitution)
@@ -365,7 +363,7 @@ void ContactStage::impact(MixedSystem& system) {
             impulse = (1.0 - s) * impulse_of(soft) + s * impulse;
         }
         point.impact += normal;
-        own_extras(point).impact_impulse += impulse;
+        extras_.own(point).impact_impulse += impulse;
     }
     after_impact(system);
 }
@@ -382,7 +380,7 @@ void ContactStage::after_impact(const MixedSystem& system) {
         if (bodies_->solver_index[b] >= 0 && !supported_[b] && !bodies_->jointed[b])
             next[b] = sum(velocity_[b], dv_ext_[b]);
     changed_.assign(next.size(), 1);
-    if (outrun(next)) find_open_again();
+    if (margins_.outrun(*bodies_, options_.time_step, next, changed_)) find_open_again();
     const std::size_t known = points_.size();
     const bool found = find_impacts(next, false) > 0;
     if (found) {

@@ -4,6 +4,7 @@
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_stage.hpp"
+#include "contacts/solve_quality.hpp"
 #include "contacts/tolerances.hpp"
 #include "linear/elementary.hpp"
 
@@ -106,59 +107,51 @@ RowsResidual rows_residual(const MixedSystem& system, const std::vector<Friction
     return worst;
 }
 
-void ContactStage::judge(const MixedSystem& system, const std::vector<FrictionPoint>& points,
-                         const FrictionReport& report) {
-    residual_ = unsettled_by_ = 0.0;
-    sunk_ = false;
-    unsettled_body_ = -1;
-    if (!report.finite || report.rounds + report.pgs_iterations == 0) return;
-    const RowsResidual worst = rows_residual(system, points, options_.friction);
-    residual_ = worst.residual;
-    if (report.converged && options_.solver == SolverKind::direct) return;
+SolveQuality judge(const JudgedStep& step, const MixedSystem& system,
+                   const std::vector<FrictionPoint>& points, const FrictionReport& report) {
+    SolveQuality quality;
+    if (!report.finite || report.rounds + report.pgs_iterations == 0) return quality;
+    const RowsResidual worst = rows_residual(system, points, step.options.friction);
+    quality.residual = worst.residual;
+    if (report.converged && step.options.solver == SolverKind::direct) return quality;
     const RowBlock& block = system.rows[worst.row];
-    blame(worst.residual, std::max(block.first, block.second));
-    if (unsettled_body_ < 0 && !report.converged) blame_sunk();
+    blame(quality, step, worst.residual, std::max(block.first, block.second));
+    if (quality.body < 0 && !report.converged) blame_sunk(quality, step);
+    return quality;
 }
 
-/// The same of an impact whose solve stopped at a limit; of several solves, as they follow each other in a step, the worst.
-void ContactStage::judge_impact(const MixedSystem& hit, const std::vector<FrictionPoint>& points,
-                                FrictionModel model) {
+void judge_impact(SolveQuality& quality, const JudgedStep& step, const MixedSystem& hit,
+                  const std::vector<FrictionPoint>& points, FrictionModel model) {
     const RowsResidual worst = rows_residual(hit, points, model);
-    if (!(worst.residual > residual_)) return;
-    residual_ = worst.residual;
+    if (!(worst.residual > quality.residual)) return;
+    quality.residual = worst.residual;
     const RowBlock& block = hit.rows[worst.row];
-    blame(worst.residual, std::max(block.first, block.second));
+    blame(quality, step, worst.residual, std::max(block.first, block.second));
 }
 
-/// Iterations that stop early let bodies sink by little each, in a tall stack step after step: no row is far off, and the
-/// load is not borne. What the projection could not lift again shows it.
-void ContactStage::blame_sunk() {
+void blame_sunk(SolveQuality& quality, const JudgedStep& step) {
     double worst = sunk;
-    for (const Point& point : points_) {
+    for (const StepContact& point : step.points) {
         if (point.toi >= 0.0 || point.before < 0.0) continue;
-        const auto given = state_.initial_penetration.find(point.contact.key >> feature_bits);
-        const double known =
-            elastic_depth(point) + (given == state_.initial_penetration.end() ? 0.0 : given->second);
-        const double share = (-point.contact.point.gap - known) / bodies_->moving_size(point.contact);
+        const auto given = step.initial_penetration.find(point.contact.key >> feature_bits);
+        const double known = elastic_depth(step.bodies, point) +
+                             (given == step.initial_penetration.end() ? 0.0 : given->second);
+        const double share = (-point.contact.point.gap - known) / step.bodies.moving_size(point.contact);
         if (!(share > worst)) continue;
         worst = share;
-        unsettled_by_ = residual_;
-        sunk_ = true;
-        unsettled_body_ =
-            bodies_->solver_index[point.contact.first] >= 0 ? point.contact.first : point.contact.second;
+        quality.by = quality.residual;
+        quality.sunk = true;
+        quality.body = step.bodies.moves(point.contact.first) ? point.contact.first : point.contact.second;
     }
 }
 
-/// Takes down which row is off by more than the method allows.
-void ContactStage::blame(double residual, int index) {
+void blame(SolveQuality& quality, const JudgedStep& step, double residual, int solver_index) {
     double speed = 0.0;
-    for (const Vec6& v : velocity_) speed = std::max(speed, norm(linear(v)));
+    for (const Vec6& v : step.velocity) speed = std::max(speed, norm(linear(v)));
     // A billionth of the fastest body's speed, or so, is rounding wherever it stands.
-    if (!(residual > options_.unsettled_residual + 1e-6 * speed)) return;
-    unsettled_by_ = residual;
-    unsettled_body_ =
-        static_cast<int>(std::find(bodies_->solver_index.begin(), bodies_->solver_index.end(), index) -
-                         bodies_->solver_index.begin());
+    if (!(residual > step.options.unsettled_residual + 1e-6 * speed)) return;
+    quality.by = residual;
+    quality.body = step.bodies.body_of[solver_index];
 }
 
 /// `share`, per moving body: what is left of the impulses of its island, where a solve that did not settle would raise

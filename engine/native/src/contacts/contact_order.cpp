@@ -51,11 +51,12 @@ void ContactStage::find_events() {
         const Contact& contact = point.contact;
         const int island = root(bodies_->solver_index[contact.first] >= 0 ? contact.first : contact.second);
         if (drive_.acts_at(contact, *surfaces_)) may_move_along[island] = event_bodies;
-        else if (pushes_against_forces(point))
+        else if (pushes_against_forces(point, *bodies_, dv_ext_))
             may_move_along[island] = std::max<std::size_t>(may_move_along[island], 1);
         if (point.toi < 0.0) {
-            const double approach = -relative(point, contact.point.normal, predicted_, false);
-            if (approach > 1e-9 * (margin_[contact.first] + margin_[contact.second]) / options_.time_step)
+            const double approach = -relative_velocity(point, contact.point.normal, predicted_);
+            if (approach > 1e-9 * (margins_.reach()[contact.first] + margins_.reach()[contact.second]) /
+                               options_.time_step)
                 plain[island] = 0;
             continue;
         }
@@ -76,7 +77,7 @@ void ContactStage::find_events() {
         fastest = std::max(fastest, norm(linear(predicted_[b])));
     }
     const auto island = [&](int b) { return bodies_->solver_index[b] >= 0 ? root(b) : b; };
-    for (const OpenPair& open : open_) {
+    for (const OpenPair& open : open_.pairs) {
         if (open.has_met()) continue;
         const int a = island(open.first), b = island(open.second);
         if (open.apart.gap > options_.time_step * (speed[a] + speed[b])) continue;
@@ -101,6 +102,33 @@ void ContactStage::find_events() {
     }
 }
 
+/// Whether a body that is supported, or jointed, moves along the forces.
+bool ContactStage::moves_along_forces(int body) const {
+    return (supported_[body] || bodies_->jointed[body]) &&
+           is_along(linear(dv_ext_[body]), linear(velocity_[body]));
+}
+
+/// A supported body that an impact sends along the forces, or against them: until then its support took its kick.
+void ContactStage::release_support(int body, const Vec6& velocity) {
+    if (event_time_[body] < 0.0 || toi_fraction_[body] > 0.0 || !(supported_[body] || bodies_->jointed[body]))
+        return;
+    const Vec3 kick = linear(dv_ext_[body]), before = linear(velocity_[body]);
+    if (is_along(kick, before) || !is_along(kick, linear(velocity) - before)) return;
+    toi_fraction_[body] = part_of_forces(event_time_[body] / options_.time_step, surfaces_->rebounds);
+    supported_.release(body, toi_fraction_[body], dv_ext_[body]);
+    for (double& k : dv_ext_[body]) k *= 1.0 - toi_fraction_[body];
+}
+
+/// What a supported body of an event that falls in the rest of the step is to go besides, m/s: it falls for all of it, or it
+/// would have the speed of a fall and not have lost the height.
+Vec3 ContactStage::free_fall_correction(int body, Vec3 after) const {
+    const Vec3 k = linear(dv_ext_[body]), change = after - linear(velocity_[body]);
+    if (!supported_[body] || !(dot(k, k) > 0.0)) return {};
+    const double won = event_time_[body] / options_.time_step * dot(k, after - linear(predicted_[body])) -
+                       0.5 * dot(change, change);
+    return won > 0.0 ? (won / dot(k, k)) * k : Vec3{};
+}
+
 /// Forces act on a free body up to this part of the step; the rest of them comes with the solve.
 void ContactStage::apply_forces_until(std::size_t b, double part) {
     velocity_[b] = sum(velocity_[b], whole_dv_ext_[b], part - toi_fraction_[b]);
@@ -120,8 +148,8 @@ void ContactStage::apply_half_of_forces() {
 void ContactStage::lay_down() {
     for (const Point& point : points_) {
         if (!point.event) continue;
-        const double apart = relative(point, point.contact.point.normal, velocity_, false),
-                     push = relative(point, point.contact.point.normal, whole_dv_ext_, false);
+        const double apart = relative_velocity(point, point.contact.point.normal, velocity_),
+                     push = relative_velocity(point, point.contact.point.normal, whole_dv_ext_);
         const double left = 1.0 - point.toi / options_.time_step;
         if (!(std::abs(apart) < 0.5 * left * -push)) continue;
         for (const int b : {point.contact.first, point.contact.second})
@@ -143,15 +171,15 @@ void ContactStage::order_points() {
         point.compression_before = cached[old].compression;
         if (point.solved) continue;
         std::copy_n(cached[old].tangent, 2, point.tangents);
-        if (surfaces_->resists_turning) std::copy_n(cached[old].turning, 3, own_extras(point).turning);
+        if (surfaces_->resists_turning) std::copy_n(cached[old].turning, 3, extras_.own(point).turning);
     }
     ordered_ = points_.size();
 }
 
 /// Approach and push, from the current velocities.
 void ContactStage::measure(Point& point) const {
-    point.approach = relative(point, point.contact.point.normal, velocity_, false);
-    point.dv_ext = relative(point, point.contact.point.normal, dv_ext_, false);
+    point.approach = relative_velocity(point, point.contact.point.normal, velocity_);
+    point.dv_ext = relative_velocity(point, point.contact.point.normal, dv_ext_);
 }
 
 /// Approach, push and part in the impact of every point, from the current velocities.
@@ -170,14 +198,15 @@ void ContactStage::measure_points() {
                    point.impact > 0.0) {  // an impact of this step has brought them together
             point.bounce = 0.0;
         } else if (speed > 0.0 && gap + time_left(point) * (point.approach + point.dv_ext) < 0.0) {
-            const double push = relative(point, contact.point.normal, whole_dv_ext_, false);
+            const double push = relative_velocity(point, contact.point.normal, whole_dv_ext_);
             const double ahead = 2.0 * (-push / h) * gap / (speed * speed);
             const double left = psi > 0.0 ? psi * psi - (1.0 - psi * psi) * ahead : 0.0;
             if (left > 0.0) point.bounce = std::min(1.0, std::sqrt(left));
             else if (plastic_first_) point.bounce = 0.0;
         }
         const double kick = norm(linear(dv_ext_[contact.first])) + norm(linear(dv_ext_[contact.second]));
-        point.rounding = 1e-6 * kick + 1e-12 * (margin_[contact.first] + margin_[contact.second]) / h;
+        point.rounding =
+            1e-6 * kick + 1e-12 * (margins_.reach()[contact.first] + margins_.reach()[contact.second]) / h;
         impact_needed_ = impact_needed_ || is_impact(point);
     }
 }

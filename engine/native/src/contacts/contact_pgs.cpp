@@ -31,7 +31,7 @@ void ContactStage::hand_over() {
                 prefetch(velocity_[body]), prefetch(dv_ext_[body]);
         }
         const PairMaterial material = surfaces_->pair(point.contact);
-        const ContactExtras& extras = this->extras(point);
+        const ContactExtras& extras = extras_.of(point);
         PgsContact row;
         row.first = bodies_->solver_index[point.contact.first];
         row.second = bodies_->solver_index[point.contact.second];
@@ -50,7 +50,7 @@ void ContactStage::hand_over() {
         if (surfaces_->conveys || row.first < 0 || row.second < 0) {
             const Vec3 directions[3] = {row.normal, row.tangent, row.across};
             for (int i = 0; i < 3; ++i)
-                row.right[i] = -relative(point, directions[i], drive_.prescribed(), true);
+                row.right[i] = -relative_velocity(point, directions[i], drive_.prescribed());
             for (int i = 1; i < 3; ++i) row.right[i] -= surface_speed(point, directions[i]);
         }
         row.right[0] += resting_right(point);
@@ -64,7 +64,7 @@ void ContactStage::predict_sinking() {
     for (const Point& point : points_) {
         if (point.toi >= 0.0) continue;
         const Contact& contact = point.contact;
-        const double closing = -relative(point, contact.point.normal, next_, false);
+        const double closing = -relative_velocity(point, contact.point.normal, next_);
         const double sinking = options_.time_step * closing - std::max(0.0, contact.point.gap);
         for (const int b : {contact.first, contact.second})
             predicted_sinking_[b] = std::max(predicted_sinking_[b], sinking);
@@ -85,7 +85,7 @@ bool ContactStage::find_more(bool over) {
         changed_[b] = all || next_[b] != now;
         next_[b] = now;
     });
-    if (outrun(next_)) find_open_again();
+    if (margins_.outrun(*bodies_, options_.time_step, next_, changed_)) find_open_again();
     if (bodies_->swings) predict_sinking();
     const std::size_t known = points_.size();
     const bool turned = find_turned(next_);
@@ -110,24 +110,23 @@ void ContactStage::take_in(std::size_t known) {
     hand_over();
 }
 
-/// Whether the iterations have come as near to their law as the method asks for; if not, notes which body is furthest off.
-bool ContactStage::is_settled(MixedSystem& system) {
-    unsettled_body_ = -1;
-    unsettled_by_ = 0.0;
+/// Notes how far the iterations are from their law, and if that is more than the method asks for, which body is.
+ContactStage::PgsEnd ContactStage::judge_pgs(MixedSystem& system) {
+    quality_.body = -1;
+    quality_.by = 0.0;
     if (!system.rows.empty()) pgs_.write(system);
     const RowsResidual contact = pgs_.worst(focus * options_.unsettled_residual, options_.unsettled_residual),
                        joint = rows_residual(system, {}, options_.friction);
-    residual_ = std::max(contact.residual, joint.residual);
-    joint_is_worst_ = joint.residual > contact.residual;
+    quality_.residual = std::max(contact.residual, joint.residual);
     if (contact.row >= 0 && contact.residual >= joint.residual) {
         const Contact& pair = points_[contact.row].contact;
-        blame(contact.residual,
+        blame(quality_, judged(), contact.residual,
               std::max(bodies_->solver_index[pair.first], bodies_->solver_index[pair.second]));
     } else if (!system.rows.empty()) {
         const RowBlock& block = system.rows[joint.row];
-        blame(joint.residual, std::max(block.first, block.second));
+        blame(quality_, judged(), joint.residual, std::max(block.first, block.second));
     }
-    return unsettled_body_ < 0;
+    return {quality_.body<0, joint.residual> contact.residual};
 }
 
 /// Whether the iterations have made far more energy than there is. No answer does, but where friction on a long arm loads the
@@ -209,7 +208,7 @@ void ContactStage::warm_start_by_pgs(MixedSystem& system, std::size_t known, int
         const double* impulse = pgs_.impulse(static_cast<int>(k));
         point.solved = true;
         point.normal = impulse[0];
-        for (int i = 0; i < 2; ++i) point.tangents[i] = impulse[i + 1] * extras(point).axis_scale[i];
+        for (int i = 0; i < 2; ++i) point.tangents[i] = impulse[i + 1] * extras_.of(point).axis_scale[i];
     }
 }
 
@@ -224,10 +223,7 @@ bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
     iterating_ = false;
     const std::size_t begun = points_.size();
     FrictionReport report;
-    residual_ = 0.0;
-    unsettled_body_ = -1;
-    unsettled_by_ = 0.0;
-    sunk_ = false;
+    quality_ = {};
     for (bool again = true; again;) {
         again = false;
         double last = unbounded;
@@ -236,14 +232,17 @@ bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
                 pgs_.run(options_.iterations, options_.residual_tolerance,
                          focus * options_.unsettled_residual, [this](bool over) { return find_more(over); });
             state_.counters.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
-            if ((report.finite && is_settled(system)) || report.converged) break;
-            const bool grows = residual_ > std::exchange(last, residual_) && system.rows.empty();
+            PgsEnd end;
+            if (report.finite) end = judge_pgs(system);
+            if (end.settled || report.converged) break;
+            const bool grows =
+                quality_.residual > std::exchange(last, quality_.residual) && system.rows.empty();
             if (!report.finite || (grows && runs_away(system))) {
                 points_.resize(begun);  // what was met on that way is not
                 find_open();
                 return unfinished = ran_away_ = true;
             }
-            if (turn + 1 >= joint_turns && joint_is_worst_) break;
+            if (turn + 1 >= joint_turns && end.joint_is_worst) break;
         }
         pgs_.write(system);
         if (!report.finite) break;
@@ -263,7 +262,7 @@ bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
         if (again) take_in(known);
     }
     if (report.finite && pass_other_ends(system, system.rows.size())) return true;
-    unfinished = report.finite && !report.converged && (state_.by_rows || unsettled_body_ >= 0) &&
+    unfinished = report.finite && !report.converged && (state_.by_rows || quality_.body >= 0) &&
                  !system.rows.empty() && system.rows.size() + points_.size() <= few_rows;
     state_.by_rows = state_.by_rows || unfinished;
     if (unfinished) return true;
@@ -272,7 +271,7 @@ bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
     std::vector<double>& share = arrays_.share;
     share.clear();
     if (!report.converged) {
-        if (unsettled_body_ < 0) blame_sunk();
+        if (quality_.body < 0) blame_sunk(quality_, judged());
         std::vector<char>& pushes = arrays_.pushes;
         pushes.clear();
         for (std::size_t k = 0; k < points_.size(); ++k) {
@@ -294,7 +293,7 @@ bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
                 z *= share[std::max(bodies_->solver_index[point.contact.first],
                                     bodies_->solver_index[point.contact.second])];
         const Vec3 across = cross(point.contact.point.normal, point.tangent);
-        const double* const axis_scale = extras(point).axis_scale;
+        const double* const axis_scale = extras_.of(point).axis_scale;
         cache_contact(system, point, impulse[0],
                       (impulse[1] * axis_scale[0]) * point.tangent + (impulse[2] * axis_scale[1]) * across);
         if (impulse[0] == 0.0 && impulse[1] == 0.0 && impulse[2] == 0.0) continue;

@@ -33,23 +33,10 @@ ContactStage::ContactStage(Detection detection, const std::vector<SurfaceMateria
     pgs_.help(team_.get());
     projector_.help(team_.get());
     const std::size_t bodies = bodies_->count();
-    margin_.assign(bodies, 0.0);
-    supported_.assign(bodies, 0);
     depth_.assign(bodies, 0.0);
     predicted_sinking_.assign(bodies, 0.0);
     toi_fraction_.assign(bodies, 0.0);
     event_time_.assign(bodies, -1.0);
-}
-
-double ContactStage::relative(const Point& point, Vec3 direction, const std::vector<Vec6>& velocity,
-                              bool only_prescribed) const {
-    const Contact& contact = point.contact;
-    double total = 0.0;
-    if (!only_prescribed || bodies_->solver_index[contact.first] < 0)
-        total += dot(contact_row(direction, point.first_arm), velocity[contact.first]);
-    if (!only_prescribed || bodies_->solver_index[contact.second] < 0)
-        total -= dot(contact_row(direction, point.second_arm), velocity[contact.second]);
-    return total;
 }
 
 /// How fast the surfaces move along themselves, the first against the second, along `direction`, m/s.
@@ -68,13 +55,13 @@ RowBlock ContactStage::row_block(const Point& point, int rows) const {
     block.first = bodies_->solver_index[contact.first];
     block.second = bodies_->solver_index[contact.second];
     block.size = std::min(rows, 3);
-    const double* const axis_scale = extras(point).axis_scale;
+    const double* const axis_scale = extras_.of(point).axis_scale;
     const Vec3 directions[3] = {contact.point.normal, axis_scale[0] * point.tangent,
                                 axis_scale[1] * cross(contact.point.normal, point.tangent)};
     for (int i = 0; i < block.size; ++i) {
         if (block.first >= 0) block.first_jacobian[i] = contact_row(directions[i], point.first_arm);
         if (block.second >= 0) block.second_jacobian[i] = contact_row(-directions[i], point.second_arm);
-        block.right[i] = -relative(point, directions[i], drive_.prescribed(), true);
+        block.right[i] = -relative_velocity(point, directions[i], drive_.prescribed());
         if (i > 0) block.right[i] -= surface_speed(point, directions[i]);
     }
     block.lower[0] = 0.0;
@@ -105,11 +92,11 @@ void ContactStage::add_friction(const Point& point, int block, std::vector<Frict
     const PairMaterial material = surfaces_->pair(point.contact);
     const double soft = material.slip_compliance / options_.time_step, scale = bodies_->size(point.contact);
     double normal = point.before;
-    if (options_.friction == FrictionModel::box) normal = normal < 0.0 ? extras(point).guessed : normal;
+    if (options_.friction == FrictionModel::box) normal = normal < 0.0 ? extras_.of(point).guessed : normal;
     else if (point.solved) normal = point.normal;
     if (point.friction > 0.0) {
         friction.push_back({block, point.friction, soft, normal});
-        friction.back().anisotropic = extras(point).is_anisotropic();
+        friction.back().anisotropic = extras_.of(point).is_anisotropic();
     }
     if (material.rolling > 0.0) friction.push_back({block, material.rolling / scale, 0.0, normal, 3, 2});
     if (material.torsional > 0.0) friction.push_back({block, material.torsional / scale, 0.0, normal, 5, 1});
@@ -127,10 +114,6 @@ double ContactStage::time_left(const Point& point) const noexcept {
     return point.event ? std::max(h - point.toi, 1e-3 * h) : h;
 }
 
-double ContactStage::elastic_depth(const Point& point) const noexcept {
-    return point.compression_before + bodies_->slack(point.contact);
-}
-
 /// What the normal's resting row adds to the right side of the bodies that do not move by themselves, m/s.
 double ContactStage::resting_right(Point& point) const {
     const double h = options_.time_step, gap = bodies_->gap(point.contact);
@@ -141,7 +124,7 @@ double ContactStage::resting_right(Point& point) const {
     if (!touching) return -gap / h;
     const PairMaterial material = surfaces_->pair(point.contact);
     const Regularisation row = regularise(material.compliance, material.damping, h);
-    const double depth = -row.violation_gain * std::max(gap, -elastic_depth(point));
+    const double depth = -row.violation_gain * std::max(gap, -elastic_depth(*bodies_, point));
     // A rigid contact that opens is not pushed after its own speed.
     return material.compliance > 0.0 ? depth + row.upsilon * point.resting_approach() : depth;
 }
@@ -167,7 +150,7 @@ RowBlock ContactStage::resting_row(Point& point) const {
     block.softness[0] = regularise(material.compliance, material.damping, h).softness;
     block.state[0] = is_pressed(point) ? RowState::free : RowState::at_lower;
     block.multiplier[0] = point.solved ? point.normal : std::max(0.0, point.before);
-    const ContactExtras& extras = this->extras(point);
+    const ContactExtras& extras = extras_.of(point);
     if (point.friction > 0.0) {
         block.softness[1] = block.softness[2] = material.slip_compliance / h;
         for (int i = 1; i <= 2; ++i) block.multiplier[i] = point.tangents[i - 1] / extras.axis_scale[i - 1];
@@ -215,12 +198,12 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         report.converged = report.converged && before.converged;  // islands may have been left as they were
         if (options_.friction == FrictionModel::box)
             for (const FrictionPoint& point : friction)
-                own_extras(points_[point.block - joints]).guessed = point.normal;
+                extras_.own(points_[point.block - joints]).guessed = point.normal;
         if (!report.finite || round == late_rounds) break;
         move_on(system, next);
         const std::size_t known = points_.size();
         changed_.assign(next.size(), 1);
-        if (outrun(next)) find_open_again();
+        if (margins_.outrun(*bodies_, options_.time_step, next, changed_)) find_open_again();
         find_turned(next);
         const std::size_t dissipated_energy = points_.size();
         late_impact_ = false;
@@ -238,7 +221,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         order_points();
     }
     mark_rows(system);  // the last round may have brought rows to bodies that had none
-    judge(system, friction, report);
+    quality_ = judge(judged(), system, friction, report);
     if (!report.converged) {
         std::vector<double>& share = arrays_.share;
         std::vector<char>& pushes = arrays_.pushes;
@@ -259,7 +242,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         Point& point = points_[k];
         const Vec3 along = store_solution(system.rows[joints + k], point);
         CachedContact& cached = cache_contact(system, point, point.normal, along);
-        std::copy_n(extras(point).turning, 3, cached.turning);
+        std::copy_n(extras_.of(point).turning, 3, cached.turning);
     }
     if (report.finite) correct_events(system);
     return report.finite;
@@ -281,7 +264,7 @@ Vec3 ContactStage::store_solution(const RowBlock& block, Point& point) {
     point.tangents[0] = dot(along, t);
     point.tangents[1] = dot(along, cross(n, t));
     if (block.size > 3) {
-        double* const own = own_extras(point).turning;
+        double* const own = extras_.own(point).turning;
         own[0] = scale * dot(turning, t);
         own[1] = scale * dot(turning, cross(n, t));
         own[2] = scale * dot(turning, n);
@@ -291,7 +274,7 @@ Vec3 ContactStage::store_solution(const RowBlock& block, Point& point) {
 
 /// Whether a point that is to rebound was stopped instead, faster than a fall in a step.
 bool ContactStage::is_stopped(const Point& point, double normal) const {
-    const double fall = std::abs(relative(point, point.contact.point.normal, whole_dv_ext_, false));
+    const double fall = std::abs(relative_velocity(point, point.contact.point.normal, whole_dv_ext_));
     return normal > 0.0 && point.approach < -(point.rounding + fall) &&
            surfaces_->pair(point.contact).restitution > 0.0;
 }
@@ -323,10 +306,10 @@ CachedContact& ContactStage::cache_contact(const MixedSystem& system, const Poin
     cached.compression = compression(system, point);
     cached.impact = point.impact;
     state_.counters.stopped += is_stopped(point, normal);
-    cached.impulse = normal * n + along + extras(point).impact_impulse;
+    cached.impulse = normal * n + along + extras_.of(point).impact_impulse;
     cached.tangent[0] = dot(along, point.tangent);
     cached.tangent[1] = dot(along, cross(n, point.tangent));
-    cached.friction = extras(point).axis_scale[0] * point.friction;
+    cached.friction = extras_.of(point).axis_scale[0] * point.friction;
     cached.active = cached.normal > 0.0 || cached.impact > 0.0 || bodies_->is_closed(point.contact);
     return cached;
 }
@@ -350,22 +333,6 @@ void ContactStage::move_on(const MixedSystem& system, std::vector<Vec6>& next) {
     }
 }
 
-/// Whether some body goes further than the search for pairs allowed for; if so, the search is widened.
-bool ContactStage::outrun(const std::vector<Vec6>& velocity) {
-    bool faster = false;
-    for (std::size_t b = 0; b < margin_.size(); ++b) {
-        if (!changed_[b]) continue;
-        const double margin = margin_of(b, velocity, velocity);
-        faster = faster || margin > search_[b] * (1.0 + 1e-9);
-        margin_[b] = std::max(margin_[b], margin);
-    }
-    if (!faster) return false;
-    grown_.clear();
-    for (std::size_t b = 0; b < margin_.size(); ++b)
-        if (margin_[b] > search_[b]) search_[b] = margin_[b], grown_.push_back(static_cast<int>(b));
-    return true;
-}
-
 /// An event's bodies went with v₋ until its time: with v₊ for the whole step they would end elsewhere.
 void ContactStage::correct_events(const MixedSystem& system) {
     for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b) {
@@ -379,12 +346,13 @@ void ContactStage::correct_events(const MixedSystem& system) {
         const Vec3 more = free_fall_correction(static_cast<int>(b), linear(system.velocity[u]));
         for (int i = 0; i < 3; ++i) correction_[u][i] += more[i];
     }
-    apply_support_impulses(system);
+    if (supported_.has_released())
+        supported_.book(system, connected(system, 0), *bodies_, state_.cache.points);
 }
 
 const PositionProjection* ContactStage::project_positions(const MixedSystem& system, std::size_t joints,
                                                           const std::vector<Pose>& poses, bool again) {
-    const StepEnd end{detection_, poses_, poses, search_, state_.cache, state_.initial_penetration};
+    const StepEnd end{detection_, poses_, poses, margins_.search(), state_.cache, state_.initial_penetration};
     return projector_.project({system, joints, pgs_}, end, drive_, again, state_.initial_penetration,
                               state_.counters, woken_);
 }

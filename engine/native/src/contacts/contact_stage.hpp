@@ -54,10 +54,14 @@
 #include "contacts/contact_islands.hpp"
 #include "contacts/contact_options.hpp"
 #include "contacts/external_drive.hpp"
+#include "contacts/open_pairs.hpp"
 #include "contacts/pgs_solver.hpp"
 #include "contacts/position_projection.hpp"
+#include "contacts/search_margins.hpp"
 #include "contacts/solve_islands.hpp"
+#include "contacts/solve_quality.hpp"
 #include "contacts/step_contact.hpp"
+#include "contacts/supported_bodies.hpp"
 #include "linear/large_array.hpp"
 #include "run/team.hpp"
 
@@ -175,30 +179,14 @@ public:
 
     ContactCounters counters() const noexcept { return state_.counters; }
     BlockLdlt::Counters factor_counters() const noexcept;
-    double residual() const noexcept {
-        return residual_;
-    }  // the last solve's or impact's rows_residual(), m/s
-    /// A body whose rows the last solve left further from their law than `unsettled_residual`; −1 if there is none.
-    int unsettled_body() const noexcept { return unsettled_body_; }
-    double unsettled_by() const noexcept { return unsettled_by_; }  // m/s
-    bool unsettled_sunk() const noexcept { return sunk_; }          // and not for what a row is off by
+    /// How near to their law the rows of the last solve, or impact, were left.
+    const SolveQuality& quality() const noexcept { return quality_; }
 
 private:
     using Point = StepContact;
     void add_point(const Contact& contact, const Pose& first, const Pose& second, double toi);
     void lie_as(const State& state);
     void orient(Point& point, const Pose& first, const Pose& second);
-    const ContactExtras& extras(const Point& point) const noexcept {
-        static constexpr ContactExtras none{};
-        return point.extras < 0 ? none : extras_[point.extras];
-    }
-    ContactExtras& own_extras(Point& point) {
-        if (point.extras < 0) {
-            point.extras = static_cast<int>(extras_.size());
-            extras_.emplace_back();
-        }
-        return extras_[point.extras];
-    }
     void find_open();
     void find_open_again();
     bool is_impact(const Point& point) const noexcept;
@@ -220,26 +208,17 @@ private:
     void apply_forces_until(std::size_t body, double part);
     void apply_half_of_forces();
     void lay_down();
-    // supported_bodies.cpp
-    void note_supports(Point& point);
-    void find_supported();
     bool moves_along_forces(int body) const;
-    bool pushes_against_forces(const Point& point) const;
     void release_support(int body, const Vec6& velocity);
     Vec3 free_fall_correction(int body, Vec3 after) const;
-    void apply_support_impulses(const MixedSystem& system);
     void order_points();
     void measure_points();
     void measure(Point& point) const;
-    double margin_of(std::size_t body, const std::vector<Vec6>& velocity,
-                     const std::vector<Vec6>& other) const;
     bool reachable(const Contact& contact) const;
     RowBlock row_block(const Point& point, int rows) const;
     void add_turning_rows(const Point& point, RowBlock& block) const;
     void add_friction(const Point& point, int block, std::vector<FrictionPoint>& friction) const;
     double surface_speed(const Point& point, Vec3 direction) const noexcept;
-    double relative(const Point& point, Vec3 direction, const std::vector<Vec6>& velocity,
-                    bool only_prescribed) const;
     IslandRules rules_of(FrictionModel model, bool exact) const noexcept;
     const Islands& connected(const MixedSystem& system, std::size_t joints) const;
     int island_of(const Islands& islands, const Point& point) const noexcept;
@@ -266,10 +245,8 @@ private:
     void after_impact(const MixedSystem& system);
     void mark_rows(const MixedSystem& system);
     void move_on(const MixedSystem& system, std::vector<Vec6>& next);
-    bool outrun(const std::vector<Vec6>& velocity);
     double slop(const OpenPair& open) const noexcept;
     double depth_at_toi(const Point& point, bool late) const;
-    void index_points();
     void remove_occluded(std::vector<Meeting>& meetings, const std::vector<Vec6>& velocity);
     bool occludes(const Meeting& earlier, const Meeting& later, int body,
                   const std::vector<Vec6>& velocity) const;
@@ -298,20 +275,21 @@ private:
     bool find_more(bool over);
     void take_in(std::size_t known);
     void predict_sinking();
-    bool is_settled(MixedSystem& system);
+    struct PgsEnd {
+        bool settled = false,
+             joint_is_worst = false;  // as near to their law as the method asks for; else a joint is furthest
+    };
+    PgsEnd judge_pgs(MixedSystem& system);
+    JudgedStep judged() const noexcept {
+        return {*bodies_, options_, velocity_, points_, state_.initial_penetration};
+    }
     bool runs_away(const MixedSystem& system) const;
     void hand_over();
-    void judge(const MixedSystem& system, const std::vector<FrictionPoint>& points,
-               const FrictionReport& report);
-    void judge_impact(const MixedSystem& hit, const std::vector<FrictionPoint>& points, FrictionModel model);
-    void blame(double residual, int index);
-    void blame_sunk();
     void shorten_unsettled(MixedSystem& system, std::size_t joints, const std::vector<char>& pushes,
                            std::vector<double>& share) const;
     void correct_events(const MixedSystem& system);
     void note_initial_penetrations();
     double time_left(const Point& point) const noexcept;
-    double elastic_depth(const Point& point) const noexcept;
 
     State state_;
     Detection detection_;
@@ -329,39 +307,33 @@ private:
     std::size_t handed_over_ = 0, ordered_ = 0;  // points the PGS solver has; points in order
     Unanswered unanswered_;
     std::vector<CachedContact> unordered_;
-    LargeArray<OpenPair> merged_;
     mutable ContactArrays arrays_;  // what is in them is of one call
 
     std::vector<Pose> poses_;
     std::vector<Vec6> velocity_, dv_ext_, predicted_;  // v, h M⁻¹ f, and what bodies are cast along
     std::vector<Vec6> whole_dv_ext_;                   // the second before an impact takes its part
-    LargeArray<OpenPair> open_;
-    int met_ = 0;                         // of them
-    std::vector<IndexPair> open_bodies_;  // of each, to look through many that did not move; empty: not yet
-    std::vector<Separation> apart_;       // of pairs, found on several threads
+    OpenPairs open_;
+    SearchMargins margins_;
+    SupportedBodies supported_;
+    PointsOfBodies points_of_;
+    ContactExtrasOf extras_;
+    std::vector<Separation> apart_;               // of pairs, found on several threads
     std::vector<std::vector<Meeting>> meetings_;  // found by each thread
     std::vector<MeetingOf> meetings_of_;          // by body and time
     std::vector<IndexPair> near_;                 // where the search was widened
-    std::vector<int> grown_;                      // the bodies it was widened for
-    std::vector<char> supported_;                 // bodies that closed contacts carry
-    std::vector<SupportPair> support_pairs_;
-    std::vector<Vec6> support_impulse_dv_;   // what supports took of a body's kick until they let it go
-    std::vector<double> depth_;              // of a body's closed contacts, m
-    std::vector<double> predicted_sinking_;  // what unsettled iterations would add to it in the step, m
+    std::vector<double> depth_;                   // of a body's closed contacts, m
+    std::vector<double> predicted_sinking_;       // what unsettled iterations would add to it in the step, m
     std::vector<Contact> scratch_;
-    std::vector<int> points_of_, points_begin_;  // points by moving body, and where each one's begin
-    DisjointSets connected_;                     // bodies, by contacts and joints
+    DisjointSets connected_;  // bodies, by contacts and joints
     std::vector<std::uint64_t> known_;
     std::vector<double> toi_fraction_, event_time_;
     std::vector<double> clock_;  // of successive impacts: up to when a body's way in the step is known, s
     std::vector<Vec6> path_;     // and that way, m and rad
     std::vector<signed char> in_order_;  // bodies: 1 if impacts come one by one in this step, −1 if not
     LargeArray<Point> points_, toi_points_;
-    std::vector<ContactExtras> extras_;                          // of points, in no order
     std::vector<std::pair<std::uint64_t, std::size_t>> places_;  // of points, by key
     std::vector<int> woken_;                                     // sleepers met in this step
-    std::vector<double> margin_, search_;  // where bodies may get, and where they are looked for, m
-    std::vector<char> has_rows_;           // moving bodies with rows, by unknown
+    std::vector<char> has_rows_;                                 // moving bodies with rows, by unknown
     std::vector<Vec6> correction_;
     bool impact_needed_ = false;
     bool warm_started_ = false;   // the step's next solve starts from warm_start_by_pgs()
@@ -369,10 +341,8 @@ private:
     bool late_impact_ = false;    // an impact found after the solve needs an impact
     bool plastic_first_ = false;  // plastic impacts are met in the impact as well
     bool ends_passed_ = false;    // by the last solve
-    int impact_rounds_ = 0, unsettled_body_ = -1;
-    double residual_ = 0.0, unsettled_by_ = 0.0;
-    bool sunk_ = false;
-    bool joint_is_worst_ = false;  // of what the last iterations have left
+    int impact_rounds_ = 0;
+    SolveQuality quality_;
 };
 
 }  // namespace spook

@@ -77,7 +77,7 @@ bool ContactStage::find_turned(const std::vector<Vec6>& velocity) {
             if (named) contact.key |= swung_in;
             add_point(contact, poses_[a], poses_[b], h);
             Point& point = points_.back();
-            const double closing = -relative(point, contact.point.normal, velocity, false);
+            const double closing = -relative_velocity(point, contact.point.normal, velocity);
             point.contact.point.gap = std::max(0.0, contact.point.gap + h * closing);
         }
     }

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "contacts/contact_bodies.hpp"
-#include "linear/vec.hpp"
+#include "contacts/pivot_system.hpp"
 
 namespace spook {
 

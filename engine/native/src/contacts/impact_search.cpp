@@ -58,36 +58,32 @@ Mover ContactStage::mover(int collider, const Pose& pose, const std::vector<Vec6
 int ContactStage::find_impacts(const std::vector<Vec6>& velocity, bool late) {
     meetings_.resize(team_ ? static_cast<std::size_t>(team_->size()) : 1);
     for (auto& meetings : meetings_) meetings.clear();
-    if (bodies_->swings && !open_.empty()) index_points();
-    if (open_bodies_.size() != open_.size() || met_ > most_met * static_cast<double>(open_.size())) {
-        std::erase_if(open_, [](const OpenPair& open) { return open.has_met(); });
-        met_ = 0;
-        open_bodies_.clear();
-        for (const OpenPair& open : open_) open_bodies_.emplace_back(open.first, open.second);
-    }
+    if (bodies_->swings && !open_.pairs.empty()) points_of_.find(points_, *bodies_);
+    open_.drop_met(most_met);
     arrays_.asked.resize(meetings_.size());
-    share_out(team_.get(), open_.size(), many_pairs, [&](int part, std::size_t begin, std::size_t end) {
+    share_out(team_.get(), open_.pairs.size(), many_pairs, [&](int part, std::size_t begin, std::size_t end) {
         std::vector<std::size_t>& asked = arrays_.asked[part];
         asked.resize(end - begin + 1);
         std::size_t count = 0;
         for (std::size_t k = begin; k < end; ++k) {  // the others were judged before
             asked[count] = k;
-            count += !late || (changed_[open_bodies_[k].first] | changed_[open_bodies_[k].second]) != 0;
+            count += !late || (changed_[open_.bodies[k].first] | changed_[open_.bodies[k].second]) != 0;
         }
         const std::size_t all = std::exchange(count, 0);
         for (std::size_t at = 0; at < all; ++at) {  // nearly all pass: the others are gathered first
             asked[count] = asked[at];
-            const OpenPair& open = open_[asked[at]];
+            const OpenPair& open = open_.pairs[asked[at]];
             count += !open.has_met() && !passes(open, velocity);
         }
         for (std::size_t at = 0; at < count; ++at) {
             if (at + ahead < count) {
-                const OpenPair& later = open_[asked[at + ahead]];
+                const OpenPair& later = open_.pairs[asked[at + ahead]];
                 for (const int body : {later.first, later.second})
                     prefetch(poses_[body]), prefetch(dv_ext_[body]);
             }
-            if (end - begin == open_.size() && (at + 1) % pairs_a_look == 0) Watch::look();  // on one thread
-            if (const double time = meeting(open_[asked[at]], velocity, late); !(time < 0.0))
+            if (end - begin == open_.pairs.size() && (at + 1) % pairs_a_look == 0)
+                Watch::look();  // on one thread
+            if (const double time = meeting(open_.pairs[asked[at]], velocity, late); !(time < 0.0))
                 meetings_[part].push_back({asked[at], time});
         }
     });
@@ -98,15 +94,15 @@ int ContactStage::find_impacts(const std::vector<Vec6>& velocity, bool late) {
     int found = 0;
     for (std::size_t at = 0; at < all.size(); ++at) {
         if (at + ahead < all.size()) {
-            const OpenPair& later = open_[all[at + ahead].open];
+            const OpenPair& later = open_.pairs[all[at + ahead].open];
             prefetch(detection_.pose(later.pair.first)), prefetch(detection_.pose(later.pair.second));
             for (const int body : {later.first, later.second})
                 prefetch(poses_[body]), prefetch(velocity[body]);
         }
         const auto& [k, time] = all[at];
-        OpenPair& open = open_[k];
+        OpenPair& open = open_.pairs[k];
         if (late && add_toi_point_at_start(open, time, velocity)) {
-            open.first = -1;
+            open_.meet(open);
             ++found;
             continue;
         }
@@ -120,10 +116,9 @@ int ContactStage::find_impacts(const std::vector<Vec6>& velocity, bool late) {
         for (std::size_t i = known; i < points_.size(); ++i)
             points_[i].begun -= dot(points_[i].contact.point.normal, led);
         if (!met) continue;
-        open.first = -1;
+        open_.meet(open);
         ++found;
     }
-    met_ += found;
     return found;
 }
 
@@ -131,7 +126,7 @@ bool ContactStage::meets(const std::vector<Vec6>& next, bool stop_hit, bool rebo
     plastic_first_ = rebounds;  // impacts that a stop's rebound leads to are found again after it
     late_impact_ = false;
     changed_ = bodies_->jointed;  // others have been cast along what they fly with
-    if (outrun(next)) find_open_again();
+    if (margins_.outrun(*bodies_, options_.time_step, next, changed_)) find_open_again();
     const std::size_t closed_points = points_.size();
     int found = find_impacts(next, true);
     if (late_impact_ && stop_hit && !plastic_first_) {  // as are those to a body that it only stops
@@ -162,11 +157,11 @@ bool ContactStage::add_toi_point_at_start(const OpenPair& open, double time,
     if (elsewhere) return false;
     const int a = open.first, b = open.second;
     scratch_.clear();
-    detection_.collide_pair(open.pair, search_[a] + search_[b], scratch_);
+    detection_.collide_pair(open.pair, margins_.search()[a] + margins_.search()[b], scratch_);
     if (scratch_.empty()) return false;
     const Contact& contact = scratch_.front();
     add_point(contact, poses_[a], poses_[b], time);
-    const double closing = relative(points_.back(), contact.point.normal, velocity, false);
+    const double closing = relative_velocity(points_.back(), contact.point.normal, velocity);
     const bool stops = contact.point.gap + options_.time_step * closing < 0.0;
     if (stops) points_.back().at_start = true;
     else points_.pop_back();
@@ -179,7 +174,8 @@ bool ContactStage::add_toi_points(IndexPair pair, const Pose& first, const Pose&
     const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
     const double radius = std::max(bodies_->radius[a], bodies_->radius[b]);
     scratch_.clear();
-    detection_.collide_pair(pair, first, second, std::max(margin_[a] + margin_[b], 2.0 * closed * radius),
+    detection_.collide_pair(pair, first, second,
+                            std::max(margins_.reach()[a] + margins_.reach()[b], 2.0 * closed * radius),
                             scratch_);
     bool met = false;
     for (const Contact& contact : scratch_) {
@@ -187,9 +183,9 @@ bool ContactStage::add_toi_points(IndexPair pair, const Pose& first, const Pose&
             continue;
         add_point(contact, first, second, time);
         Point& point = points_.back();
-        const double closing = -relative(point, contact.point.normal, velocity, false);
+        const double closing = -relative_velocity(point, contact.point.normal, velocity);
         // What forces give to one of them in this step is no impact, though both got it before one was held.
-        const double push = std::max({std::abs(relative(point, contact.point.normal, dv_ext_, false)),
+        const double push = std::max({std::abs(relative_velocity(point, contact.point.normal, dv_ext_)),
                                       std::abs(dot(contact.point.normal, linear(dv_ext_[contact.first]))),
                                       std::abs(dot(contact.point.normal, linear(dv_ext_[contact.second])))});
         if (late && !plastic_first_ && surfaces_->pair(contact).restitution > 0.0 && closing > 4.0 * push) {
@@ -233,7 +229,8 @@ void ContactStage::move_impacts_to_start(std::size_t from, const std::vector<Vec
         const IndexPair pair{static_cast<int>(meeting.key >> (feature_bits + 24)),
                              static_cast<int>(meeting.key >> feature_bits & 0xffffff)};
         scratch_.clear();
-        detection_.collide_pair(pair, search_[meeting.first] + search_[meeting.second], scratch_);
+        detection_.collide_pair(pair, margins_.search()[meeting.first] + margins_.search()[meeting.second],
+                                scratch_);
         const std::size_t old = points_.size();
         bool stops = false;
         // Past an edge, another side is met than the one that is faced at the start; of two that move, surely another.
@@ -255,9 +252,9 @@ void ContactStage::move_impacts_to_start(std::size_t from, const std::vector<Vec
             if (surfaces_->pair(contact).restitution > 0.0)
                 put_on_mover(points_.back(), bodies_->solver_index[contact.first] >= 0,
                              bodies_->solver_index[contact.second] >= 0);
-            stops =
-                stops ||
-                contact.point.gap + h * relative(points_.back(), contact.point.normal, velocity, false) < 0.0;
+            stops = stops || contact.point.gap +
+                                     h * relative_velocity(points_.back(), contact.point.normal, velocity) <
+                                 0.0;
         }
         if (stops) {
             k = end;

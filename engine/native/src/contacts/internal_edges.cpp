@@ -9,6 +9,7 @@
 // first occludes what a body would meet only behind it. And where edges lie on each other, as a body's and a tile's do when
 // a step begins there, both faces are as near: the one it moves past is no obstacle.
 #include <algorithm>
+#include <span>
 
 #include "collision/shape_cast.hpp"
 #include "contacts/contact_geometry.hpp"
@@ -38,24 +39,10 @@ bool meets_side_face(const Mover& one, const Mover& other, double time, Vec3 n) 
 /// When a solve has answered it, as much as iterations that count as settled may have left, or as the depth.
 double ContactStage::depth_at_toi(const Point& point, bool late) const {
     const double h = options_.time_step, depth = std::max(0.0, -point.contact.point.gap);
-    const double sinking = std::max(0.0, -h * relative(point, point.contact.point.normal, velocity_, false));
+    const double sinking =
+        std::max(0.0, -h * relative_velocity(point, point.contact.point.normal, velocity_));
     const double left = options_.solver == SolverKind::iterative ? h * options_.unsettled_residual : 0.0;
     return depth + (late ? std::min(sinking, std::max(depth, left)) : sinking);
-}
-
-/// Puts the points of each body together: what holds it is asked of each that it would meet.
-void ContactStage::index_points() {
-    std::vector<int>& begin = points_begin_;
-    begin.assign(bodies_->solver_index.size() + 2, 0);
-    const auto both = [this](auto&& each) {
-        for (std::size_t k = 0; k < points_.size(); ++k)
-            for (const int b : {points_[k].contact.first, points_[k].contact.second})
-                if (bodies_->solver_index[b] >= 0) each(static_cast<std::size_t>(b), static_cast<int>(k));
-    };
-    both([&](std::size_t b, int) { ++begin[b + 2]; });
-    for (std::size_t b = 2; b < begin.size(); ++b) begin[b] += begin[b - 1];
-    points_of_.resize(static_cast<std::size_t>(begin.back()));
-    both([&](std::size_t b, int k) { points_of_[static_cast<std::size_t>(begin[b + 1]++)] = k; });
 }
 
 /// Whether `body`, that would meet another at `time` [s], does not once it is lifted out of what holds it. `facing` is
@@ -68,13 +55,13 @@ bool ContactStage::is_internal_edge(const Mover& moving, int body, const Mover& 
     const double h = options_.time_step, slop = this->slop(open), least = share * slop;
     const bool by_pgs = options_.solver == SolverKind::iterative;
     if (bodies_->solver_index[body] < 0 || !(iterating_ || by_pgs || depth_[body] > least)) return false;
-    const int end = points_begin_[static_cast<std::size_t>(body) + 1];
-    for (int at = points_begin_[static_cast<std::size_t>(body)]; at < end;) {
-        const std::uint64_t pair = points_[points_of_[at]].contact.key >> feature_bits;
+    const std::span<const int> own = points_of_[body];
+    for (std::size_t at = 0; at < own.size();) {
+        const std::uint64_t pair = points_[own[at]].contact.key >> feature_bits;
         Vec3 n, support_velocity;  // what holds it goes itself, m/s
         double depth = -unbounded, begun = 0.0, sinking = 0.0;
-        for (; at < end && points_[points_of_[at]].contact.key >> feature_bits == pair; ++at) {
-            const Point& point = points_[points_of_[at]];
+        for (; at < own.size() && points_[own[at]].contact.key >> feature_bits == pair; ++at) {
+            const Point& point = points_[own[at]];
             if (point.toi >= 0.0) continue;
             const double gap = point.contact.point.gap, side = point.contact.first == body ? 1.0 : -1.0;
             const double deep = depth_at_toi(point, late);
@@ -120,7 +107,7 @@ bool ContactStage::is_internal_edge(const Mover& moving, int body, const Mover& 
 /// it falls onto a tile, and would be past its edge, below its top, when it came to the next one's side.
 bool ContactStage::occludes(const Meeting& earlier, const Meeting& later, int body,
                             const std::vector<Vec6>& velocity) const {
-    const OpenPair &before = open_[earlier.open], &after = open_[later.open];
+    const OpenPair &before = open_.pairs[earlier.open], &after = open_.pairs[later.open];
     const Pose before_first = moved(before.first, velocity), before_second = moved(before.second, velocity),
                after_first = moved(after.first, velocity), after_second = moved(after.second, velocity);
     const Mover one = mover(before.pair.first, before_first, velocity),
@@ -156,7 +143,7 @@ void ContactStage::remove_occluded(std::vector<Meeting>& meetings, const std::ve
     if (!bodies_->swings || meetings.size() < 2) return;
     meetings_of_.clear();
     for (std::size_t at = 0; at < meetings.size(); ++at)
-        for (const int b : {open_[meetings[at].open].first, open_[meetings[at].open].second})
+        for (const int b : {open_.pairs[meetings[at].open].first, open_.pairs[meetings[at].open].second})
             if (bodies_->solver_index[b] >= 0) meetings_of_.push_back({b, meetings[at].time, at});
     std::sort(meetings_of_.begin(), meetings_of_.end(), [](const MeetingOf& a, const MeetingOf& b) {
         return a.body != b.body ? a.body < b.body : a.time != b.time ? a.time < b.time : a.at < b.at;
@@ -188,14 +175,14 @@ bool ContactStage::skip_grazing(std::size_t from) {
     const double h = options_.time_step;
     std::vector<IndexPair>& gone = arrays_.grazing;
     gone.clear();
-    index_points();
+    points_of_.find(points_, *bodies_);
     for (std::size_t k = from, end = from; k < points_.size(); k = end) {
         const std::uint64_t key = points_[k].contact.key >> feature_bits;
         std::size_t deepest = k;
         double most = 0.0;
         for (; end < points_.size() && points_[end].contact.key >> feature_bits == key; ++end) {
             const Contact& contact = points_[end].contact;
-            const double closing = -relative(points_[end], contact.point.normal, velocity_, false);
+            const double closing = -relative_velocity(points_[end], contact.point.normal, velocity_);
             const double overlap = h * closing - std::max(0.0, contact.point.gap);
             if (overlap > most) most = overlap, deepest = end;
         }
@@ -204,8 +191,8 @@ bool ContactStage::skip_grazing(std::size_t from) {
     }
     for (const IndexPair& pair : gone) {
         const Collider::View one = detection_.collider(pair.first), two = detection_.collider(pair.second);
-        open_.push_back(opened(pair, separation(one.shape, detection_.pose(pair.first), two.shape,
-                                                detection_.pose(pair.second))));
+        open_.pairs.push_back(opened(pair, separation(one.shape, detection_.pose(pair.first), two.shape,
+                                                      detection_.pose(pair.second))));
         std::erase_if(points_,
                       [&](const Point& point) { return point.contact.key >> feature_bits == pair_of(pair); });
     }

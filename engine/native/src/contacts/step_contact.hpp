@@ -1,8 +1,11 @@
 // What a step with contacts knows of its points, and of pairs that may have some yet.
 #pragma once
 
+#include <vector>
+
 #include "collision/detection.hpp"
 #include "collision/shape_cast.hpp"
+#include "contacts/contact_geometry.hpp"
 #include "linear/vec.hpp"
 
 namespace spook {
@@ -34,6 +37,15 @@ struct StepContact {
     double resting_approach() const noexcept { return approach < -rounding ? 0.0 : approach; }
 };
 
+/// How fast the first body moves at a point against the second, along `direction`, m/s. `velocity` is per body of the scene.
+inline double relative_velocity(const StepContact& point, Vec3 direction,
+                                const std::vector<Vec6>& velocity) noexcept {
+    double total = 0.0;
+    total += dot(contact_row(direction, point.first_arm), velocity[point.contact.first]);
+    total -= dot(contact_row(direction, point.second_arm), velocity[point.contact.second]);
+    return total;
+}
+
 /// What else a point has that an impact has pushed, that meets friction where its bodies turn, or whose friction differs with
 /// the direction or is a box.
 struct ContactExtras {
@@ -42,6 +54,25 @@ struct ContactExtras {
     double guessed = -1.0;  // what the box takes where there was no step before, −1 if it has not yet
     Vec3 impact_impulse;
     bool is_anisotropic() const noexcept { return axis_scale[0] != axis_scale[1]; }
+};
+
+class ContactExtrasOf {
+public:
+    const ContactExtras& of(const StepContact& point) const noexcept {
+        static constexpr ContactExtras none{};
+        return point.extras < 0 ? none : extras_[point.extras];
+    }
+    ContactExtras& own(StepContact& point) {
+        if (point.extras < 0) {
+            point.extras = static_cast<int>(extras_.size());
+            extras_.emplace_back();
+        }
+        return extras_[point.extras];
+    }
+    void clear() noexcept { extras_.clear(); }
+
+private:
+    std::vector<ContactExtras> extras_;  // in no order
 };
 
 /// Two that are apart at the start of the step; they may still meet.

@@ -106,7 +106,7 @@ void ContactStage::find_earliest_impacts(MixedSystem& system, std::vector<std::s
     for (const Point& point : points_)
         arrays_.connected.tie(bodies_->solver_index[point.contact.first],
                               bodies_->solver_index[point.contact.second]);
-    for (const OpenPair& open : open_)
+    for (const OpenPair& open : open_.pairs)
         if (!open.has_met())
             arrays_.connected.tie(bodies_->solver_index[open.first], bodies_->solver_index[open.second]);
     const Islands& islands = arrays_.connected.find();
@@ -161,7 +161,7 @@ void ContactStage::find_earliest_impacts(MixedSystem& system, std::vector<std::s
         if (come_in_order(point)) move_to_last_impact(point);
     for (const std::size_t k : hit_points) {
         Point& point = points_[k];
-        point.approach = relative(point, point.contact.point.normal, velocity_, false);
+        point.approach = relative_velocity(point, point.contact.point.normal, velocity_);
         if (point.event && come_in_order(point)) point.bounce = surfaces_->pair(point.contact).restitution;
     }
 }

@@ -10,11 +10,12 @@
 // where what it meets can only push against them, see find_events(). Another body that an impact sends along them, or against
 // them, is let go, and free from then on. What still would be won, at most ½ |k|² by falling in the rest of the step,
 // is paid in height.
+#include "contacts/supported_bodies.hpp"
+
 #include <algorithm>
 #include <cmath>
 
 #include "contacts/contact_geometry.hpp"
-#include "contacts/contact_stage.hpp"
 #include "contacts/tolerances.hpp"
 
 namespace spook {
@@ -23,31 +24,36 @@ namespace {
 
 using namespace tolerances::supported_bodies;
 
+}  // namespace
+
 bool is_along(Vec3 kick, Vec3 velocity) {
     return std::abs(dot(kick, velocity)) > level * norm(kick) * (norm(kick) + norm(velocity));
 }
 
-}  // namespace
-
-/// Takes down which way the forces press the bodies of a closed point, if they do not part faster.
-void ContactStage::note_supports(Point& point) {
-    const int a = point.contact.first, b = point.contact.second;
-    const Vec3 n = point.contact.point.normal;
-    const double first = dot(contact_row(n, point.first_arm), dv_ext_[a]),
-                 second = -dot(contact_row(n, point.second_arm), dv_ext_[b]),
-                 least = pressed_by * (norm(linear(dv_ext_[a])) + norm(linear(dv_ext_[b])));
-    point.approach = relative(point, n, velocity_, false);
-    point.dv_ext = first + second;
-    const auto presses = [&](double push) { return push < -least && point.approach + push < 0.0; };
-    const bool both =
-        bodies_->solver_index[a] >= 0 && bodies_->solver_index[b] >= 0 && presses(first + second);
-    support_pairs_.push_back({a, b, both || presses(first), both || presses(second), both});
+void SupportedBodies::begin(std::size_t bodies) {
+    supported_.assign(bodies, 0);
+    pairs_.clear();
+    impulse_dv_.assign(bodies, Vec6{});
 }
 
-/// Leaves those in supported_ that are supported.
-void ContactStage::find_supported() {
-    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b)
-        supported_[b] = supported_[b] && (bodies_->solver_index[b] < 0 || bodies_->jointed[b]);
+void SupportedBodies::note(StepContact& point, const ContactBodies& bodies, const std::vector<Vec6>& velocity,
+                           const std::vector<Vec6>& dv_ext) {
+    const int a = point.contact.first, b = point.contact.second;
+    const Vec3 n = point.contact.point.normal;
+    const double first = dot(contact_row(n, point.first_arm), dv_ext[a]),
+                 second = -dot(contact_row(n, point.second_arm), dv_ext[b]),
+                 least = pressed_by * (norm(linear(dv_ext[a])) + norm(linear(dv_ext[b])));
+    point.approach = relative_velocity(point, n, velocity);
+    point.dv_ext = first + second;
+    const auto presses = [&](double push) { return push < -least && point.approach + push < 0.0; };
+    const bool both = bodies.moves(a) && bodies.moves(b) && presses(first + second);
+    pairs_.push_back({a, b, both || presses(first), both || presses(second), both});
+    supported_[a] = supported_[b] = 1;
+}
+
+void SupportedBodies::find(const ContactBodies& bodies) {
+    for (std::size_t b = 0; b < bodies.count(); ++b)
+        supported_[b] = supported_[b] && (!bodies.moves(static_cast<int>(b)) || bodies.jointed[b]);
     const auto carry = [this](const SupportPair& at) {
         char &first = supported_[at.first], &second = supported_[at.second];
         const bool more = (at.first_presses && !first && (second || at.both)) ||
@@ -58,66 +64,40 @@ void ContactStage::find_supported() {
     };
     for (bool more = true; more;) {  // there and back: most heaps are numbered from below
         more = false;
-        for (auto at = support_pairs_.begin(); at != support_pairs_.end(); ++at) more = carry(*at) || more;
+        for (auto at = pairs_.begin(); at != pairs_.end(); ++at) more = carry(*at) || more;
         if (!more) break;
         more = false;
-        for (auto at = support_pairs_.rbegin(); at != support_pairs_.rend(); ++at) more = carry(*at) || more;
+        for (auto at = pairs_.rbegin(); at != pairs_.rend(); ++at) more = carry(*at) || more;
     }
 }
 
-/// Whether a body that is supported, or jointed, moves along the forces.
-bool ContactStage::moves_along_forces(int body) const {
-    return (supported_[body] || bodies_->jointed[body]) &&
-           is_along(linear(dv_ext_[body]), linear(velocity_[body]));
-}
-
-/// Whether a point is an impact of what stands still that pushes the other one against the forces.
-bool ContactStage::pushes_against_forces(const Point& point) const {
+bool pushes_against_forces(const StepContact& point, const ContactBodies& bodies,
+                           const std::vector<Vec6>& dv_ext) {
     const int a = point.contact.first, b = point.contact.second;
-    if (point.toi < 0.0 || std::min(bodies_->solver_index[a], bodies_->solver_index[b]) >= 0) return false;
+    if (point.toi < 0.0 || std::min(bodies.solver_index[a], bodies.solver_index[b]) >= 0) return false;
     const Vec3 n = point.contact.point.normal;
-    return bodies_->solver_index[a] >= 0 ? dot(n, linear(dv_ext_[a])) < 0.0
-                                         : dot(n, linear(dv_ext_[b])) > 0.0;
+    return bodies.solver_index[a] >= 0 ? dot(n, linear(dv_ext[a])) < 0.0 : dot(n, linear(dv_ext[b])) > 0.0;
 }
 
-/// A supported body that an impact sends along the forces, or against them: until then its support took its kick.
-void ContactStage::release_support(int body, const Vec6& velocity) {
-    if (event_time_[body] < 0.0 || toi_fraction_[body] > 0.0 || !(supported_[body] || bodies_->jointed[body]))
-        return;
-    const Vec3 kick = linear(dv_ext_[body]), before = linear(velocity_[body]);
-    if (is_along(kick, before) || !is_along(kick, linear(velocity) - before)) return;
+void SupportedBodies::release(int body, double part, const Vec6& dv_ext) {
     supported_[body] = 0;
-    toi_fraction_[body] = part_of_forces(event_time_[body] / options_.time_step, surfaces_->rebounds);
-    for (int i = 0; i < 6; ++i) support_impulse_dv_[body][i] = toi_fraction_[body] * dv_ext_[body][i];
-    for (double& k : dv_ext_[body]) k *= 1.0 - toi_fraction_[body];
+    for (int i = 0; i < 6; ++i) impulse_dv_[body][i] = part * dv_ext[i];
 }
 
-/// What a supported body of an event that falls in the rest of the step is to go besides, m/s: it falls for all of it, or it
-/// would have the speed of a fall and not have lost the height.
-Vec3 ContactStage::free_fall_correction(int body, Vec3 after) const {
-    const Vec3 k = linear(dv_ext_[body]), change = after - linear(velocity_[body]);
-    if (!supported_[body] || !(dot(k, k) > 0.0)) return {};
-    const double won = event_time_[body] / options_.time_step * dot(k, after - linear(predicted_[body])) -
-                       0.5 * dot(change, change);
-    return won > 0.0 ? (won / dot(k, k)) * k : Vec3{};
+bool SupportedBodies::has_released() const noexcept {
+    return std::any_of(impulse_dv_.begin(), impulse_dv_.end(), [](const Vec6& k) { return k != Vec6{}; });
 }
 
-/// Books what supports took of the kicks of those they let go: forces add up to the momentum where an island leans on what
-/// does not move by itself.
-void ContactStage::apply_support_impulses(const MixedSystem& system) {
-    if (std::none_of(support_impulse_dv_.begin(), support_impulse_dv_.end(),
-                     [](const Vec6& k) { return k != Vec6{}; }))
-        return;
-    const Islands& islands = connected(system, 0);
-    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b) {
-        if (support_impulse_dv_[b] == Vec6{}) continue;
-        const Vec3 momentum = system.mass[bodies_->solver_index[b]][0] * linear(support_impulse_dv_[b]);
-        for (CachedContact& cached : state_.cache.points) {
-            const int first = bodies_->solver_index[cached.contact.first],
-                      second = bodies_->solver_index[cached.contact.second];
-            if (std::min(first, second) >= 0 || !bodies_->is_closed(cached.contact)) continue;
-            if (islands.of_body[std::max(first, second)] != islands.of_body[bodies_->solver_index[b]])
-                continue;
+void SupportedBodies::book(const MixedSystem& system, const Islands& islands, const ContactBodies& bodies,
+                           std::vector<CachedContact>& cache) const {
+    for (std::size_t b = 0; b < bodies.count(); ++b) {
+        if (impulse_dv_[b] == Vec6{}) continue;
+        const Vec3 momentum = system.mass[bodies.solver_index[b]][0] * linear(impulse_dv_[b]);
+        for (CachedContact& cached : cache) {
+            const int first = bodies.solver_index[cached.contact.first],
+                      second = bodies.solver_index[cached.contact.second];
+            if (std::min(first, second) >= 0 || !bodies.is_closed(cached.contact)) continue;
+            if (islands.of_body[std::max(first, second)] != islands.of_body[bodies.solver_index[b]]) continue;
             cached.impulse += first >= 0 ? -momentum : momentum;
             break;
         }

@@ -210,9 +210,9 @@ void RigidSystem::judge_pgs() {
 
 /// Takes over what the contact stage has found of its last solve.
 void RigidSystem::judge_contacts() {
-    residual_ = std::max(residual_, contacts_->residual());
-    if (contacts_->unsettled_body() >= 0)
-        note_unsettled(contacts_->unsettled_body(), contacts_->unsettled_by(), contacts_->unsettled_sunk());
+    const SolveQuality& found = contacts_->quality();
+    residual_ = std::max(residual_, found.residual);
+    if (found.body >= 0) note_unsettled(found.body, found.by, found.sunk);
 }
 
 void RigidSystem::note_unsettled(int body, double residual, bool sunk) {

@@ -1,0 +1,47 @@
+// How far the solves of a step have left their rows from their law, and which body is to be named for it.
+#pragma once
+
+#include <vector>
+
+#include "contacts/contact_arrays.hpp"
+#include "contacts/contact_bodies.hpp"
+#include "contacts/contact_options.hpp"
+#include "contacts/step_contact.hpp"
+#include "linear/large_array.hpp"
+
+namespace spook {
+
+struct SolveQuality {
+    double residual = 0.0;  // the last solve's or impact's rows_residual(), m/s
+    int body = -1;          // whose rows it left further from their law than `unsettled_residual`; −1: none
+    double by = 0.0;        // m/s
+    bool sunk = false;      // no row is off, but the body was left in another
+};
+
+/// What a solve is judged by: bodies and v before it, points, and how deep pairs overlapped where the run began.
+struct JudgedStep {
+    const ContactBodies& bodies;
+    const ContactOptions& options;
+    const std::vector<Vec6>& velocity;
+    const LargeArray<StepContact>& points;
+    const DepthOfPair& initial_penetration;
+};
+
+/// What a compliant contact was pressed in by while it was one, and rounding, m.
+inline double elastic_depth(const ContactBodies& bodies, const StepContact& point) noexcept {
+    return point.compression_before + bodies.slack(point.contact);
+}
+
+/// Takes down a row of the body of that solver index that is off by more than the method allows.
+void blame(SolveQuality& quality, const JudgedStep& step, double residual, int solver_index);
+/// Iterations that stop early let bodies sink by little each, in a tall stack step after step: no row is far off, and the
+/// load is not borne. What the projection could not lift again shows it.
+void blame_sunk(SolveQuality& quality, const JudgedStep& step);
+
+SolveQuality judge(const JudgedStep& step, const MixedSystem& system,
+                   const std::vector<FrictionPoint>& points, const FrictionReport& report);
+/// The same of an impact whose solve stopped at a limit; of several solves, as they follow each other in a step, the worst.
+void judge_impact(SolveQuality& quality, const JudgedStep& step, const MixedSystem& hit,
+                  const std::vector<FrictionPoint>& points, FrictionModel model);
+
+}  // namespace spook
