@@ -12,13 +12,13 @@ SOURCES = Path(__file__).parent.parent / "engine/native/src"
 MOST_MEMBERS, MOST_METHODS = 30, 40
 LARGER = {  # members and methods of those that are over: lower a number that has become smaller
     "contacts/ConeFour": (37, 4),
-    "contacts/ContactStage": (60, 113),
+    "contacts/ContactStage": (59, 111),
     "contacts/PgsSolver": (49, 44),
     "contacts/PivotSolver": (32, 14),
     "particles/ParticleSystem": (17, 46),
     "rigid/JointSet": (15, 53),
     "rigid/JointSpec": (38, 0),
-    "rigid/RigidSystem": (99, 204),
+    "rigid/RigidSystem": (99, 203),
 }
 OPENS = re.compile(r"\b(class|struct)\s+(?:alignas\([^)]*\)\s*)?([\w:]+)(?:\s+final)?(?:\s*:\s*[^{;]*)?\s*$")
 NO_MEMBER = re.compile(

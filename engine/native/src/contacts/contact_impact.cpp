@@ -230,13 +230,6 @@ bool ContactStage::needs_stop_impact(const MixedSystem& system, std::size_t know
     return true;
 }
 
-/// Whether what was found leads past the far end of some stop: it needs a row before this step can be solved.
-bool ContactStage::pass_other_ends(const MixedSystem& system, std::size_t joints) {
-    for (std::size_t k = 0; k < joints; ++k)
-        ends_passed_ = ends_passed_ || passes_other_end(system.rows[k], system.velocity, options_.time_step);
-    return ends_passed_;
-}
-
 /// The rows of joints as an impact sees them, of those that are connected to a point that is hit, or that have a stop
 /// which is hit beside a point: what is far from any does not know of it.
 void ContactStage::take_part(MixedSystem& system, const std::vector<std::size_t>& hit_points,

@@ -212,9 +212,7 @@ void ContactStage::warm_start_by_pgs(MixedSystem& system, std::size_t known, int
     }
 }
 
-/// `unfinished`: it ends unfinished, since few joints and contacts are better solved by rows, and directly if need be; or the
-/// iterations run away.
-bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
+ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
     pgs_.start(system, options_.friction);
     next_.clear();
     late_impact_ = false;
@@ -240,14 +238,15 @@ bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
             if (!report.finite || (grows && runs_away(system))) {
                 points_.resize(begun);  // what was met on that way is not
                 find_open();
-                return unfinished = ran_away_ = true;
+                ran_away_ = true;
+                return {{}, true};
             }
             if (turn + 1 >= joint_turns && end.joint_is_worst) break;
         }
         pgs_.write(system);
         if (!report.finite) break;
         if (!late_impact_) {
-            if (needs_stop_impact(system, begun, next_)) return true;
+            if (needs_stop_impact(system, begun, next_)) return {};
             break;
         }
         late_impact_ = false;  // it was one by velocities on the way
@@ -256,16 +255,17 @@ bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
         changed_.assign(bodies_->solver_index.size(), 1);
         const std::size_t known = points_.size();
         if (find_impacts(next_, true) > 0) move_impacts_to_start(known, next_);
-        if (needs_plastic_impact() || needs_stop_impact(system, begun, next_)) return true;
+        if (needs_plastic_impact() || needs_stop_impact(system, begun, next_)) return {};
         if (late_impact_) find_deferred_impacts(next_);
         again = points_.size() > known;
         if (again) take_in(known);
     }
-    if (report.finite && pass_other_ends(system, system.rows.size())) return true;
-    unfinished = report.finite && !report.converged && (state_.by_rows || quality_.body >= 0) &&
-                 !system.rows.empty() && system.rows.size() + points_.size() <= few_rows;
+    if (report.finite && passes_other_ends(system, system.rows.size(), options_.time_step))
+        return {{.ends_passed = true}};
+    const bool unfinished = report.finite && !report.converged && (state_.by_rows || quality_.body >= 0) &&
+                            !system.rows.empty() && system.rows.size() + points_.size() <= few_rows;
     state_.by_rows = state_.by_rows || unfinished;
-    if (unfinished) return true;
+    if (unfinished) return {{}, true};
     state_.counters.unsettled += !report.converged;
 
     std::vector<double>& share = arrays_.share;
@@ -302,7 +302,7 @@ bool ContactStage::solve_by_pgs(MixedSystem& system, bool& unfinished) {
     }
     if (report.finite) correct_events(system);
     order_by_key(state_.cache.points, unordered_, places_);
-    return report.finite;
+    return {{.finite = report.finite}};
 }
 
 }  // namespace spook

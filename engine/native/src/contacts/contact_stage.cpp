@@ -159,14 +159,12 @@ RowBlock ContactStage::resting_row(Point& point) const {
     return block;
 }
 
-bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity) {
+ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity) {
     const std::size_t joints = system.rows.size();
     velocity_ = velocity;
-    warm_started_ = ends_passed_ = ran_away_ = false;
+    warm_started_ = ran_away_ = false;
     if (options_.solver == SolverKind::iterative && !surfaces_->resists_turning) {
-        bool unfinished = false;
-        const bool finite = solve_by_pgs(system, unfinished);
-        if (!unfinished) return finite;
+        if (const PgsSolveEnd end = solve_by_pgs(system); !end.unfinished) return end;
     }
     std::vector<FrictionPoint>& friction = arrays_.friction;
     std::vector<Vec6>& next = next_;
@@ -208,10 +206,10 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         const std::size_t dissipated_energy = points_.size();
         late_impact_ = false;
         if (find_impacts(next, true) > 0) move_impacts_to_start(dissipated_energy, next);
-        if (needs_plastic_impact() || needs_stop_impact(system, known, next)) return true;
+        if (needs_plastic_impact() || needs_stop_impact(system, known, next)) return {};
         if (late_impact_) find_deferred_impacts(next);
         if (points_.size() == known) {
-            if (pass_other_ends(system, joints)) return true;
+            if (passes_other_ends(system, joints, options_.time_step)) return {.ends_passed = true};
             break;
         }
         state_.counters.contacts += points_.size() - known;
@@ -245,7 +243,7 @@ bool ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity)
         std::copy_n(extras_.of(point).turning, 3, cached.turning);
     }
     if (report.finite) correct_events(system);
-    return report.finite;
+    return {.finite = report.finite};
 }
 
 /// What a solve found for a point, along world tangents: it may have turned its own. Gives the impulse along the surface.

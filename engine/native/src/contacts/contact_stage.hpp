@@ -107,14 +107,16 @@ public:
     /// moving kinematic bodies: that of the rest).
     void impact(MixedSystem& system);
 
+    struct SolveEnd {
+        bool finite = true;
+        /// The solve leads past the end of some joint's stop whose row is that of its other end, and stops unfinished: it is
+        /// to be solved again with rows for both.
+        bool ends_passed = false;
+    };
     /// The resting stage. `system` holds mass, momentum M v + h f (less the lead) and rows of joints, `velocity` is
-    /// v after the impact. Appends rows of contacts behind those of joints; fills velocity and multipliers.
-    /// False if a value was not finite. It ends unfinished where ends_passed().
-    bool solve(MixedSystem& system, const std::vector<Vec6>& velocity);
-
-    /// Whether the solve leads past the end of some joint's stop whose row is that of its other end: it is to be solved
-    /// again with rows for both.
-    bool ends_passed() const noexcept { return ends_passed_; }
+    /// v after the impact. Appends rows of contacts behind those of joints; fills velocity and multipliers. It ends
+    /// unfinished, too, where an impact is needed first.
+    SolveEnd solve(MixedSystem& system, const std::vector<Vec6>& velocity);
 
     /// Velocity to add to v₊ when positions advance, per moving body; empty when there is none. It leads an event's
     /// bodies to where they are at the step's end.
@@ -225,7 +227,6 @@ private:
     bool is_hit(const RowBlock& block) const noexcept;
     bool stop_is_hit(const MixedSystem& system) const;
     bool needs_stop_impact(const MixedSystem& system, std::size_t known, const std::vector<Vec6>& next);
-    bool pass_other_ends(const MixedSystem& system, std::size_t joints);
     void find_earliest_impacts(MixedSystem& system, std::vector<std::size_t>& hit_points);
     void find_orderly(const Islands& islands, const std::vector<double>& first,
                       const std::vector<double>& closing);
@@ -263,7 +264,11 @@ private:
     double compression(const MixedSystem& system, const Point& point) const;
     Vec3 store_solution(const RowBlock& block, Point& point);
     // contact_pgs.cpp: the same by PGS over compact contacts
-    bool solve_by_pgs(MixedSystem& system, bool& unfinished);
+    struct PgsSolveEnd : SolveEnd {
+        bool unfinished =
+            false;  // few joints and contacts are better solved by rows, or the iterations run away
+    };
+    PgsSolveEnd solve_by_pgs(MixedSystem& system);
     void warm_start_by_pgs(MixedSystem& system, std::size_t known, int round);
     struct Unanswered {
         std::vector<int> island;          // of each point
@@ -340,7 +345,6 @@ private:
     bool iterating_ = false;      // PGS goes on: what bodies do so far is not final
     bool late_impact_ = false;    // an impact found after the solve needs an impact
     bool plastic_first_ = false;  // plastic impacts are met in the impact as well
-    bool ends_passed_ = false;    // by the last solve
     int impact_rounds_ = 0;
     SolveQuality quality_;
 };

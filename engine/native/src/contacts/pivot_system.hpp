@@ -96,6 +96,13 @@ inline bool passes_other_end(const RowBlock& block, const std::vector<Vec6>& vel
     return (low ? way : -way) > std::max(0.0, stop.room) + passed * stop.range;
 }
 
+/// Whether one of the first `joints` blocks of rows does: it needs a row for that end before the step can be solved.
+inline bool passes_other_ends(const MixedSystem& system, std::size_t joints, double time_step) noexcept {
+    for (std::size_t k = 0; k < joints; ++k)
+        if (passes_other_end(system.rows[k], system.velocity, time_step)) return true;
+    return false;
+}
+
 /// wᵢ = (G v)ᵢ + Sigᵢ zᵢ − rᵢ.
 inline double row_residual(const RowBlock& block, int i, const std::vector<Vec6>& velocity) noexcept {
     return row_velocity(block, i, velocity) + block.softness[i] * block.multiplier[i] - block.right[i];

@@ -84,7 +84,6 @@ public:
     }
 
     void reset(StageClock* clock);
-    void set_clock(StageClock* clock) noexcept { clock_ = clock; }
     RigidSolver solver() const noexcept { return solver_; }
     void count(RunReport& report, std::int64_t steps) const;
     using Unsettled = spook::Unsettled;

@@ -38,7 +38,7 @@ void RigidSystem::solve_mixed(bool touching) {
         return touching && stages_.runs(Stage::impact) && contacts_->impact_needed(mixed_);
     };
     const Stage solver = stages_.runs(Stage::solve_iterative) ? Stage::solve_iterative : Stage::pivot;
-    bool finite = true;
+    ContactStage::SolveEnd end;
     scratch_.other_ends.clear();
     int corrected = 0;
     const auto to_correct = [&] { return curved_ && corrected++ < method_.corrections; };
@@ -49,13 +49,14 @@ void RigidSystem::solve_mixed(bool touching) {
         if (clock_ && touching) clock_->mark(Stage::impact);
         fill_momenta(true);
         if (clock_) clock_->mark(Stage::assemble_rows);
-        finite = touching ? contacts_->solve(mixed_, scratch_.velocities) : solve_joints();
+        if (touching) end = contacts_->solve(mixed_, scratch_.velocities);
+        else end.finite = solve_joints();
         if (clock_) clock_->mark(solver);
-    } while (finite && (impact_needed() || ((!touching || contacts_->ends_passed()) && find_other_ends()) ||
-                        to_correct()));  // the solve may find some that is to come first
+    } while (end.finite && (impact_needed() || ((!touching || end.ends_passed) && find_other_ends()) ||
+                            to_correct()));  // the solve may find some that is to come first
     if (touching) judge_contacts();
     else if (solver_ == RigidSolver::iterative) judge_pgs();
-    if (!finite) {
+    if (!end.finite) {
         live_.not_solved = constrained_.front();
         return;
     }
