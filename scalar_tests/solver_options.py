@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random
 
 import numpy as np
@@ -9,6 +10,7 @@ import numpy as np
 from spook_tracker.engine import (
     Box,
     ConstraintForce,
+    ContactForce,
     Energy,
     Final,
     Material,
@@ -17,6 +19,7 @@ from spook_tracker.engine import (
     Position,
     RigidBody,
     Scene,
+    Sphere,
     Trace,
     Velocity,
 )
@@ -51,6 +54,13 @@ DRAWN = (1e-4, 3e-4, 1e-3, 2e-3, 2.5e-3, 3e-3, 1e-2, 1e-1)
 SEARCHED = 1e-3
 FLOORS = (1e-16, 1e-14, 1e-10, 1e-8)  # from 1e-6 on the hinges share the door as they like
 THRESHOLDS = (0.3, 0.1, 0.03, 0.01)  # m/s, below what ten sweeps leave by themselves, 0.17, but for the first
+STACKED, LYING = 5, 3.0  # boxes, s
+SLEEPY = Method(sleep_speed=0.02)
+AFTER = SLEEPY.sleep_after  # s
+RADIUS = 0.1  # m, of the ball
+SLOPE = math.radians(30.0)
+PULL = GRAVITY * math.sin(SLOPE)  # m/s², along it
+FINE = TIME_STEP / 4.0  # s, on the slope
 ROUGH = Material(friction=0.5)
 FLOOR = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=ROUGH)
 
@@ -126,6 +136,61 @@ def _floored(simulate: Simulate) -> dict[str, float]:
     return {"split_of_floors": worst}
 
 
+def stack() -> Scene:
+    """Boxes of 1 kg one on the other, at rest."""
+    boxes = tuple(
+        RigidBody(
+            name=f"box {k}", mass=1.0, shape=Box((1.0,) * 3), position=(0.0, 0.0, 0.5 + k), material=ROUGH
+        )
+        for k in range(STACKED)
+    )
+    return Scene(bodies=(FLOOR, *boxes), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def thrown(speed: float, slope: float = 0.5 * math.pi) -> Scene:
+    """A ball on its way straight up, or up a smooth slope [rad]; x is up the slope."""
+    ball = RigidBody(
+        name="ball", mass=1.0, shape=Sphere(RADIUS), position=(0.0, 0.0, RADIUS), velocity=(speed, 0.0, 0.0)
+    )
+    ground = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
+    return Scene(bodies=(ground, ball), gravity=(-GRAVITY * math.sin(slope), 0.0, -GRAVITY * math.cos(slope)))
+
+
+def _asleep(simulate: Simulate) -> dict[str, float]:
+    """What lies keeps its place and its weight, and what flies is left alone."""
+    observe = {"x": Trace(quantity=Position()), "load": Final(quantity=ContactForce("floor"))}
+    result = simulate(stack(), time_step=TIME_STEP, duration=LYING, method=SLEEPY, observe=observe)
+    late = result["x"][result.sample_times["x"] > AFTER + 2.0 * TIME_STEP]
+    flight = {"x": Trace(quantity=Position("ball"))}
+    flown, free = (
+        simulate(thrown(4.0), time_step=TIME_STEP, duration=1.0, method=method, observe=flight)["x"]
+        for method in (Method(sleep_speed=3.0), Method())
+    )
+    return {
+        "awake": STACKED - float(result.counters.get("asleep", 0)),
+        "moved_asleep": float(np.abs(late - late[-1]).max()),
+        "load_asleep": float(abs(result["load"][2]) / (STACKED * GRAVITY) - 1.0),
+        "held_in_flight": float(np.abs(flown - free).max()),
+    }
+
+
+def comes_down(simulate: Simulate, slow: float) -> bool:
+    """Whether a ball thrown up the slope at twice the speed at which bodies sleep [m/s] comes down again."""
+    result = simulate(
+        thrown(2.0 * slow, SLOPE),
+        time_step=FINE,
+        duration=2.0 * slow / PULL + AFTER,
+        method=Method(sleep_speed=slow),
+        observe={"v": Final(quantity=Velocity("ball"))},
+    )
+    return bool(result["v"][0] < 0.0)
+
+
+def laziest(simulate: Simulate) -> BreakPoint:
+    """The largest sleep speed [m/s] with which a ball is not put to sleep where it turns back on a smooth slope."""
+    return break_point(lambda slow: comes_down(simulate, slow), 0.1, 20.0, resolution=1e-3, walk=9)
+
+
 def tightest(simulate: Simulate) -> BreakPoint:
     """The smallest cap of a correction that leaves the pendulum alone, to the bit."""
     usual = _swung(simulate, Method().correction_cap)
@@ -167,18 +232,24 @@ def _none(name: str, description: str, unit: str, source: str) -> Metric:
 TEST = ScalarTest(
     title="Options of the solver",
     question="Do options that shall only save work, or only report, leave the answer alone?",
-    why="Threads and guards are set once and trusted. One that changes an answer a little is never suspected.",
-    model="A heap of boxes, a pendulum and a door, with one option turned at a time.",
+    why="Threads, sleeping and guards are set once and trusted. One that changes an answer a little is never suspected.",
+    model="A heap of boxes, a stack, a thrown ball, a pendulum and a door, with one option turned at a time.",
     parameters=(
         ("threads", "1 against 2 and 4: 216 boxes fall together, more than 512 contacts, 20 sweeps"),
         ("unsettled_residual", "0.3 to 0.01 m/s, 30 boxes fall together, 10 sweeps"),
         ("correction_cap", "0.03 to 1, a pendulum that bends 0.003 a step"),
+        (
+            "sleep_speed",
+            f"{SLEEPY.sleep_speed} m/s for {AFTER} s: five boxes; 3 m/s: a ball thrown up at 4 m/s; up a smooth slope of 30°",
+        ),
         ("floor", "1e-16 to 1e-8, a door of 45 kg on five hinges of compliance 0"),
         ("time step", "1/60 s"),
     ),
     theory=(
         "Work shared among threads is the same work. A cap that nothing reaches caps nothing: a pendulum let go level departs "
         "from its chord by (v h)²/(2 l), g h² where it is fastest.",
+        "What falls freely is not at rest at the top. On a smooth slope it is slower than s for 2 s/(g sin α): with s below half "
+        "of g sin α times sleep_after it does not sleep.",
         "A threshold is kept by more sweeps where that can be; a run within it is settled.",
     ),
     reference="The same scene without the option, to the bit; statics.",
@@ -229,6 +300,34 @@ TEST = ScalarTest(
             "caps",
         ),
         ask(
+            _asleep,
+            (
+                _none("awake", "boxes of the stack awake after 3 s", "1", "they lie still from the start"),
+                _none(
+                    "moved_asleep",
+                    "largest move of a box of the stack once asleep",
+                    "m",
+                    "a sleeping body keeps every bit",
+                ),
+                error(
+                    "load_asleep",
+                    "relative error of the floor's load",
+                    "1",
+                    1e-9,
+                    "the weight, as it was last",
+                ),
+                _none(
+                    "held_in_flight",
+                    "largest change of a ball's path by sleeping",
+                    "m",
+                    "what nothing holds is not at rest, however slow it is at its top",
+                ),
+            ),
+            "A stack lies, a ball flies.",
+            TIME_STEP,
+            "sleeping",
+        ),
+        ask(
             _floored,
             (
                 error(
@@ -258,6 +357,16 @@ TEST = ScalarTest(
             expected=((1.0 - BEND) * BEND, (1.0 + BEND + 1.1 * SEARCHED) * BEND),
             expected_source="(v h)²/(2 l) with v² = 2 g l at the bottom, more or less by what is left of its next order, g h²/l of it; "
             "the search ends 0.1 % above it at most",
+        ),
+        StabilityStudy(
+            name="laziest",
+            title="Largest sleep speed with which a ball is not put to sleep where it turns back on a slope",
+            configuration="sleeping",
+            definition="thrown up a smooth slope of 30° at twice that speed, it comes down again",
+            study=laziest,
+            unit="m/s",
+            expected=(0.5 * PULL * (AFTER - 2.0 * FINE), 0.5 * PULL * (AFTER + 2.0 * FINE)),
+            expected_source="2 s/(g sin α) = sleep_after, counted in steps of 1/240 s, two at most more or less",
         ),
         unbroken(
             told,

@@ -58,6 +58,17 @@ def test_every_scene_that_breaks_has_one_band_from_theory_at_least() -> None:
     assert without == []
 
 
+def test_every_scene_is_asked_in_two_directions() -> None:
+    """Its stiff and its extreme one; a map has both."""
+    alone = [
+        name
+        for name, test in CATALOGUE.items()
+        if len(test.stability) < 2
+        and not any(isinstance(study.study(engine.simulate), StabilityMap) for study in test.stability)
+    ]
+    assert alone == []
+
+
 def test_every_ladder_compares_two_configurations_at_least() -> None:
     alone = [
         f"{name}: {ladder.name}"
