@@ -61,7 +61,7 @@ RowBlock ContactStage::row_block(const Point& point, int rows) const {
     for (int i = 0; i < block.size; ++i) {
         if (block.first >= 0) block.first_jacobian[i] = contact_row(directions[i], point.first_arm);
         if (block.second >= 0) block.second_jacobian[i] = contact_row(-directions[i], point.second_arm);
-        block.right[i] = -relative_velocity(point, directions[i], drive_.prescribed());
+        block.right[i] = drive_.any() ? -relative_velocity(point, directions[i], drive_.prescribed()) : -0.0;
         if (i > 0) block.right[i] -= surface_speed(point, directions[i]);
     }
     block.lower[0] = 0.0;
