@@ -84,8 +84,8 @@ bool LoadDependentBounds::follow_tyre(int tyre, MixedSystem& solved, JointSet& j
     const Slip slip(of, rows, state.slides, solved.velocity);
     const bool free = rows.upper[1] == unbounded || rows.upper[2] == unbounded;
     const double now = free && slip.total > 0.0 ? state.slides / slip.total : 0.0;  // 1/|F|
-    double may = slip.load,
-           next = 1.0;  // |F| that it may have; a wheel that its own friction lifts goes half the way
+    // |F| that it may have. A wheel that its own friction lifts would be let go and caught in turn: it goes half the way.
+    double may = slip.load, next = 1.0;
     if (round_ > PATIENT) may = 0.5 * (may + length_over(rows, of.friction));
     if (may > 0.0 && slip.total > may) {
         next = slip.total / may;
