@@ -33,6 +33,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.heavier import heavier
 from spook_tracker.scalar_tests.sweep import line, told
 
 GRAVITY = 9.81  # m/s²
@@ -80,20 +81,19 @@ def nodes(count: int) -> list[tuple[float, float]]:
 
 
 @functools.cache
-def scene(count: int, whole: float = MASS) -> Scene:
-    """Thin rods on ball joints, at rest where statics puts them; `whole` [kg] is the mass of all."""
+def scene(count: int) -> Scene:
+    """Thin rods on ball joints, at rest where statics puts them."""
     length, places = LENGTH / count, nodes(count)
     rods, joints = [], []
-    across = whole / count * length**2 / 12.0
     for k, angle in enumerate(angles(count, horizontal(count))):
         (x, z), (u, w) = places[k], places[k + 1]
         turn = 0.5 * (0.5 * math.pi - angle)  # the rod lies along its z axis
         rods.append(
             RigidBody(
                 name=f"link {k}",
-                mass=whole / count,
+                mass=MASS / count,
                 shape=Capsule(0.02, length - 0.04),
-                inertia=(across, across, 1e-5 * whole / MASS),
+                inertia=(MASS / count * length**2 / 12.0, MASS / count * length**2 / 12.0, 1e-5),
                 position=(0.5 * (x + u), 0.0, 0.5 * (z + w)),
                 orientation=(math.cos(turn), 0.0, math.sin(turn), 0.0),
             )
@@ -132,7 +132,9 @@ def hangs(simulate: Simulate, whole: float) -> bool:
         "x": MaximumAbsolute(quantity=Position(), from_start=True),
         "force": Final(quantity=ConstraintForce("joint 0")),
     }
-    result = simulate(scene(10, whole), time_step=TIME_STEP, duration=DURATION, observe=observe)
+    result = simulate(
+        heavier(scene(10), whole / MASS), time_step=TIME_STEP, duration=DURATION, observe=observe
+    )
     pull = -float(result["force"][0]) * MASS / whole
     return result.completed and float(result["x"].max()) < 1e-9 and abs(pull / horizontal(10) - 1.0) < 1e-9
 

@@ -42,6 +42,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.heavier import heavier
 from spook_tracker.scalar_tests.sweep import line, told
 
 LENGTH, MASS, THICK = 10.0, 5.0, 0.004  # m, kg, m: of the whole rope, however many links it has
@@ -61,10 +62,10 @@ def middle_pull() -> float:
 
 
 @functools.cache
-def rope(count: int, spin: float = SPIN, nudge: float = 0.0, whole: float = MASS) -> Scene:
+def rope(count: int, spin: float = SPIN, nudge: float = 0.0) -> Scene:
     """Thin rods on ball joints in a straight line along x, which turns about its middle; nothing else acts. `nudge` [rad/s]
-    tilts every other rod up and down; `whole` [kg] is the mass of all."""
-    length, mass = LENGTH / count, whole / count
+    tilts every other rod up and down."""
+    length, mass = LENGTH / count, MASS / count
     across = mass * length**2 / 12.0
     links = []
     for k in range(count):
@@ -201,7 +202,7 @@ def fastest(simulate: Simulate) -> BreakPoint:
 def pulls(simulate: Simulate, whole: float) -> bool:
     """Whether forty links of that mass [kg] pull in their middle as Σ m ω² x asks, after thirty steps."""
     observe = {"pull": Final(quantity=ConstraintForce("joint 20"))}
-    result = simulate(rope(40, whole=whole), time_step=TIME_STEP, steps=30, observe=observe)
+    result = simulate(heavier(rope(40), whole / MASS), time_step=TIME_STEP, steps=30, observe=observe)
     pull = float(np.linalg.norm(result["pull"][:3])) * MASS / whole
     return result.completed and abs(pull / middle_pull() - 1.0) < 10.0 * (SPIN * TIME_STEP) ** 2
 

@@ -351,7 +351,9 @@ TEST = ScalarTest(
             time_steps=tuple(1.0 / n for n in (30, 60, 120)),
             configurations=(
                 Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+                Configuration(
+                    name="half-step", method=Method(half_step_velocities=True), expected_order=None
+                ),
             ),
             error=lambda simulate, time_step, method: sinking(
                 simulate, 2, LESS * LIMIT[2], time_step, method, SHORT
