@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, get_args
+from types import SimpleNamespace
+from typing import Any, cast, get_args
 
 import pytest
 from click.testing import CliRunner
@@ -122,6 +123,27 @@ def test_the_least_error_is_read_off_the_rungs(errors: list[float], told: str) -
 
     assert {name: str(one) for name, one in found["log"].items()} == {"rolled": told}
     assert isinstance(found["log"]["rolled"], Rungs)
+
+
+def test_the_row_of_a_scene_tells_what_its_night_came_short_of() -> None:
+    class Night:
+        def runs(self) -> Any:
+            return [SimpleNamespace(id=1)]
+
+        def cards(self, run: int) -> Any:
+            return []
+
+        def samples(self, run: int) -> Any:
+            found = {}
+            for k, error in enumerate((1e-2, 5e-3)):
+                one = series("motor", "ladder:angle", kind="ladder", unit="rad", time_step=0.1 / 2**k)
+                found[k] = (one, sample(one, error))
+            return found
+
+    (row,) = coverage_rows({"motor": CATALOGUE["motor"]}, cast(Any, Night()))
+    assert row.cells[0] == (
+        "angle: 2 configurations, down to 0.005 rad, not 1e-4: order 1 asks for steps of 0.001 s"
+    )
 
 
 def test_list_prints_it_and_gives_it_as_json(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import textwrap
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import click
@@ -48,11 +49,9 @@ def coverage_rows(tests: Mapping[str, ScalarTest], history: History | None) -> l
     for name, test in tests.items():
         reached = measured.get(name, {})
         ladders = [
-            Rungs(
-                ladder.name,
-                ladder.unit,
-                len(ladder.configurations),
-                reached[ladder.name].least if ladder.name in reached else None,
+            replace(
+                reached.get(ladder.name, Rungs(ladder.name, ladder.unit, 0)),
+                configurations=len(ladder.configurations),
             )
             for ladder in test.ladders
         ]
