@@ -159,6 +159,7 @@ bool RigidSystem::pivot_rows() {
         double most = 0.0;
         for (int i = 0; i < rows.size; ++i) most = std::max(most, std::abs(rows.multiplier[i]));
         const double missed = off * most / constants_[body].mass;
+        residual_ = std::max(residual_, missed);
         if (missed > method_.unsettled_residual) note_unsettled(body, missed);
         return true;
     }
