@@ -9,12 +9,22 @@ from pathlib import Path
 
 import msgspec
 import pytest
+from click import unstyle
 
+from spook_tracker.tracker.cli.report_ci import night_markdown
+from spook_tracker.tracker.cli.report_compare import finding_lines
+from spook_tracker.tracker.cli.report_junit import junit_of_night
 from spook_tracker.tracker.judge.accepted import Accepted, AcceptedError, acceptance, read_accepted, unused
 from spook_tracker.tracker.judge.compare import compare
 from spook_tracker.tracker.judge.judged import night_of
 from spook_tracker.tracker.judge.series_history import judge_history
+from spook_tracker.tracker.judge.tonight import tonight
+from spook_tracker.tracker.website.causes import causes_of
+from spook_tracker.tracker.website.nights import book
+from spook_tracker.tracker.website.page_index import lead
+from tests.synthetic_history import DocumentHistory, sample, series
 from tests.test_tracker_analyse import SERIES, history
+from tests.test_tracker_one_judge import night, one
 
 ENTRY = """
 [[accepted]]
@@ -151,6 +161,29 @@ def test_what_is_expected_to_fail_and_becomes_a_hundred_times_worse_is_said() ->
     assert [night.verdict.word for night in told] == ["new", "expected", "expected", "expected"]
     assert "; since" not in told[2].verdict.sentence
     assert "; since" in told[3].verdict.sentence and "by 2.0 decades" in told[3].verdict.sentence
+
+
+def test_night_and_page_say_what_is_expected_and_became_worse_and_hold_no_level_of_it() -> None:
+    other = series("u", "m", role="gate", limit=2.0, unit="m")
+    levels = (EXPECTED, Accepted(series="u/*", low=0.0, high=5.0, who="Ada", why="for a while"))
+    for values, said in ((3.0, 3.0), False), ((3.0, 300.0), True):
+        runs = [
+            night(n, [*one(0.01 if n == 0 else x), (other, sample(other, 0.01 if n < 2 else 1.0))])
+            for n, x in enumerate((0.01, *values))
+        ]
+        records = DocumentHistory(runs)
+        findings = tonight(records, runs[-1], levels)
+        lines = [unstyle(line) for line in finding_lines(findings)]
+        told = [line for line in lines if line.startswith("! t/")]
+        site = book(records, levels)
+
+        assert lines[0].endswith("; 1 are worse and accepted; 1 fail as expected")
+        assert len(told) == said
+        assert all("worse than expected; 0.01 → 300 m" in line and "by 2.0 decades" in line for line in told)
+        assert ("worse than expected: expected to fail; " in junit_of_night(findings)) == said
+        assert ("| worse than expected | 0.01 | 300 m |" in night_markdown(runs[-1], findings)) == said
+        page = lead(site, causes_of(site))["blamed"]
+        assert ("1 expected failure is worse than before." in page) == said
 
 
 def test_a_run_time_accepted_until_a_day_is_red_after_it_and_news_once() -> None:

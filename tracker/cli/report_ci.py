@@ -22,7 +22,7 @@ MOST_ANNOTATIONS = 10  # GitHub shows as many of a step
 
 
 def night_markdown(run: RunInfo, findings: Sequence[Finding], site: str = "") -> str:
-    """One sentence, what broke by cause, and a row for each series red or recovered; `site` is the website's address."""
+    """One sentence, what broke by cause, a row for each series red, recovered or worse than expected; `site` is the website's address."""
     engine, started = run.engine, run.started
     red = [finding for finding in findings if finding.red]
     lines = [f"### {escape(engine.name)} {escape(version(engine))}, {clock(started)} UTC", ""]
@@ -30,7 +30,7 @@ def night_markdown(run: RunInfo, findings: Sequence[Finding], site: str = "") ->
     causes = causes_tonight(findings)
     if len(causes) < len(red):
         lines += [*(f"- {escape(cause.sentence)}" for cause in causes), ""]
-    shown = [*red, *(finding for finding in findings if finding.recovered)]
+    shown = [*red, *(f for f in findings if f.recovered), *(f for f in findings if f.worse_than_expected)]
     if shown:
         lines += ["| series | what | before | now | since |", "|---|---|---:|---:|---|"]
     for finding in shown[:MOST]:

@@ -25,6 +25,12 @@ if TYPE_CHECKING:
     from spook_tracker.tracker.past import OldAnswers
 
 COLOUR = {"✗": "red", "?": "yellow", "!": "yellow", "✓": "green"}
+APART = {  # of series that are not red and hold no level
+    "new": "are measured for the first time: nothing to compare with yet",
+    "not_comparable": "cannot be compared",
+    "accepted": "are worse and accepted",
+    "expected": "fail as expected",
+}
 MOST_ROWS = 40  # of a Markdown table: a comment on a pull request has its limits
 
 
@@ -250,6 +256,7 @@ def finding_lines(findings: Sequence[Finding], site: str = "") -> list[str]:
         *(click.style(_finding_line(finding, site), fg="red") for finding in red),
         *(click.style(_finding_line(f, site), fg="green") for f in findings if f.recovered),
         *(click.style(_finding_line(f, site), fg="yellow") for f in findings if f.suspected),
+        *(click.style(_finding_line(f, site), fg="yellow") for f in findings if f.worse_than_expected),
         *(f"note: {clean(note)}" for note in not_compared(_verdicts(findings))),
     ]
 
@@ -295,7 +302,7 @@ def summary(findings: Sequence[Finding]) -> str:
     """One sentence: how many are red, how many of them since tonight, which is the worst, how many recovered."""
     red = [finding for finding in findings if finding.red]
     also = besides([finding.state for finding in findings])
-    words = Counter(finding.verdict.word for finding in findings if not finding.red)
+    words = Counter(_held(finding) for finding in findings if not finding.red)
     if red:
         new = sum(finding.news for finding in red)
         news = f"{new} new tonight" if new else "none of them new tonight"
@@ -304,18 +311,21 @@ def summary(findings: Sequence[Finding]) -> str:
         return click.style(told, fg="red", bold=True)
     if not findings:
         return click.style("? nothing was measured that could be judged", fg="yellow", bold=True)
-    held = len(findings) - words["new"] - words["not_comparable"] - sum(f.suspected for f in findings)
-    parts = [f"{held} series hold their level"] if held or also or not words else []
-    if words["new"]:
-        parts.append(f"{words['new']} are measured for the first time: nothing to compare with yet")
-    if words["not_comparable"]:
-        parts.append(f"{words['not_comparable']} cannot be compared")
+    left = words.total() - sum(words[word] for word in APART) - sum(f.suspected for f in findings)
+    parts = [f"{left} series hold their level"] if left or also or not words else []
+    parts += [f"{words[word]} {said}" for word, said in APART.items() if words[word]]
     return click.style("✓ " + "; ".join(parts) + also, fg="green")
+
+
+def _held(finding: Finding) -> str:
+    """What a series that is not red is counted as: its word, or that it was accepted tonight."""
+    accepted = finding.state == "accepted" and finding.verdict.word != "expected"
+    return "accepted" if accepted else finding.verdict.word
 
 
 def _finding_line(finding: Finding, site: str) -> str:
     judged, definition = finding.judged, finding.definition
-    mark, what = ("✓", "recovered") if finding.recovered else ("✗", finding.name)
+    mark, what = ("✓", "recovered") if finding.recovered else ("✗" if finding.red else "!", finding.name)
     parts = [f"? {finding.series}: suspected" if finding.suspected else f"{mark} {finding.series}: {what}"]
     if judged is not None and definition is not None:
         before, now = judged.pair

@@ -15,6 +15,7 @@ from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
 from spook_tracker.tracker.judge.standing import FOLLOWED, is_red
 from spook_tracker.tracker.judge.tonight import Finding
+from spook_tracker.tracker.judge.vocabulary import WORSE_THAN_EXPECTED
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.past import OldAnswers
@@ -62,7 +63,10 @@ def junit_of_night(findings: Sequence[Finding], then: Sequence[OldAnswers] = ())
         failure = f"{finding.name}: {finding.verdict.sentence}; {finding.blame}" if finding.red else ""
         sample = finding.judged.night.sample if finding.judged else None
         crashed = sample is not None and sample.outcome == "crashed"
-        said = f"recovered: {finding.verdict.sentence}" if finding.recovered else ""
+        what = (
+            "recovered" if finding.recovered else WORSE_THAN_EXPECTED if finding.worse_than_expected else ""
+        )
+        said = f"{what}: {finding.verdict.sentence}" if what else ""
         where = f" on {finding.machine}" if finding.machine else ""
         cases[finding.test].append(
             Case(finding.series.partition("/")[2] + where, failure, crashed, said=said)

@@ -26,7 +26,7 @@ from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.judged import Judged, commit_of, is_release, night_of, red_class, same_commit
 from spook_tracker.tracker.judge.standing import NOT_SUPPORTED, standing
 from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict, judge, same_bits
-from spook_tracker.tracker.judge.vocabulary import Class
+from spook_tracker.tracker.judge.vocabulary import WORSE_THAN_EXPECTED, Class
 
 LONG_DRIFT = 5.0  # tolerances a series may lose over many releases before that is called drift, too
 IDENTICAL = Verdict(word="identical", sentence="the same bits", ulps=0)
@@ -178,12 +178,13 @@ def _fails_as_expected(
     definition: SeriesDefinition, state: KnownValue, seen: Seen, taken: Accepted
 ) -> tuple[KnownValue, Judged]:
     """Bad, as accepted.toml said it would be: the level from before stays, and worse than expected is told."""
-    words = f"expected to fail; {seen.verdict.sentence}"
+    words, name = f"expected to fail; {seen.verdict.sentence}", ""
     if state.failing is not None and (grown := _against(definition, state.failing, seen.night)).red:
         words += f"; since {commit_of(state.failing.run)}: {grown.sentence}"
+        name = WORSE_THAN_EXPECTED
     return replace(state, name="held", red=None, failing=seen.night), Judged(
         night=seen.night,
-        verdict=replace(seen.verdict, word="expected", sentence=words, name=""),
+        verdict=replace(seen.verdict, word="expected", sentence=words, name=name),
         state="green" if state.red is None else "accepted",
         stands="accepted",
         against=seen.against,

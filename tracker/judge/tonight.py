@@ -17,7 +17,7 @@ from spook_tracker.tracker.judge.lane import Records, histories, line_of
 from spook_tracker.tracker.judge.maps import ToldMap, stands_of, told_maps
 from spook_tracker.tracker.judge.series_history import Told, judge_all
 from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict
-from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class, State
+from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, WORSE_THAN_EXPECTED, Class, State
 
 MOST_NAMED = 8  # tests in one sentence
 NIGHT = timedelta(days=1)  # runs of several machines within it are of one
@@ -57,6 +57,11 @@ class Finding:
     def suspected(self) -> bool:
         """A slow night that no second one has confirmed."""
         return self.state == "suspected"
+
+    @property
+    def worse_than_expected(self) -> bool:
+        """Expected to fail, and worse than on the last such night."""
+        return self.verdict.name == WORSE_THAN_EXPECTED
 
     @property
     def stands(self) -> Class:

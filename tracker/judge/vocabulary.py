@@ -92,6 +92,7 @@ CALLED_WORSE = {  # what a growth of badness is called, by the kind of series
     "time": "slower",
     "work": "more work",
 }
+WORSE_THAN_EXPECTED = "worse than expected"  # the name of a failure that is expected, and became worse
 STATES: dict[State, str] = {
     "green": "",
     "detected": "✗ red",

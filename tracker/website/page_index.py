@@ -14,7 +14,7 @@ from spook_tracker.tracker.document.wording import clean, day, quantity, short_h
 from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.standing import Count, count_points, expected, worst
-from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, Class
+from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, WORSE_THAN_EXPECTED, Class
 from spook_tracker.tracker.website.causes import ToldCause, damage_of, lasting, told
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory, Trend
 from spook_tracker.tracker.website.page_rows import Page, Row, address, row
@@ -113,7 +113,7 @@ def lead(book: Book, causes: Sequence[Cause]) -> Lead:
         "old": old[:MOST_OLD],
         "old_left_out": max(0, len(old) - MOST_OLD),
         "most_tests": MOST_TESTS,
-        "blamed": _blamed(new, old, recovered(book)),
+        "blamed": _blamed(new, old, recovered(book), _worse_than_expected(book)),
     }
 
 
@@ -199,13 +199,20 @@ def summary(book: Book) -> str:
     return " ".join(parts)
 
 
-def _blamed(new: Sequence[ToldCause], old: Sequence[ToldCause], recovered: int) -> str:
-    """How many causes there are, new apart from old, and how many series recovered tonight."""
+def _worse_than_expected(book: Book) -> int:
+    """How many failures that are expected became worse."""
+    return [t.told.nights[-1].verdict.name for t in tonight(book)].count(WORSE_THAN_EXPECTED)
+
+
+def _blamed(new: Sequence[ToldCause], old: Sequence[ToldCause], recovered: int, worse: int) -> str:
+    """How many causes there are, new apart from old; how many failures that are expected became worse; what recovered."""
     parts = []
     if new:
         parts.append(_worsened(new))
-    elif old:
+    elif old and not worse:
         parts.append("Nothing became worse tonight.")
+    if worse:
+        parts.append(f"{worse} expected {'failure is' if worse == 1 else 'failures are'} worse than before.")
     if old:
         parts.append(
             "One earlier cause is still red."
