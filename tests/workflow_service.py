@@ -46,15 +46,20 @@ class Service:
     artifacts: dict[str, list[Path]] = field(default_factory=dict)
     runs: int = 0
 
-    def run(self, workflow: Path, event: str, branch: str, **inputs: str) -> dict[str, Ran]:
-        """Every job of a reusable workflow for an event on a branch."""
+    def run(
+        self, workflow: Path, event: str, branch: str, ended: dict[str, Ran] | None = None, **inputs: str
+    ) -> dict[str, Ran]:
+        """Every job of a reusable workflow for an event on a branch; those that have `ended` are not run again."""
         said = yaml.safe_load(workflow.read_text(encoding="utf-8"))
         declared = said[True]["workflow_call"]["inputs"]  # YAML 1.1 reads the key `on` as true
         given = {name: str(what.get("default", "")) for name, what in declared.items()} | inputs
         self.runs += 1
-        self.artifacts.clear()
-        jobs: dict[str, Ran] = {}
+        if not ended:
+            self.artifacts.clear()
+        jobs = dict(ended or {})
         for name, job in said["jobs"].items():
+            if name in jobs:
+                continue
             context = {"inputs": given, "github": self._github(event), "needs": jobs, "branch": branch}
             jobs[name] = self._job(name, job, context)
         return jobs
