@@ -344,17 +344,22 @@ def free_turn(moments: Array, h: float, p: Array) -> Array:
     Power series of q' = ½ q (0, w), p' = p × w, w = p/I, in pieces of at most a quarter of a radian.
     """
     pieces = 1 + int(4.0 * abs(h) * float(np.linalg.norm(p / moments)))
-    t, whole = h / pieces, np.array([1.0, 0.0, 0.0, 0.0])
+    t, whole, orders = h / pieces, np.array([1.0, 0.0, 0.0, 0.0]), 24
+    powers = t ** np.arange(orders + 1)
     for _ in range(pieces):
-        ps, qs = [p], [np.array([1.0, 0.0, 0.0, 0.0])]
-        for n in range(24):
-            pairs = [(k, n - k) for k in range(n + 1)]
-            dp = sum(cross(ps[i], ps[j] / moments) for i, j in pairs)
-            dq = sum(0.5 * product(qs[i], np.concatenate([[0.0], ps[j] / moments])) for i, j in pairs)
-            ps.append(dp / (n + 1))
-            qs.append(dq / (n + 1))
-        p = sum(term * t**n for n, term in enumerate(ps))
-        turn = sum(term * t**n for n, term in enumerate(qs))
+        ps, ws, qs = (np.zeros((orders + 1, count)) for count in (3, 3, 4))
+        ps[0], ws[0], qs[0, 0] = p, p / moments, 1.0
+        for n in range(orders):
+            before = ws[n::-1]  # of the product of two series, the terms of order n: all pairs at once
+            (_, a01, a02), (a10, _, a12), (a20, a21, _) = (ps[: n + 1].T @ before).tolist()
+            (s0, s1, s2), (b00, b01, b02), (b10, b11, b12), (b20, b21, b22) = (
+                qs[: n + 1].T @ before
+            ).tolist()
+            ps[n + 1] = np.array([a12 - a21, a20 - a02, a01 - a10]) / (n + 1)
+            ws[n + 1] = ps[n + 1] / moments
+            turned = [-b00 - b11 - b22, s0 + b12 - b21, s1 + b20 - b02, s2 + b01 - b10]
+            qs[n + 1] = 0.5 * np.array(turned) / (n + 1)
+        p, turn = powers @ ps, powers @ qs
         whole = product(whole, turn / np.linalg.norm(turn))
     return np.asarray(whole)
 
