@@ -99,16 +99,28 @@ def built(desk: Path, settings: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(
     "settings", [by_ci_run, by_make, by_the_container_of_a_release], ids=lambda one: one.__name__
 )
-def test_a_planted_constraint_is_obeyed_and_a_planted_archive_refused(settings, desk: Path) -> None:
+def test_each_way_to_build_names_the_list(settings, desk: Path) -> None:
+    told = subprocess.run(
+        ["sh", "-c", f'{settings()}\necho "$PIP_BUILD_CONSTRAINT"'],
+        cwd=desk,
+        env={},
+        capture_output=True,
+        text=True,
+    )
+
+    assert told.stdout == f"{desk}/.ci/{LIST.name}\n"
+
+
+def test_a_planted_constraint_is_obeyed_and_a_planted_archive_refused(desk: Path) -> None:
     good, _ = planted(desk, "1.0"), planted(desk, "2.0")
     (desk / ".ci" / LIST.name).write_text(f"planted==1.0 --hash=sha256:{good}\n")
 
-    done = built(desk, settings())
+    done = built(desk, by_ci_run())
 
     assert done.returncode == 0, done.stderr
     assert [file.name for file in (desk / "out").iterdir()] == ["built-1.0-py3-none-any.whl"]
     (desk / ".ci" / LIST.name).write_text(f"planted==1.0 --hash=sha256:{'0' * 64}\n")
-    refused = built(desk, settings())
+    refused = built(desk, by_ci_run())
     assert refused.returncode != 0
     assert "DO NOT MATCH THE HASHES" in refused.stderr
 
