@@ -128,27 +128,28 @@ def test_every_cell_of_the_notebook_runs(tmp_path: Path, monkeypatch: pytest.Mon
     assert names["result"].steps == 100
 
 
-def test_the_site_builds_without_a_warning(tmp_path: Path) -> None:
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The documentation, built without a warning."""
     pytest.importorskip("mkdocs", reason="MkDocs is not installed here")
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path / "site")]
-
+    folder = tmp_path_factory.mktemp("documentation") / "site"
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
-
     assert done.returncode == 0, done.stderr
-    pages = {str(page.relative_to(tmp_path / "site")) for page in (tmp_path / "site").rglob("*.html")}
+    return folder
+
+
+def test_the_site_builds_without_a_warning(site: Path) -> None:
+    pages = {str(page.relative_to(site)) for page in site.rglob("*.html")}
     assert {"index.html", "tutorial/first-night.html", "reference/schema.html"} <= pages
-    for page in (tmp_path / "site").rglob("*.html"):
+    for page in site.rglob("*.html"):
         assert not re.search(r'(src|href)="https?://[^"]*\.(js|css)', page.read_text(encoding="utf-8")), page
 
 
-def test_the_documentation_is_searched_from_a_folder(tmp_path: Path) -> None:
+def test_the_documentation_is_searched_from_a_folder(site: Path) -> None:
     """Words in any order find the section, also in pages that are made from the code; the passage marks them."""
-    pytest.importorskip("mkdocs", reason="MkDocs is not installed here")
     if programs() is None:
         pytest.skip(MISSING)
-    site = tmp_path / "site"
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(site)]
-    subprocess.run(command, cwd=ROOT, capture_output=True, check=True)
 
     with browser(*programs()) as driver:
         look(driver)

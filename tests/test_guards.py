@@ -176,7 +176,7 @@ def test_a_new_shape_and_a_new_joint_touch_the_files_that_are_said() -> None:
 
 
 def test_every_module_says_what_it_is() -> None:
-    without = [path.name for path in PYTHON_FILES if not ast.get_docstring(ast.parse(path.read_text()))]
+    without = [path.name for path in PYTHON_FILES if not re.match(r'r?"""\S', path.read_text())]
 
     assert without == []
 

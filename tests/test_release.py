@@ -157,11 +157,10 @@ def test_drift_against_a_release_end_to_end(clone: Clone) -> None:
     assert clone.release("1.0.0").returncode == 0
     first = night(1.05)
     assert first.returncode == 0, first.stdout + first.stderr
-    for number, error in enumerate((1.06, 1.068), start=1):
-        clone.commit(f"Step {number}")
-        inside = night(error)
-        assert inside.returncode == 0, inside.stdout + inside.stderr
-    clone.commit("Step 3")
+    clone.commit("Step 1")
+    inside = night(1.065)
+    assert inside.returncode == 0, inside.stdout + inside.stderr
+    clone.commit("Step 2")
 
     last = night(1.075)
 

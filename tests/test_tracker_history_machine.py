@@ -39,10 +39,11 @@ KEYS = ["a", "b", "c"]
 class Storage(RuleBasedStateMachine):
     """The database beside a dictionary of run id → document."""
 
-    def __init__(self, server=None) -> None:
-        """`server` makes databases of PostgreSQL, every other one that is moved into; without one all are files."""
+    def __init__(self, template, server=None, server_template="") -> None:
+        """`server` makes databases of PostgreSQL, every other one that is moved into; without one all are files. New
+        ones are copies of the templates: migrating is what upgrading asks."""
         super().__init__()
-        self.folder = Path(tempfile.mkdtemp())
+        self.folder, self.template, self.server_template = Path(tempfile.mkdtemp()), template, server_template
         self.server, self.databases = server, ExitStack()
         self.copies = 0
         self.expected = {}
@@ -51,8 +52,9 @@ class Storage(RuleBasedStateMachine):
     def new(self):
         """The URL of an empty database."""
         if self.server is not None and self.copies % 2 == 0:
-            return self.databases.enter_context(self.server.new_database())
-        return f"sqlite:///{self.folder}/{self.copies}.db"
+            return self.databases.enter_context(self.server.new_database(copied=self.server_template))
+        file = self.folder / f"{self.copies}.db"
+        return f"sqlite:///{shutil.copyfile(self.template, file)}"
 
     def open(self, url):
         self.url = url
@@ -161,10 +163,13 @@ SETTINGS = settings(
 )
 
 
-def test_storage_keeps_what_a_dictionary_keeps_in_files():
-    run_state_machine_as_test(Storage, settings=SETTINGS)
+def test_storage_keeps_what_a_dictionary_keeps_in_files(sqlite_template):
+    run_state_machine_as_test(lambda: Storage(sqlite_template), settings=SETTINGS)
 
 
-def test_storage_keeps_what_a_dictionary_keeps_on_a_server_and_between_both(postgresql_server):
+def test_storage_keeps_what_a_dictionary_keeps_on_a_server_and_between_both(
+    sqlite_template, postgresql_server, postgresql_template
+):
     few = settings(SETTINGS, max_examples=3)
-    run_state_machine_as_test(lambda: Storage(postgresql_server), settings=few)
+    templates = (sqlite_template, postgresql_server, postgresql_template)
+    run_state_machine_as_test(lambda: Storage(*templates), settings=few)
