@@ -164,6 +164,39 @@ void solves_what_a_dense_elimination_solves() {
     for (int round = 0; round < 20; ++round) EXPECT(solved_error(tangle(15, 18), 0.01) < 1e-12);
 }
 
+/// x₁ᵀ A⁻¹ x₂ of vectors in two blocks: half a solve each, along their ways to the root.
+void the_inverse_between_two_blocks_needs_their_ways_to_the_root_only() {
+    for (const System& s : {chain(12, 6, 5), door(9, 4), ring(9, 5), tangle(12, 10)}) {
+        BlockLdlt a;
+        a.analyse(s.sizes, s.edges, s.is_constraint);
+        fill_values(a, s, 0.01);
+        EXPECT(a.factor(1e-12));
+        std::vector<int> columns;
+        std::vector<std::vector<double>> given, half;
+        for (const int block : {0, a.block_count() / 2, a.block_count() - 1}) {
+            given.emplace_back(a.unknowns(), 0.0);
+            for (int i = 0; i < a.size(block); ++i) given.back()[a.offset(block) + i] = random_number();
+            half.push_back(given.back());
+            a.reach(std::vector<int>{block}, columns);
+            a.forward(columns, half.back().data());
+        }
+        for (std::size_t i = 0; i < given.size(); ++i) {
+            const std::vector<double> whole = dense_solve(dense(a), given[i]);
+            for (std::size_t j = 0; j < given.size(); ++j) {
+                double sum = 0.0, truth = 0.0, scale = 0.0;
+                for (int k = 0; k < a.block_count(); ++k) {
+                    const auto [offset, inverse] = a.pivots(k);
+                    for (std::size_t c = 0; c < inverse.size(); ++c)
+                        sum += half[i][offset + c] * inverse[c] * half[j][offset + c];
+                }
+                for (int k = 0; k < a.unknowns(); ++k)
+                    truth += given[j][k] * whole[k], scale += std::abs(given[j][k] * whole[k]);
+                EXPECT(std::abs(sum - truth) < 1e-10 * (scale + 1.0));
+            }
+        }
+    }
+}
+
 void chains_and_trees_have_no_fill() {
     BlockLdlt a;
     System s = chain(200);
@@ -306,6 +339,7 @@ void a_large_chain_costs_no_more_per_body_than_a_small_one() {
 
 int main() {
     solves_what_a_dense_elimination_solves();
+    the_inverse_between_two_blocks_needs_their_ways_to_the_root_only();
     chains_and_trees_have_no_fill();
     no_constraint_of_a_chain_is_eliminated_before_its_child();
     many_hinges_on_one_body_do_not_couple();

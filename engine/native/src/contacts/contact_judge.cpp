@@ -10,22 +10,30 @@
 
 namespace spook {
 
-double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
+namespace {
+
+template <class FactorOf> double inertia(const FactorOf& factor, const RowBlock& block, int i) {
     double own = block.softness[i];
-    for (const bool first : {true, false}) {
-        const int body = first ? block.first : block.second;
-        if (body < 0) continue;
-        const Vec6& jacobian = first ? block.first_jacobian[i] : block.second_jacobian[i];
+    const auto add = [&](int body, const Vec6& jacobian) {
+        if (body < 0) return;
         Vec6 x = jacobian;
-        solve_six(factor_six(system.mass[body]), x);
+        solve_six(factor(body), x);
         own += dot(jacobian, x);
-    }
-    for (const auto& [body, jacobian] : block.further) {
-        Vec6 x = jacobian;
-        solve_six(factor_six(system.mass[body]), x);
-        own += dot(jacobian, x);
-    }
+    };
+    add(block.first, block.first_jacobian[i]);
+    add(block.second, block.second_jacobian[i]);
+    for (const auto& [body, jacobian] : block.further) add(body, jacobian);
     return own;
+}
+
+}  // namespace
+
+double own_inertia(const MixedSystem& system, const RowBlock& block, int i) {
+    return inertia([&](int body) { return factor_six(system.mass[body]); }, block, i);
+}
+
+double own_inertia(const MassFactors& mass, const RowBlock& block, int i) {
+    return inertia([&](int body) -> const Mat6& { return mass[static_cast<std::size_t>(body)]; }, block, i);
 }
 
 namespace {

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "contacts/mass_factors.hpp"
 #include "contacts/pivot_system.hpp"
 #include "run/named_enum.hpp"
 
@@ -51,6 +52,8 @@ struct RowsResidual {
 };
 /// G M⁻¹ Gᵀ + Sig of one row: the scale between an impulse and a velocity.
 double own_inertia(const MixedSystem& system, const RowBlock& block, int i);
+/// The same where many are asked.
+double own_inertia(const MassFactors& mass, const RowBlock& block, int i);
 
 RowsResidual rows_residual(const MixedSystem& system, const std::vector<FrictionPoint>& points,
                            FrictionModel model, double enough = 0.0);

@@ -59,7 +59,8 @@ double PositionProjector::compliance_of(const Contact& contact) const noexcept {
 
 /// Rows of joints hold displacements instead of velocities; limits only push, and motors let go. They give far less
 /// than the contacts, the least of which gives `least`.
-void PositionProjector::hold_joints(MixedSystem& projection, double least) const {
+void PositionProjector::hold_joints(MixedSystem& projection, double least) {
+    masses_.find(projection.mass);
     for (std::size_t k = 0; k < projection.rows.size(); ++k) {
         RowBlock& block = projection.rows[k];
         for (int i = 0; i < block.size; ++i) {
@@ -69,7 +70,7 @@ void PositionProjector::hold_joints(MixedSystem& projection, double least) const
             if (k < yielding_.size() && yielding_[k] != 0) continue;
             const double softness = block.softness[i];
             block.softness[i] = 0.0;
-            const double own = own_inertia(projection, block, i);
+            const double own = own_inertia(masses_, block, i);
             block.softness[i] = std::min({softness, joint_compliance_share * own,
                                           std::max(joint_share * least, min_joint_compliance * own)});
         }

@@ -54,7 +54,7 @@ public:
 private:
     void find_body_compliance(const MixedSystem& projection);
     double compliance_of(const Contact& contact) const noexcept;
-    void hold_joints(MixedSystem& projection, double least) const;
+    void hold_joints(MixedSystem& projection, double least);
     double separation_speed(const PenetrationRecord& record, const DepthOfPair& given, bool again) const;
     bool project_directly(const DepthOfPair& given, bool again, ContactCounters& counters);
     bool project_by_pgs(const PgsSolver& beside, const DepthOfPair& given, bool again,
@@ -81,6 +81,7 @@ private:
     std::vector<char> reconsidered_;           // which bodies are looked at again
     // Of one:
     MixedSystem system_;
+    MassFactors masses_;
     IslandFinder connected_, pushed_;               // by joints and ground; by contacts that push, too
     std::vector<double> island_mass_, compliance_;  // kg; of contacts of jointed bodies, 1/kg
     std::vector<char> answered_, far_islands_;

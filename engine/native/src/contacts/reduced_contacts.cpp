@@ -13,6 +13,30 @@ namespace {
 
 using namespace tolerances::reduced_contacts;
 
+/// Calls part(body, jacobian) for each body of a row.
+template <class Part> void each_body(const RowBlock& block, int row, const Part& part) {
+    if (block.first >= 0) part(block.first, block.first_jacobian[row]);
+    if (block.second >= 0) part(block.second, block.second_jacobian[row]);
+    for (const FurtherBody& other : block.further) part(other.body, other.jacobian);
+}
+
+/// G v of one row.
+double along(const RowBlock& block, int row, const double* v) {
+    double sum = 0.0;
+    each_body(block, row, [&](int body, const Vec6& g) {
+        const double* x = v + 6 * static_cast<std::size_t>(body);
+        sum += g[0] * x[0] + g[1] * x[1] + g[2] * x[2] + g[3] * x[3] + g[4] * x[4] + g[5] * x[5];
+    });
+    return sum;
+}
+
+/// p += Gᵀ z of one row.
+void put(const RowBlock& block, int row, double z, double* p) {
+    each_body(block, row, [&](int body, const Vec6& g) {
+        for (int a = 0; a < 6; ++a) p[6 * static_cast<std::size_t>(body) + a] += g[a] * z;
+    });
+}
+
 }  // namespace
 
 bool ReducedContacts::takes(const MixedSystem& system, const std::vector<FrictionPoint>& points) {
@@ -90,7 +114,10 @@ bool ReducedContacts::factor(const MixedSystem& system) {
         for (std::size_t o = 0; o < block.further.size(); ++o)
             couple(joint.further_edge + static_cast<int>(o), &block.further[o].jacobian);
     }
-    return matrix_.factor(floor_of_pivots);
+    const std::uint64_t before = matrix_.counters().floored_pivots;
+    if (!matrix_.factor(floor_of_pivots)) return false;
+    floored_ = matrix_.counters().floored_pivots > before;
+    return true;
 }
 
 void ReducedContacts::list_units(const MixedSystem& system, const std::vector<FrictionPoint>& points) {
@@ -119,74 +146,94 @@ void ReducedContacts::list_units(const MixedSystem& system, const std::vector<Fr
     }
 }
 
-/// Columns of A⁻¹ Gᵀ, W and q.
-void ReducedContacts::reduce(const MixedSystem& system) {
-    const std::size_t all = static_cast<std::size_t>(matrix_.unknowns()), n = static_cast<std::size_t>(rows_);
-    const int refinements = matrix_.counters().floored_pivots > 0 ? 2 : 0;
-    right_.assign(all, 0.0);
-    free_.resize(all);
+/// What acts without the bounded rows.
+void ReducedContacts::fill_right(const MixedSystem& system) {
+    right_.assign(static_cast<std::size_t>(matrix_.unknowns()), 0.0);
     for (int b = 0; b < bodies_; ++b) std::copy_n(system.momentum[b].data(), 6, right_.data() + 6 * b);
     for (std::size_t k = 0; k < joints_.size(); ++k)
         for (int i = 0; i < joints_[k].count; ++i)
             right_[matrix_.offset(bodies_ + static_cast<int>(k)) + i] =
                 system.rows[joints_[k].block].right[joints_[k].row[i]];
-    matrix_.solve_refined(right_.data(), free_.data(), 1);
+}
 
-    response_.resize(all * n);
-    w_.resize(n * n);
+/// W and q. With A = Uᵀ D U, W is Yᵀ D⁻¹ Y for Y = U⁻ᵀ Gᵀ: half of a solve per row, and only along its bodies' ways to
+/// the root. A floored pivot is in the factor only: then W is taken from solutions refined against A.
+void ReducedContacts::reduce(const MixedSystem& system) {
+    const std::size_t all = static_cast<std::size_t>(matrix_.unknowns()), n = static_cast<std::size_t>(rows_);
+    fill_right(system);
+    free_.resize(all);
+    matrix_.solve_refined(right_.data(), free_.data(), 1);
+    mass_.find(system.mass);
+    response_.assign(all * n, 0.0);
+    w_.assign(n * n, 0.0);
     q_.resize(n), z_.resize(n), u_.resize(n);
     speed_ = 0.0;
     for (int b = 0; b < bodies_; ++b)
         for (int a = 0; a < 3; ++a) speed_ = std::max(speed_, std::abs(free_[6 * b + a]));
-    const auto along = [this](const RowBlock& block, int row, const double* v) {
-        const auto part = [&](int body, const Vec6& g) {
-            const double* x = v + 6 * static_cast<std::size_t>(body);
-            return g[0] * x[0] + g[1] * x[1] + g[2] * x[2] + g[3] * x[3] + g[4] * x[4] + g[5] * x[5];
-        };
-        double sum = 0.0;
-        if (block.first >= 0) sum += part(block.first, block.first_jacobian[row]);
-        if (block.second >= 0) sum += part(block.second, block.second_jacobian[row]);
-        for (const FurtherBody& other : block.further) sum += part(other.body, other.jacobian);
-        return sum;
-    };
-    for (Unit& unit : units_) {
+    for (const Unit& unit : units_) {
         const RowBlock& block = system.rows[unit.block];
-        unit.own = 0.0;
-        double apart = 0.0;
+        touched_.clear();
+        each_body(block, unit.row, [&](int body, const Vec6&) { touched_.push_back(body); });
+        matrix_.reach(touched_, reached_);
         for (int i = 0; i < unit.size; ++i) {
             const int row = unit.row + i;
-            const std::size_t at = static_cast<std::size_t>(unit.at) + static_cast<std::size_t>(i);
+            const std::size_t at = static_cast<std::size_t>(unit.at + i);
             double* column = response_.data() + all * at;
-            std::fill_n(right_.data(), all, 0.0);
-            const auto put = [&](int body, const Vec6& g) {
-                for (int a = 0; a < 6; ++a) right_[6 * static_cast<std::size_t>(body) + a] += g[a];
-            };
-            if (block.first >= 0) put(block.first, block.first_jacobian[row]);
-            if (block.second >= 0) put(block.second, block.second_jacobian[row]);
-            for (const FurtherBody& other : block.further) put(other.body, other.jacobian);
-            if (refinements > 0) {
-                matrix_.solve_refined(right_.data(), column, refinements);
-            } else {
-                std::copy_n(right_.data(), all, column);
-                matrix_.solve(column);
-            }
+            put(block, row, 1.0, column);
+            if (!floored_) matrix_.forward(reached_, column);
             q_[at] = along(block, row, free_.data()) - block.right[row];
             z_[at] = block.multiplier[row];
             speed_ = std::max(speed_, std::abs(block.right[row]));
-            for (const Unit& other : units_) {
-                if (other.at > unit.at + i) break;
-                for (int j = 0; j < other.size; ++j) {
-                    const std::size_t to = static_cast<std::size_t>(other.at) + static_cast<std::size_t>(j);
-                    if (to > at) break;
-                    const double value = along(system.rows[other.block], other.row + j, column);
-                    w_[n * at + to] = w_[n * to + at] = value;
-                }
-            }
-            w_[(n + 1) * at] += block.softness[row];
-            unit.own += w_[(n + 1) * at];
-            apart += own_inertia(system, block, row);
+        }
+    }
+    floored_ ? couple_refined(system) : couple();
+    for (Unit& unit : units_) {
+        const RowBlock& block = system.rows[unit.block];
+        double apart = 0.0;
+        unit.own = 0.0;
+        for (int row = unit.row; row < unit.row + unit.size; ++row) {
+            double& own = w_[(n + 1) * static_cast<std::size_t>(unit.at + row - unit.row)];
+            own += block.softness[row];
+            unit.own += own;
+            apart += own_inertia(mass_, block, row);
         }
         if (!(unit.own > held * apart)) unit.own = 0.0;
+    }
+}
+
+/// W unknown by unknown: what one adds is the product of the few rows that reach it.
+void ReducedContacts::couple() {
+    const std::size_t all = static_cast<std::size_t>(matrix_.unknowns()), n = static_cast<std::size_t>(rows_);
+    line_.resize(n);
+    for (int k = 0; k < matrix_.block_count(); ++k) {
+        const auto [offset, inverse] = matrix_.pivots(k);
+        for (std::size_t a = 0; a < inverse.size(); ++a) {
+            const double* y = response_.data() + static_cast<std::size_t>(offset) + a;
+            for (std::size_t i = 0; i < n; ++i) line_[i] = y[all * i];
+            for (std::size_t i = 0; i < n; ++i) {
+                if (line_[i] == 0.0) continue;
+                const double scaled = inverse[a] * line_[i];
+                double* w = w_.data() + n * i;
+                for (std::size_t j = 0; j <= i; ++j) w[j] += scaled * line_[j];
+            }
+        }
+    }
+    for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t j = 0; j < i; ++j) w_[n * j + i] = w_[n * i + j];
+}
+
+void ReducedContacts::couple_refined(const MixedSystem& system) {
+    const std::size_t all = static_cast<std::size_t>(matrix_.unknowns()), n = static_cast<std::size_t>(rows_);
+    for (std::size_t at = 0; at < n; ++at) {
+        double* column = response_.data() + all * at;
+        right_.assign(column, column + all);
+        matrix_.solve_refined(right_.data(), column, refinements_of_floored);
+        for (const Unit& other : units_)
+            for (int j = 0; j < other.size; ++j) {
+                const std::size_t to = static_cast<std::size_t>(other.at + j);
+                if (to > at) continue;
+                w_[n * at + to] = w_[n * to + at] = along(system.rows[other.block], other.row + j, column);
+            }
     }
 }
 
@@ -302,39 +349,16 @@ void ReducedContacts::settle(Report& report, double goal, int iterations) {
 
 /// All unknowns from z; M v = p + Gᵀ z and the joints' rows hold to rounding.
 void ReducedContacts::deliver(MixedSystem& system) {
-    const std::size_t all = static_cast<std::size_t>(matrix_.unknowns());
-    whole_ = free_;
-    for (std::size_t j = 0; j < static_cast<std::size_t>(rows_); ++j) {
-        if (z_[j] == 0.0) continue;
-        const double* column = response_.data() + all * j;
-        for (std::size_t i = 0; i < all; ++i) whole_[i] += column[i] * z_[j];
-    }
-    right_.assign(all, 0.0);
-    for (int b = 0; b < bodies_; ++b) std::copy_n(system.momentum[b].data(), 6, right_.data() + 6 * b);
-    for (std::size_t k = 0; k < joints_.size(); ++k)
-        for (int i = 0; i < joints_[k].count; ++i)
-            right_[matrix_.offset(bodies_ + static_cast<int>(k)) + i] =
-                system.rows[joints_[k].block].right[joints_[k].row[i]];
+    fill_right(system);
     for (const Unit& unit : units_) {
         RowBlock& block = system.rows[unit.block];
         for (int i = 0; i < unit.size; ++i) {
-            const int row = unit.row + i;
-            const double z = z_[unit.at + i];
-            block.multiplier[row] = z;
-            const auto put = [&](int body, const Vec6& g) {
-                for (int a = 0; a < 6; ++a) right_[6 * static_cast<std::size_t>(body) + a] += g[a] * z;
-            };
-            if (block.first >= 0) put(block.first, block.first_jacobian[row]);
-            if (block.second >= 0) put(block.second, block.second_jacobian[row]);
-            for (const FurtherBody& other : block.further) put(other.body, other.jacobian);
+            block.multiplier[unit.row + i] = z_[unit.at + i];
+            put(block, unit.row + i, z_[unit.at + i], right_.data());
         }
     }
-    left_.resize(all);
-    for (int round = 0; round < 2; ++round) {
-        matrix_.residual(right_.data(), whole_.data(), left_.data());
-        matrix_.solve(left_.data());
-        for (std::size_t i = 0; i < all; ++i) whole_[i] += left_[i];
-    }
+    whole_.resize(right_.size());
+    matrix_.solve_refined(right_.data(), whole_.data(), floored_ ? 2 * refinements_of_floored : 2);
     system.velocity.resize(system.mass.size());
     for (int b = 0; b < bodies_; ++b) std::copy_n(whole_.data() + 6 * b, 6, system.velocity[b].data());
     for (std::size_t k = 0; k < joints_.size(); ++k)

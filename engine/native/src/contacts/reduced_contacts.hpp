@@ -20,6 +20,7 @@
 
 #include "contacts/bilateral_rows.hpp"
 #include "contacts/friction_point.hpp"
+#include "contacts/mass_factors.hpp"
 #include "linear/block_ldlt.hpp"
 
 namespace spook {
@@ -59,7 +60,10 @@ private:
     bool factor(const MixedSystem& system);
     void analyse(const MixedSystem& system);
     void list_units(const MixedSystem& system, const std::vector<FrictionPoint>& points);
+    void fill_right(const MixedSystem& system);
     void reduce(const MixedSystem& system);
+    void couple();
+    void couple_refined(const MixedSystem& system);
     void measure();
     void change(int at, double by);
     void iterate();
@@ -88,9 +92,13 @@ private:
     };
     std::vector<Joint> joints_;
     std::vector<Unit> units_;
-    std::vector<double> response_;              // columns A⁻¹ Gᵀ, of all unknowns
+    MassFactors mass_;
+    bool floored_ = false;                // pivots, by the last factorisation
+    std::vector<double> response_;        // columns U⁻ᵀ Gᵀ; A⁻¹ Gᵀ where pivots are floored; of all unknowns
+    std::vector<double> line_;            // of the first, what one unknown adds to a row of W
+    std::vector<int> touched_, reached_;  // bodies of a row, and columns it reaches
     std::vector<double> w_, q_, z_, u_, best_;  // W row by row; best_: z
-    std::vector<double> right_, free_, whole_, left_;
+    std::vector<double> right_, free_, whole_;
     std::vector<double> dense_, step_, image_;  // of Newton's method
     std::vector<int> active_, place_;
     std::vector<signed char> pinned_;

@@ -231,6 +231,7 @@ inline constexpr double held =
     1e-10;  // of what a row moves without joints: joints hold it, and no impulse there does anything
 inline constexpr int passes = 3;                  // measured anew with the true equations
 inline constexpr double floor_of_pivots = 1e-12;  // of the largest: smaller ones are redundant rows
+inline constexpr int refinements_of_floored = 2;  // what the factor lacks there is found against the matrix
 }  // namespace tolerances::reduced_contacts
 
 // reduced_newton.cpp

@@ -35,7 +35,6 @@ struct Buckets {
 /// What an analysis needs besides what it gives. One per thread: its memory outlives an analysis, its values do not.
 struct BlockLdlt::Analysis {
     Ordering ordering;
-    std::vector<int> position;           // of blocks in the order of elimination
     std::vector<std::int64_t> touched;   // by which column first: pivot blocks, then rows
     std::vector<std::int64_t> block_at;  // of the same, in work_
     std::vector<std::int64_t> edge_of, next, rooms, sizes;
@@ -81,8 +80,13 @@ void BlockLdlt::analyse(std::span<const int> sizes, std::span<const BlockEdge> e
     static thread_local Analysis analysis;
     order_blocks(size_, edges_, is_constraint_, analysis.ordering);
     order_ = analysis.ordering.order;
-    analysis.position.resize(count);
-    for (int k = 0; k < count; ++k) analysis.position[order_[k]] = k;
+    column_of_.resize(count);
+    for (int k = 0; k < count; ++k) column_of_[order_[k]] = k;
+    parent_.assign(count, -1);
+    for (int k = 0; k < count; ++k)
+        if (const std::int64_t first = analysis.ordering.column_start[k];
+            first < analysis.ordering.column_start[k + 1])
+            parent_[k] = column_of_[analysis.ordering.column_rows[first]];
     place_columns(analysis);
     scale_.assign(unknowns_, 0.0);
     residual_.assign(unknowns_, 0.0);
@@ -92,7 +96,7 @@ void BlockLdlt::analyse(std::span<const int> sizes, std::span<const BlockEdge> e
 void BlockLdlt::place_columns(Analysis& analysis) {
     const int count = block_count();
     const Ordering& ordering = analysis.ordering;
-    const std::vector<int>& position = analysis.position;
+    const std::vector<int>& position = column_of_;
     columns_.resize(count);
     row_size_.resize(ordering.column_rows.size());
     row_offset_.resize(ordering.column_rows.size());
@@ -221,7 +225,7 @@ void BlockLdlt::place_work(Analysis& analysis) {
 void BlockLdlt::place_loads(Analysis& analysis) {
     const int count = block_count();
     const Ordering& ordering = analysis.ordering;
-    const std::vector<int>& position = analysis.position;
+    const std::vector<int>& position = column_of_;
     const std::vector<std::int64_t>&touched = analysis.touched, &block_at = analysis.block_at;
 
     // The edge that a block of the factor comes from; the rest is fill.
@@ -283,7 +287,7 @@ void BlockLdlt::place_loads(Analysis& analysis) {
 void BlockLdlt::find_raw(Analysis& analysis) {
     // A constraint eliminated before all its bodies has no Schur complement to measure its pivot by.
     const int count = block_count();
-    const std::vector<int>& position = analysis.position;
+    const std::vector<int>& position = column_of_;
     raw_blocks_.clear();
     raw_edges_.clear();
     raw_start_.assign(1, 0);
@@ -365,6 +369,30 @@ bool BlockLdlt::factor(double floor) { return factor_with(floor, nullptr); }
 void BlockLdlt::solve(double* x) const {
     kernel::kernels().forward(view(), uniform_size_, x);
     kernel::kernels().backward(view(), uniform_size_, x);
+}
+
+void BlockLdlt::reach(std::span<const int> blocks, std::vector<int>& columns) const {
+    columns.clear();
+    for (const int block : blocks)
+        for (int k = column_of_[block]; k >= 0; k = parent_[k]) columns.push_back(k);
+    std::sort(columns.begin(), columns.end());
+    columns.erase(std::unique(columns.begin(), columns.end()), columns.end());
+}
+
+void BlockLdlt::forward(std::span<const int> columns, double* x) const {
+    kernel::Factor piece = view();
+    for (std::size_t from = 0, to = 0; from < columns.size(); from = to) {  // neighbours in one go
+        for (to = from + 1; to < columns.size() && columns[to] == columns[to - 1] + 1;) ++to;
+        piece.columns = columns_.data() + columns[from];
+        piece.column_count = static_cast<std::int64_t>(to - from);
+        kernel::kernels().forward(piece, uniform_size_, x);
+    }
+}
+
+BlockLdlt::Pivots BlockLdlt::pivots(int column) const noexcept {
+    const kernel::Column& k = columns_[column];
+    const int n = k.size;
+    return {k.offset, {factor_.data() + k.at + n * (n - 1) / 2, static_cast<std::size_t>(n)}};
 }
 
 double BlockLdlt::largest_constraint_scale() const noexcept {

@@ -50,6 +50,18 @@ public:
     /// x ← F⁻¹ x with the factor F as it is.
     void solve(double* x) const;
 
+    /// Columns of the factor, in order, that a forward substitution of what is zero outside these blocks writes to:
+    /// their ways to the root.
+    void reach(std::span<const int> blocks, std::vector<int>& columns) const;
+    /// x ← U⁻ᵀ x along such columns. Of two results y₁ and y₂, y₁ᵀ D⁻¹ y₂ is x₁ᵀ F⁻¹ x₂.
+    void forward(std::span<const int> columns, double* x) const;
+    /// D⁻¹ of a column's unknowns, and where they begin.
+    struct Pivots {
+        int offset = 0;
+        std::span<const double> inverse;
+    };
+    Pivots pivots(int column) const noexcept;
+
     /// x ← A⁻¹ rhs from zero, with so many residual corrections against the true A. rhs and x do not overlap.
     void solve_refined(const double* rhs, double* x, int refinements);
 
@@ -82,6 +94,7 @@ private:
     kernel::Factor view() const noexcept;
 
     std::vector<int> size_, offset_, order_;
+    std::vector<int> column_of_, parent_;  // of blocks; of columns, −1: a root
     std::vector<BlockEdge> edges_;
     std::vector<std::uint8_t> is_constraint_;
     bool thin_ = false;
