@@ -37,7 +37,7 @@ help:
 	@echo "make mutation  the judge's rules changed one at a time: do its tests notice?"
 	@echo "make tolerances the numbers contacts are tuned by, times and by ten: which tests and bits notice?"
 	@echo "make pairs      how many unchanged changes are blocked beside their base, and how many slower ones found"
-	@echo "make detectors  what the judge of run times finds and cries over, beside asv and Otava"
+	@echo "make detectors  what the judge of run times finds and cries over, beside asv, Otava and ruptures"
 	@echo "make aa        twenty nights of one build beside two busy processes: is any of them red?"
 	@echo "make crashes   200 commands killed at random moments, on each database: is the history whole?"
 	@echo "make hostile   10 000 documents that mean harm, on each database: refused, or stored as what they say?"
@@ -141,13 +141,13 @@ mutation: develop
 tolerances: develop
 	$(BIN)/python bench/tolerances.py $(PARTS)
 
-# asv and Otava stand in an environment of their own: Otava pins its NumPy.
 pairs: develop
 	$(BIN)/python bench/pairs.py --page docs/pairs.md
 
+# The other detectors stand in an environment of their own: Otava pins its NumPy.
 detectors:
 	$(PYTHON) -m venv build/detectors
-	build/detectors/bin/pip install -q msgspec asv==0.6.6 apache-otava==0.8.0
+	build/detectors/bin/pip install -q msgspec asv==0.6.6 apache-otava==0.8.0 ruptures==1.1.10
 	PYTHONPATH=. build/detectors/bin/python bench/detectors.py --page docs/detectors.md
 
 aa: develop

@@ -1,11 +1,13 @@
-"""`make detectors`: what the judge of run times finds and what it cries over, beside asv's steps and Otava.
+"""`make detectors`: what the judge of run times finds and what it cries over, beside asv's steps, Otava and ruptures.
 
 Synthetic noise and steps (tests/noise_battery.py), and histories that continuous integration of other projects has
 published (tests/data/recorded: each file says whose, at which commit). Alarms are starts of red stretches after
 sixty nights of learning; the other tools see each history whole, which favours them, and a step of theirs counts
-where it is upward and above 5 %, asv's own threshold for a regression. Delays are of night after night for all.
-asv and apache-otava are asked where they are installed; `make detectors` puts them into an environment of their own,
-for Otava pins its NumPy. `--page FILE` writes the tables as Markdown, with the versions that answered.
+where it is upward, of asv's where it is above 5 %, its own threshold for a regression. Delays are of night after night
+for all. ruptures splits by the squares of what is left (l2) and by a Gaussian kernel (rbf), in units of the noise from one
+night to the next; it leaves its penalty to who asks, so that these were chosen for it on these data (PENALTY).
+They are asked where they are installed; `make detectors` puts them into an environment of their own, for Otava pins
+its NumPy. `--page FILE` writes the tables as Markdown, with the versions that answered.
 """
 
 from __future__ import annotations
@@ -28,12 +30,13 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import itertools
 
 from spook_tracker.tracker.judge.run_times import judge_noisy
-from spook_tracker.tracker.judge.shifts import RARE
+from spook_tracker.tracker.judge.shifts import NORMAL, RARE
 from tests import noise_battery as battery
 
 LEARNING, NIGHTS = 60, 560
 AFTER = 15  # nights looked at after a step
 UPWARD = 0.05
+PENALTY = {"l2": 3.0, "rbf": 0.5}  # logarithms of the number of nights: less cries more, more is later
 NEAR = 10  # nights: a step may be told so much before or after another tells it
 AT = 45  # of sixty nights: where the step of a mix begins
 MIXES = [(0.0005, 0.03), (0.002, 0.03), (0.005, 0.03), (0.01, 0.03), (0.01, 0.05), (0.01, 0.1), (0.03, 0.1), (0.03, 0.2), (0.02, 0.05), (0.005, 0.02)]  # fmt: skip
@@ -85,6 +88,21 @@ def otava(values: Sequence[float]) -> list[int]:
     return [p.index for p in points if p.stats.mean_2 > p.stats.mean_1]
 
 
+def ruptures(kernel: str) -> Detector:
+    def detect(values: Sequence[float]) -> list[int]:
+        import ruptures
+
+        logs = np.log(np.array(values))
+        moves = np.diff(logs)
+        noise = NORMAL * float(np.median(np.abs(moves - np.median(moves)))) / math.sqrt(2.0)
+        search = ruptures.KernelCPD("linear" if kernel == "l2" else kernel, min_size=2)
+        ends = search.fit(logs / max(noise, 1e-12)).predict(pen=PENALTY[kernel] * math.log(len(logs)))
+        levels = [float(np.mean(logs[i:j])) for i, j in itertools.pairwise([0, *ends])]
+        return [end for end, (low, high) in zip(ends, itertools.pairwise(levels), strict=False) if high > low]
+
+    return detect
+
+
 def detectors() -> dict[str, Detector]:
     """Ours, and those of the others that are installed."""
     found: dict[str, Detector] = {"ours": ours}
@@ -92,12 +110,14 @@ def detectors() -> dict[str, Detector]:
         found["asv"] = asv_steps
     if find_spec("otava"):
         found["Otava"] = otava
+    if find_spec("ruptures"):
+        found |= {f"ruptures {kernel}": ruptures(kernel) for kernel in PENALTY}
     return found
 
 
 def others() -> str:
     """The other tools that are installed, with their versions."""
-    known = {"asv": "asv", "otava": "apache-otava"}
+    known = {"asv": "asv", "otava": "apache-otava", "ruptures": "ruptures"}
     return ", ".join(f"{tool} {version(tool)}" for module, tool in known.items() if find_spec(module))
 
 
@@ -176,7 +196,7 @@ def blamed(found: dict[str, Detector], series: int) -> list[str]:
                 named["ours"].append(night.worse_at)
                 accused.append(night.accused[0] < AT <= night.accused[1])
             for name in found:
-                if name != "ours" and (places := detect_any(name, list(map(float, values)))):
+                if name != "ours" and (places := detect_any(name, found[name], list(map(float, values)))):
                     named[name].append(min(places, key=lambda place: abs(place - AT)))
             named["least squares"].append(one_step(values))
         cells = [f"+{100.0 * step:g} % at {100.0 * noise:g} % noise"]
@@ -190,10 +210,10 @@ def blamed(found: dict[str, Detector], series: int) -> list[str]:
     return table(head, rows)
 
 
-def detect_any(name: str, values: Sequence[float]) -> list[int]:
+def detect_any(name: str, detect: Detector, values: Sequence[float]) -> list[int]:
     """Upward steps of another tool, however small."""
-    if name == "Otava":
-        return otava(values)
+    if name != "asv":
+        return detect(values)
     from asv.step_detect import detect_steps
 
     pairs = itertools.pairwise(detect_steps(list(values)))
@@ -223,14 +243,15 @@ def recorded(found: dict[str, Detector], files: Sequence[Path]) -> list[str]:
         histories = histories_of(file)
         for values in histories:
             places = {name: [p for p in detect(values) if p >= LEARNING] for name, detect in found.items()}
-            others = [p for name, theirs in places.items() if name != "ours" for p in theirs]
+            others = [p for name in ("asv", "Otava") for p in places.get(name, [])]
             for name, theirs in places.items():
                 counts[name] += len(theirs)
             seen = sum(any(abs(p - q) <= NEAR for q in others) for p in places["ours"])
             near, alone = near + seen, alone + len(places["ours"]) - seen
         cells = [f"{file.stem}: {len(histories)} series, {sum(map(len, histories))} values"]
         rows.append([*cells, *(str(count) for count in counts.values()), f"{near} and {alone}"])
-    head = ["alarms on recorded histories", *found, f"ours within {NEAR} nights of another's, and not"]
+    near_others = f"ours within {NEAR} nights of asv's or Otava's, and not"
+    head = ["alarms on recorded histories", *found, near_others]
     return table(head, rows) if rows else []
 
 
