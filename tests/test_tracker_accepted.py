@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
 from datetime import date
@@ -12,7 +13,7 @@ import pytest
 from click import unstyle
 
 from spook_tracker.tracker.cli.report_ci import night_markdown
-from spook_tracker.tracker.cli.report_compare import finding_lines
+from spook_tracker.tracker.cli.report_compare import finding_lines, findings_json
 from spook_tracker.tracker.cli.report_junit import junit_of_night
 from spook_tracker.tracker.judge.accepted import Accepted, AcceptedError, acceptance, read_accepted, unused
 from spook_tracker.tracker.judge.compare import compare
@@ -180,6 +181,7 @@ def test_night_and_page_say_what_is_expected_and_became_worse_and_hold_no_level_
         assert lines[0].endswith("; 1 are worse and accepted; 1 fail as expected")
         assert len(told) == said
         assert all("worse than expected; 0.01 → 300 m" in line and "by 2.0 decades" in line for line in told)
+        assert [f["name"] for f in json.loads(findings_json(findings))].count("worse than expected") == said
         assert ("worse than expected: expected to fail; " in junit_of_night(findings)) == said
         assert ("| worse than expected | 0.01 | 300 m |" in night_markdown(runs[-1], findings)) == said
         page = lead(site, causes_of(site))["blamed"]

@@ -359,7 +359,7 @@ def findings_json(findings: Sequence[Finding], then: Sequence[OldAnswers] = ()) 
             "series": finding.series,
             "test": finding.test,
             "word": finding.verdict.word,
-            "name": finding.name if finding.red else "",
+            "name": finding.name if finding.red or finding.worse_than_expected else "",
             "red": finding.red,
             "news": finding.red and finding.news,
             "state": finding.state,
