@@ -263,6 +263,14 @@ def test_a_rate_that_fell_is_told_as_the_time_that_rose() -> None:
         assert told[-1].state == "green"
 
 
+def test_a_rate_that_collapses_is_told_however_far_apart_its_first_nights_lay() -> None:
+    """A rate falls by a hundred per cent at most: what stands clear is asked of the time that it stands for."""
+    first = [1.0, 1.5, 1.0, 1.4, 0.8, 1.3, 0.7, 1.0]
+    told = judge_noisy([1.0 / time for time in (*first, 5.0, 5.0)], larger_is_better=True)
+
+    assert [night.state for night in told[-2:]] == ["suspected", "detected"]
+
+
 def test_two_clusters_are_told_from_one_hump_cut_in_two() -> None:
     for series in range(5):
         two = battery.clusters(0.3, 1.08)(battery.generator("two", series), 60)

@@ -11,6 +11,7 @@ import pytest
 from bench.detectors import AT, MIXES, one_step
 from spook_tracker.tracker.judge.noisy import Noisy
 from spook_tracker.tracker.judge.run_times import judge_noisy, judged_and_segments
+from spook_tracker.tracker.judge.segments import earlier_level
 
 
 def told_of(values: Any, **options: Any) -> list[Noisy]:
@@ -104,6 +105,34 @@ def test_an_old_level_hides_no_change(name: str) -> None:
 
         assert any(red[:3])
         assert red[-1]
+
+
+FIRST_NIGHTS = {
+    "three slow nights, six on the way": [1.82, 1.83, 1.62, 0.8, 0.87, 0.81, 0.9, 0.915, 0.9, *[1.0] * 45],
+    "three slow nights, six by turns": [1.82, 1.83, 1.62, *[0.85, 0.95] * 3, *[1.0] * 45],
+    "eight nights more than three times as slow": [1.0, 1.1, 1.2, 1.2, 1.2, 1.05, 0.85, 0.85, *[0.29] * 30],
+}
+
+
+@pytest.mark.parametrize("name", FIRST_NIGHTS)
+def test_the_first_nights_of_a_project_hide_no_change(name: str) -> None:
+    """However much slower they were: twice as fast is as far from a level as twice as slow."""
+    old = FIRST_NIGHTS[name]
+    for seed in range(10):
+        values = np.array([*old, *[1.18 * old[-1]] * 4]) * noise(seed, 0.01, len(old) + 4)
+
+        assert any(night.news for night in told_of(values)[len(old) :])
+
+
+def test_few_first_nights_are_an_older_level_where_chance_seldom_puts_them_on_one_side() -> None:
+    """Three of 140 are the slowest once in 447 580 draws; of 60 once in 34 220, which is not rare."""
+    for nights, older in ((60, None), (140, 3)):
+        values = noise(1, 0.01, nights)
+        values[:3] *= 1.5
+
+        assert earlier_level(values) == earlier_level(2.0 - values) == older
+    assert earlier_level(noise(1, 0.01, 140)) is None
+    assert earlier_level(np.linspace(1.0, 2.0, 140)) is None  # a way, and no two levels
 
 
 def test_what_is_printed_is_what_the_percentage_says() -> None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.document.middle import median, median_of_sorted
 from spook_tracker.tracker.judge.normal_nights import exceeded
-from spook_tracker.tracker.judge.segments import NORMAL, Boundary, Standing, inner_split
+from spook_tracker.tracker.judge.segments import NORMAL, Boundary, Standing, earlier_level, inner_split
 from spook_tracker.tracker.judge.shifts import (
     BASE,
     CLIP,
@@ -141,6 +141,13 @@ class PresentLevel:
     def _worse_by(self, level: float, value: float) -> float:
         return worse_by(level, value, self.larger_is_better)
 
+    def _costlier_by(self, level: float, value: float) -> float:
+        """The same of a time and of a rate: half the rate is twice the time, so that no fall is too deep to be told."""
+        change = self._worse_by(level, value)
+        if not self.larger_is_better or not math.isfinite(change):
+            return change
+        return change / (1.0 - change) if change < 1.0 else math.inf
+
     def _number(self, place: int) -> bool:
         """Whether a night has a time: none is infinite, and so is that of a rate of zero."""
         return math.isfinite(self.values[place]) and not (self.larger_is_better and self.values[place] == 0.0)
@@ -164,14 +171,13 @@ class PresentLevel:
         reached = self._reached()
         if len(reached) < 2:
             return threshold
-        lowest = second_largest([-x for x in reached])
-        return REACH * (1.0 + UNSEEN / len(reached)) * lowest
+        return REACH * (1.0 + UNSEEN / len(reached)) * second_largest(list(map(way_back, reached)))
 
     def _join(self, places: Sequence[int]) -> None:
         """Nights that hold."""
         if len(self.now.places) >= FEWEST:
             level = self._level()[0]
-            self.reached += [self._worse_by(level, self.values[i]) for i in places]
+            self.reached += [self._costlier_by(level, self.values[i]) for i in places]
             if self._outer is not None:
                 moved = [*self.reached[-len(places) :], *self.reached[:-REACHED]]
                 self._outer = self._outer if max(moved) < self._outer else None
@@ -220,13 +226,11 @@ class PresentLevel:
         count = len(self.now.places)
         if count < FEWEST_BASE or count % FEWEST:
             return
-        if inner_split(self._costs(self.now.places[-BASE:]), 1.0) is None:
-            return  # nearly always
         base = self._base()
         costs = base.tolist()
-        split = inner_split(costs, 1.0)
+        split = inner_split(costs, 1.0) or earlier_level(base)
         if split is None:
-            return
+            return  # nearly always
         import numpy as np
 
         low, high = base[:split], base[split:]
@@ -243,7 +247,7 @@ class PresentLevel:
         """What the segment's nights reached, of other nights than before."""
         self._told = None
         level = self._level()[0]
-        self.reached = [self._worse_by(level, self.values[i]) for i in self.now.places[-REACHED:]]
+        self.reached = [self._costlier_by(level, self.values[i]) for i in self.now.places[-REACHED:]]
         self._told = self._outer = None
 
     def _base(self) -> Values:
@@ -281,9 +285,9 @@ class PresentLevel:
     def _chance(self, nights: Sequence[int]) -> float:
         """How probable it is that these nights lie so far off by chance: the tail of Student's t."""
         level, noise, _ = self._level()
-        off = [abs(self._worse_by(level, self.values[i])) for i in nights]
         own, reached = len(self.now.places), self._reached()
-        side = [-x for x in reached] if self.better else reached
+        off = [self._costlier_by(level, self.values[i]) for i in nights]
+        off, side = (list(map(way_back, x)) if self.better else x for x in (off, reached))
         if len(side) > 1:
             noise = max(noise, second_largest(side) / SECOND)
         known = min(own, WINDOW) if own >= ENOUGH else min(WINDOW, own + len(self.remembers))
@@ -293,6 +297,11 @@ class PresentLevel:
             return 0.0
         t = sum(off) / len(off) / (noise * math.sqrt(1.0 / len(off) + 1.0 / min(own, WINDOW)))
         return exceeded(min(t, 1e9), max(FEWEST, known + len(off) - 2))
+
+
+def way_back(change: float) -> float:
+    """What undoes a relative change: twice as fast is as far from a level as twice as slow."""
+    return -change / (1.0 + change) if -1.0 < change < math.inf else math.copysign(1.0, -change) * math.inf
 
 
 def second_largest(values: Sequence[float]) -> float:

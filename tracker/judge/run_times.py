@@ -26,6 +26,7 @@ from spook_tracker.tracker.judge.level import (
     Reference,
     exponent_of,
     times_two_to,
+    way_back,
 )
 from spook_tracker.tracker.judge.noisy import Noisy
 from spook_tracker.tracker.judge.segments import Segment, boundary, spread_of
@@ -109,13 +110,13 @@ class _Walk(DriftingLevel):
     broken: bool = False  # no finite value last night
 
     def held_to(self) -> Usual:
-        """The level that a night is held to, and what stands clear of it."""
+        """The level that a night is held to, and by which change of the value it stands clear of it for the worse."""
+        level, threshold = math.inf, FLOOR
         if self.reference is not None:
-            return self.reference.level, self.reference.threshold
-        if not self.now.places:
-            return math.inf, FLOOR
-        level, _, threshold = self._level()
-        return level, threshold
+            level, threshold = self.reference.level, self.reference.threshold
+        elif self.now.places:
+            level, _, threshold = self._level()
+        return level, threshold / (1.0 + threshold) if self.larger_is_better else threshold
 
     # One more night.
 
@@ -128,7 +129,7 @@ class _Walk(DriftingLevel):
             return self._no_value(place, accepted)
         change = self._worse_by(level, value)
         self.broken = False
-        self._see(place, change, threshold)
+        self._see(place, self._costlier_by(level, value), threshold)
         found = self._begins()
         if not accepted and (mixed := self._of_two_levels(value, found)) is not None:
             return self._drawn_anew(place, mixed)
@@ -176,7 +177,8 @@ class _Walk(DriftingLevel):
     def _see(self, place: int, change: float, threshold: float) -> None:
         """The nights in a row that stand clear of the segment on one side; what no second one confirmed is noise."""
         worse = change > threshold and self._stands_clear(change)
-        better = -change > threshold and -change > self._reach_down(threshold)
+        faster = way_back(change)
+        better = faster > threshold and faster > self._reach_down(threshold)
         if self.off and (not (worse or better) or better != self.better):
             self._join(self.off)
             self.off = []
@@ -324,7 +326,7 @@ class _Walk(DriftingLevel):
         self.over.append(
             Segment(nights[0] if began is None else began.best, before[-1], old, noise, was, began)
         )
-        off = [self._worse_by(old, self.values[i]) for i in before[-REACHED:]]
+        off = [self._costlier_by(old, self.values[i]) for i in before[-REACHED:]]
         self.earlier = [*self.earlier, *off][-REACHED:]
         self.remembers, self.reached = [*self.remembers, *off[-WINDOW:]][-WINDOW:], []
         self._outer = None
@@ -377,7 +379,7 @@ class _Walk(DriftingLevel):
         """Whether a level is worse than what it is held to, beyond noise and tolerance."""
         noise = max(held.noise, self._level()[1])
         noise *= SIGMAS * math.sqrt(1.0 / nights + 1.0 / held.nights)
-        return self._worse_by(held.level, level) > max(
+        return self._costlier_by(held.level, level) > max(
             LEAST, min(noise, held.threshold), self._tolerated(held.level)
         )
 

@@ -23,6 +23,11 @@ Standing = Literal["usual", "red", "accepted", "recovered", "flaky"]
 
 NORMAL = 1.4826  # standard deviations in a median absolute deviation
 FAR = 3.5  # noises: more of one night is an accident
+CHOICES = (
+    300_000  # of the first nights among all: by chance an older level as rarely as 4.5 standard deviations
+)
+FEWEST_LATER = 16  # nights behind an older level
+APART = 4.0  # standard deviations inside both
 SURE = 0.998  # of the accused range: its nights hold the true one with this probability
 
 
@@ -130,6 +135,31 @@ def inner_split(costs: Sequence[float], remembered: float, fewest: int = 8) -> i
     if max(high, -low) <= 4.5 / math.sqrt(remembered):
         return None
     return int(off.argmax() if high >= -low else off.argmin()) + fewest
+
+
+def earlier_level(costs: Values) -> int | None:
+    """How many of the first nights are all slower, or all faster, than every later one, and stand clear of these.
+
+    Of nights drawn from one level the first so many are that once in as many times as there are choices of them,
+    whatever the noise is. Ranks alone tell few nights from many only to a limit. None where there are none.
+    """
+    import numpy as np
+
+    count = len(costs)
+    most = count - FEWEST_LATER
+    if most < 2:
+        return None
+    above, below = np.minimum.accumulate(costs)[:most], np.maximum.accumulate(costs)[:most]
+    later = costs[::-1]
+    highest, lowest = np.maximum.accumulate(later)[::-1], np.minimum.accumulate(later)[::-1]
+    for split in (
+        np.flatnonzero((above > highest[1 : most + 1]) | (below < lowest[1 : most + 1])) + 1
+    ).tolist():
+        low, high = costs[:split], costs[split:]
+        noise = math.sqrt((float(np.var(low)) * split + float(np.var(high)) * (count - split)) / count)
+        if math.comb(count, split) >= CHOICES and abs(float(low.mean() - high.mean())) > APART * noise:
+            return int(split)
+    return None
 
 
 @lru_cache(maxsize=128)
