@@ -1,0 +1,232 @@
+"""Histories that strangers bring, through the command line: their files in, what is told of them out."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from spook_tracker.tracker.cli.main import main
+
+DAY = 86_400_000  # ms
+NIGHTS = 97
+LAST = NIGHTS - 2  # where the last two nights begin
+SPEED_UPS = [2.0, 1.9, 1.7, 1.5, 1.4, 1.2, 1.1]  # of a new project
+
+
+def noise(seed: int, share: float = 0.005) -> Any:
+    return 1.0 + share * np.random.default_rng(seed).standard_normal(NIGHTS)
+
+
+def from_night(night: int, factor: float) -> Any:
+    return np.where(np.arange(NIGHTS) < night, 1.0, factor)
+
+
+STEPS = {f"step{n}": noise(n) * from_night(80, 1.03) for n in range(8)}
+SERIES = {
+    **STEPS,
+    "fast": noise(20, 0.01) * from_night(40, 2.0) * np.where(np.arange(NIGHTS) == 70, 0.5, 1.0),
+    "old": noise(21) * np.array([*SPEED_UPS, *[1.0] * 70, *[1.25] * 20]),
+    "second": noise(22) * from_night(30, 1.1) * from_night(LAST, 10.0),
+    "slow": noise(23) * from_night(LAST, 1.15),
+    "back": noise(24) * from_night(60, 1.5) * from_night(LAST, 1.0 / 1.5),
+    "known": noise(26) * from_night(50, 1.5),
+}
+
+
+def data(
+    series: Mapping[str, Sequence[float | None]], units: Callable[[int], str] = lambda _: "ns/iter"
+) -> str:
+    """A history in the form of github-action-benchmark's page; None where a benchmark is not in a run."""
+    entries = [
+        {
+            "commit": {"id": f"{night:04d}" + "a" * 36, "timestamp": "2025-01-01T00:00:00Z"},
+            "date": 1735689600000 + night * DAY,
+            "tool": "cargo",
+            "benches": [
+                {"name": name, "unit": units(night), "value": values[night]}
+                for name, values in series.items()
+                if night < len(values) and values[night] is not None
+            ],
+        }
+        for night in range(max(map(len, series.values())))
+    ]
+    return "window.BENCHMARK_DATA = " + json.dumps({"repoUrl": "r", "entries": {"B": entries}})
+
+
+class Told:
+    """What the command says of a database."""
+
+    def __init__(self, folder: Path) -> None:
+        self.database = f"sqlite:///{folder}/x.db"
+
+    def __call__(self, *words: object) -> tuple[int, str]:
+        done = CliRunner().invoke(main, [*map(str, words), "--db", self.database])
+        return done.exit_code, done.output
+
+    def nights(self, test: str) -> list[dict[str, Any]]:
+        return list(json.loads(self("trend", test, "--json")[1])[0]["nights"])
+
+
+def imported(folder: Path, *contents: str) -> Told:
+    """Each content a file, all of them imported by one command."""
+    told, files = Told(folder), []
+    for place, content in enumerate(contents):
+        files.append(folder / f"{place}.{'json' if content.startswith('{') else 'js'}")
+        files[-1].write_text(content)
+    assert told("import", *files)[0] == 0
+    return told
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> Told:
+    series = {name: [1000.0 * float(value) for value in values] for name, values in SERIES.items()}
+    return imported(tmp_path_factory.mktemp("strangers"), data(series))
+
+
+def test_the_right_commit_is_named(told: Told) -> None:
+    named = [told.nights(name)[-1]["first_bad"][:4] for name in STEPS]
+
+    assert named.count("0080") >= 7
+
+
+def test_one_fast_night_closes_no_red(told: Told) -> None:
+    nights = told.nights("fast")
+
+    assert {night["state"] for night in nights[42:]} == {"detected"}
+    assert (sum(night["news"] for night in nights), nights[-1]["first_bad"][:4]) == (1, "0040")
+
+
+def test_levels_of_long_ago_hide_no_change(told: Told) -> None:
+    assert told.nights("old")[-1]["state"] == "detected"
+
+
+def test_a_second_regression_on_a_red_run_time_is_new_and_blamed_on_its_own_commit(told: Told) -> None:
+    code, said = told("judge", "latest", "--test", "second")
+
+    assert (code, "1 new tonight" in said, f"bad since {LAST:04d}" in said) == (1, True, True)
+
+
+def test_two_versions_are_compared_with_each_other(told: Told) -> None:
+    """Both are slow, the second confirms the first: nothing became worse between them."""
+    for more, ended in (((), 0), (("--against-history",), 1)):
+        assert told("compare", f"{LAST:04d}", f"{LAST + 1:04d}", "--test", "slow", *more)[0] == ended
+    code, said = told("compare", f"{LAST - 1:04d}", f"{LAST + 1:04d}", "--test", "slow")
+    pair, percent = re.search(r"slow/default/run_time +([\d.e-]+) +([\d.e-]+) s +\+([\d.]+) %", said), 0.0
+    assert pair is not None
+    percent = 100.0 * (float(pair[2]) / float(pair[1]) - 1.0)
+
+    assert (code, percent) == (1, pytest.approx(float(pair[3]), abs=0.1))
+
+
+def test_a_night_says_what_recovered(told: Told) -> None:
+    code, said = told("judge", "latest", "--test", "back")
+
+    assert (code, "1 recovered" in said, "✓ back/default/run_time: recovered" in said) == (0, True, True)
+
+
+def test_values_at_the_end_of_the_doubles_are_no_defect(tmp_path: Path) -> None:
+    values = [*(1e307 * value for value in noise(25)[:-3].tolist()), *[1.7e308] * 3]
+    code, said = imported(tmp_path, data({"x": values}))("judge", "latest")
+
+    assert (code, "x/default/run_time: slower" in said) == (1, True)
+
+
+def test_an_accepted_run_time_is_red_after_its_day(told: Told, tmp_path: Path) -> None:
+    accepted = tmp_path / "accepted.toml"
+    for until, ended in (("2025-04-07", 0), ("2025-04-06", 1)):
+        accepted.write_text(
+            f'[[accepted]]\nseries = "known/*"\nrange = [0.0, 1.0]\nwho = "a"\nwhy = "b"\nuntil = {until}\n'
+        )
+        assert told("judge", "latest", "--test", "known", "--accepted", accepted)[0] == ended
+
+
+def test_where_time_alone_orders_commits_it_is_said(told: Told) -> None:
+    assert "ordered by time, as neither parents nor git" in told("judge", "latest", "--test", "second")[1]
+
+
+@pytest.mark.parametrize(
+    ("units", "factor", "ended"),
+    [
+        (["ops/s"], 0.6, 1), (["ops/us"], 1.6, 0), (["MB/s"], 0.6, 1), (["KB", "MB"], 1.5e-3, 1), (["KB", "MB"], 1e-3, 0),
+    ],
+)  # fmt: skip
+def test_units_have_a_direction_and_a_size(
+    units: list[str], factor: float, ended: int, tmp_path: Path
+) -> None:
+    values = [
+        float(1000.0 * value) * (factor if night >= 86 else 1.0) for night, value in enumerate(noise(1))
+    ]
+    told = imported(tmp_path, data({"x": values}, lambda night: units[-1 if night >= 86 else 0]))
+
+    assert told("judge", "latest")[0] == ended
+
+
+@pytest.mark.parametrize("bad", [math.nan, -1.0, None])
+def test_one_bad_value_costs_its_own_benchmark_and_no_other(bad: float | None, tmp_path: Path) -> None:
+    """NaN, a negative time, and a benchmark that is not there any more while its sibling is."""
+    values = [float(1000.0 * value) for value in noise(1)]
+    told = imported(tmp_path, data({"x": [*values[:-1], bad], "y": values}))
+    code, said = told("judge", "latest")
+
+    assert (code, "x/default/run_time: " in said, "y/default" in said) == (1, True, False)
+
+
+def asv(night: int, results: Mapping[str, list[Any]]) -> str:
+    return json.dumps(
+        {
+            "version": 2, "commit_hash": f"{night:04d}" + "d" * 36, "env_name": "e", "date": 1735689600000 + night * DAY,
+            "params": {"machine": "m"}, "result_columns": ["result", "params", "version"], "results": results,
+        }
+    )  # fmt: skip
+
+
+def test_a_benchmark_of_asv_is_its_version_its_parameters_and_its_unit(tmp_path: Path) -> None:
+    """Twelve nights, then another version four times as slow, a parameter put in front, and one that fails."""
+    before = {"a.time_x": [[0.1], [], "v1"], "b.time_x": [[0.01, 0.1], [["'some'", "'many'"]], "v"]}
+    after = {
+        "a.time_x": [[0.4], [], "v2"],
+        "b.time_x": [[0.001, 0.01, None], [["'few'", "'some'", "'many'"]], "v"],
+    }
+    told = imported(tmp_path, *(asv(night, before if night < 12 else after) for night in range(14)))
+    code, said = told("judge", "latest")
+
+    assert (code, said.count("✗ b.time_x('many')/e/run_time: crashed"), said.count("✗")) == (1, 1, 2)
+    folder = tmp_path / "asv" / "results" / "m"
+    folder.mkdir(parents=True)
+    (folder / "0001-e.json").write_text(asv(20, before))
+    (folder.parent / "benchmarks.json").write_text(json.dumps({"version": 2}))
+    (folder / "machine.json").write_text(json.dumps({"machine": "m", "version": 1}))
+    assert told("import", folder.parent)[0] == 0
+
+
+def test_a_hosted_runner_has_a_baseline_whatever_it_is_called(tmp_path: Path) -> None:
+    def night(number: int, seconds: float) -> str:
+        cpu = {"brand_raw": "Example 7763 64-Core Processor", "count": 4}
+        stats = {
+            "min": seconds,
+            "median": seconds,
+            "max": 1.01 * seconds,
+            "data": [seconds, seconds, 1.01 * seconds],
+        }
+        return json.dumps(
+            {
+                "machine_info": {"node": f"runner-{number}", "cpu": cpu, "system": "Linux"}, "version": "5.0.0",
+                "commit_info": {"id": f"{number:04d}" + "c" * 36, "time": "2025-01-01T00:00:00+00:00", "project": "p"},
+                "benchmarks": [{"name": "t", "fullname": "t", "params": None, "stats": stats}],
+                "datetime": f"2025-01-{number + 1:02d}T03:00:00+00:00",
+            }
+        )  # fmt: skip
+
+    told = imported(
+        tmp_path, *(night(n, 1e-3 * float(noise(1)[n]) * (1.6 if n >= 20 else 1.0)) for n in range(22))
+    )
+
+    assert told("judge", "latest")[0] == 1
