@@ -14,7 +14,14 @@ from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.document.middle import median, median_of_sorted
 from spook_tracker.tracker.judge.normal_nights import exceeded
-from spook_tracker.tracker.judge.segments import NORMAL, Boundary, Standing, earlier_level, inner_split
+from spook_tracker.tracker.judge.segments import (
+    NORMAL,
+    Boundary,
+    Standing,
+    begins_apart,
+    earlier_level,
+    inner_split,
+)
 from spook_tracker.tracker.judge.shifts import (
     BASE,
     CLIP,
@@ -89,8 +96,15 @@ class PresentLevel:
     )  # values since each segment was told to begin
     until: int = 0  # nights seen
     start: int = 0  # the first night there is, or the last that was accepted
+    timed: Sequence[
+        bool
+    ] = ()  # whether each night has a time: none is infinite, and so is that of a rate of zero
     _told: tuple[float, float, float] | None = None  # what `_level` said, until a night joins or leaves
     _outer: float | None = None  # the second largest of what its own nights reached, while it is known
+
+    def __post_init__(self) -> None:
+        zero = self.larger_is_better
+        self.timed = [math.isfinite(value) and not (zero and value == 0.0) for value in self.values]
 
     def _costs(self, places: Sequence[int]) -> list[float]:
         """Values of which larger is worse, and a change as many per cent: a rate gives the time of one."""
@@ -143,14 +157,8 @@ class PresentLevel:
 
     def _costlier_by(self, level: float, value: float) -> float:
         """The same of a time and of a rate: half the rate is twice the time, so that no fall is too deep to be told."""
-        change = self._worse_by(level, value)
-        if not self.larger_is_better or not math.isfinite(change):
-            return change
-        return change / (1.0 - change) if change < 1.0 else math.inf
-
-    def _number(self, place: int) -> bool:
-        """Whether a night has a time: none is infinite, and so is that of a rate of zero."""
-        return math.isfinite(self.values[place]) and not (self.larger_is_better and self.values[place] == 0.0)
+        change = worse_by(level, value, self.larger_is_better)
+        return way_back(-change) if self.larger_is_better else change
 
     def _stands_clear(self, change: float) -> bool:
         """Whether a night beyond what is usual is beyond where nights that remember each other go, too."""
@@ -177,7 +185,8 @@ class PresentLevel:
         """Nights that hold."""
         if len(self.now.places) >= FEWEST:
             level = self._level()[0]
-            self.reached += [self._costlier_by(level, self.values[i]) for i in places]
+            costlier = self._costlier_by if self.larger_is_better else self._worse_by
+            self.reached += [costlier(level, self.values[i]) for i in places]
             if self._outer is not None:
                 moved = [*self.reached[-len(places) :], *self.reached[:-REACHED]]
                 self._outer = self._outer if max(moved) < self._outer else None
@@ -226,11 +235,14 @@ class PresentLevel:
         count = len(self.now.places)
         if count < FEWEST_BASE or count % FEWEST:
             return
+        costs = self._costs(self.now.places[-BASE:])
+        if inner_split(costs, 1.0) is None and not begins_apart(costs):
+            return  # nearly always
         base = self._base()
         costs = base.tolist()
         split = inner_split(costs, 1.0) or earlier_level(base)
         if split is None:
-            return  # nearly always
+            return
         import numpy as np
 
         low, high = base[:split], base[split:]
@@ -301,7 +313,7 @@ class PresentLevel:
 
 def way_back(change: float) -> float:
     """What undoes a relative change: twice as fast is as far from a level as twice as slow."""
-    return -change / (1.0 + change) if -1.0 < change < math.inf else math.copysign(1.0, -change) * math.inf
+    return -change / (1.0 + change) if -1.0 < change < math.inf else math.copysign(math.inf, -change)
 
 
 def second_largest(values: Sequence[float]) -> float:

@@ -125,11 +125,11 @@ class _Walk(DriftingLevel):
         if not self.now.places:
             return self._without_a_level(place)
         level, _, threshold = self._level()
-        if not self._number(place):
+        if not self.timed[place]:
             return self._no_value(place, accepted)
         change = self._worse_by(level, value)
         self.broken = False
-        self._see(place, self._costlier_by(level, value), threshold)
+        self._see(place, self._costlier_by(level, value) if self.larger_is_better else change, threshold)
         found = self._begins()
         if not accepted and (mixed := self._of_two_levels(value, found)) is not None:
             return self._drawn_anew(place, mixed)
@@ -145,7 +145,7 @@ class _Walk(DriftingLevel):
 
     def _without_a_level(self, place: int) -> Noisy:
         """Before the first number there is nothing to be worse than."""
-        number = self._number(place)
+        number = self.timed[place]
         if number:
             self._start(place)
         new = place == self.start
@@ -177,7 +177,7 @@ class _Walk(DriftingLevel):
     def _see(self, place: int, change: float, threshold: float) -> None:
         """The nights in a row that stand clear of the segment on one side; what no second one confirmed is noise."""
         worse = change > threshold and self._stands_clear(change)
-        faster = way_back(change)
+        faster = way_back(change) if change < 0.0 else 0.0
         better = faster > threshold and faster > self._reach_down(threshold)
         if self.off and (not (worse or better) or better != self.better):
             self._join(self.off)
@@ -223,7 +223,7 @@ class _Walk(DriftingLevel):
         if self._worse_by(level, sum([self.values[i] for i in last]) / len(last)) < 0.5 * LEAST:
             return None
         first = max(self.start, self.until - BASE - LONGEST_SPAN)
-        nights = [i for i in range(first, self.until) if self._number(i)]
+        nights = [i for i in range(first, self.until) if self.timed[i]]
         if len(nights) < FEWEST_BASE + FEWEST_SPAN:
             return None
         found = shift(self._costs(nights), True, self.ages[nights[-1]] - self.ages[self.start])
@@ -276,7 +276,7 @@ class _Walk(DriftingLevel):
             begun.append((len(self.over), self.now.places[0]))
         asked = found[0] if found else len(self.now.places) + len(self.off)  # of the last nights
         for place, first in begun:
-            nights = [i for i in range(max(first, self.until - BASE), self.until) if self._number(i)]
+            nights = [i for i in range(max(first, self.until - BASE), self.until) if self.timed[i]]
             if len(nights) >= max(FEWEST_BASE, asked + 1) and drawn_anew(
                 np.array(self._costs(nights)), asked
             ):
@@ -288,7 +288,7 @@ class _Walk(DriftingLevel):
         held, _ = self.held_to()
         joined = self.over[segment:]
         first = joined[0].first if joined else self.now.places[0]
-        nights = [i for i in range(self.start, self.until) if self._number(i)]
+        nights = [i for i in range(self.start, self.until) if self.timed[i]]
         if joined:
             del self.over[segment:]
             before = [i for i in nights if i < first][-WINDOW:]
@@ -310,7 +310,7 @@ class _Walk(DriftingLevel):
         count, told = found
         if count >= len(nights):  # the segment is as young: what was before it
             first = max(self.start, place - WINDOW - SETTLED)
-            nights = [i for i in range(first, place + 1) if self._number(i)]
+            nights = [i for i in range(first, place + 1) if self.timed[i]]
         old, noise, threshold = self._level()
         near = nights[-WINDOW - count :]
         where = boundary(near, self._costs(near), count)

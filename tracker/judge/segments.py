@@ -137,6 +137,13 @@ def inner_split(costs: Sequence[float], remembered: float, fewest: int = 8) -> i
     return int(off.argmax() if high >= -low else off.argmin()) + fewest
 
 
+def begins_apart(costs: Sequence[float]) -> bool:
+    """Whether the first nights lie outside of the last ones: a look that costs little, before `earlier_level`."""
+    last = costs[-FEWEST_LATER:]
+    low, high = min(last), max(last)
+    return not low <= costs[0] <= high and not low <= costs[1] <= high
+
+
 def earlier_level(costs: Values) -> int | None:
     """How many of the first nights are all slower, or all faster, than every later one, and stand clear of these.
 
