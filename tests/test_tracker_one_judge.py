@@ -23,6 +23,7 @@ from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.tonight import tonight
 from spook_tracker.tracker.library import trend
 from spook_tracker.tracker.website.publish import publish
+from tests.night_readers import read_alike
 from tests.recoveries import recovered_alike
 from tests.synthetic_history import MACHINE, DocumentHistory, document, sample, series
 
@@ -244,7 +245,7 @@ def noted(runs: list[RunDocument], accepted: list[Accepted]) -> tuple[list[RunDo
 
 
 def say_the_same(runs: list[RunDocument], accepted: list[Accepted]) -> None:
-    """Night, JUnit, page, feed, badge, trend, comparison."""
+    """Night, JUnit, JSON, Markdown, page, feed, badge, trend, comparison."""
     from spook_tracker.tracker.judge.standing import worst
     from spook_tracker.tracker.website.causes import causes_of
     from spook_tracker.tracker.website.events import all_events
@@ -284,6 +285,9 @@ def say_the_same(runs: list[RunDocument], accepted: list[Accepted]) -> None:
 
     assert page_recovered(told) == len(recovered)
     causes = causes_of(told)
+    tests = sorted({key.partition("/")[0] for key in word})
+    every = [one for test in tests for one in trend(records, test, None, accepted)]
+    read_alike(runs[-1], findings, every, told, causes)
     ended = {h.series for c in causes for h in c.hits if h.end is not None and h.end is told.tonight}
     assert recovered <= ended
     here = runs[-1].machine.fingerprint  # what is red on another machine lasts there
@@ -301,8 +305,8 @@ def say_the_same(runs: list[RunDocument], accepted: list[Accepted]) -> None:
         worst = f"{cause.worst.name}: {cause.worst.series}"
         assert any(worst in text and event.definition.test in text for text in texts)
 
-    for test in {key.partition("/")[0] for key in word}:
-        trends_told = trend(records, test, None, accepted)
+    for test in tests:
+        trends_told = [one for one in every if one.definition.test == test]
         assert summary(trends_told).startswith("\x1b[32m✓") == (
             not any(found.nights[-1].red for found in trends_told)
         )
