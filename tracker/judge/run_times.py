@@ -199,16 +199,8 @@ class _Walk(DriftingLevel):
 
     def _together(self) -> tuple[int, Shift | None] | None:
         """Several nights that together lie above the segment's others."""
-        if self.off and self.better:
-            return None
         level = self._level()[0]
-        if level <= 0.0 or len(self.now.places) < FEWEST_BASE + FEWEST_SPAN - len(self.off):
-            return None
-        last = self.now.places[-FEWEST_SPAN:]
-        if self.off:
-            last = [*last, *self.off][-FEWEST_SPAN:]
-        mean = self._worse_by(level, sum([self.values[i] for i in last]) / len(last))
-        if mean < LEAST:
+        if level <= 0.0 or (mean := self._last_above(level)) < LEAST:
             return None  # most nights: nothing to count
         nights = [*self.now.places[-BASE - LONGEST_SPAN :], *self.off]
         age = self.ages[nights[-1]] - self.ages[self.start]
@@ -219,16 +211,19 @@ class _Walk(DriftingLevel):
         """Several nights above both of two clusters that nights are drawn from at random, whatever segments they made."""
         if not self.over or self.now.standing == "red" or len(self.now.places) >= BASE:
             return None
-        level, last = self._level()[0], [*self.now.places[-FEWEST_SPAN:], *self.off][-FEWEST_SPAN:]
-        if self._worse_by(level, sum([self.values[i] for i in last]) / len(last)) < 0.5 * LEAST:
+        level = self._level()[0]
+        if self._last_above(level) < 0.5 * LEAST:
             return None
         first = max(self.start, self.until - BASE - LONGEST_SPAN)
         nights = [i for i in range(first, self.until) if self.timed[i]]
-        if len(nights) < FEWEST_BASE + FEWEST_SPAN:
-            return None
         found = shift(self._costs(nights), True, self.ages[nights[-1]] - self.ages[self.start])
         told = found is not None and found.apart and found.change > self._tolerated(level)
         return (found.span, found) if found is not None and told else None
+
+    def _last_above(self, level: float) -> float:
+        """How far the mean of the last few nights lies above a level."""
+        last = [*self.now.places[-FEWEST_SPAN:], *self.off][-FEWEST_SPAN:]
+        return self._worse_by(level, sum([self.values[i] for i in last]) / len(last))
 
     def _came_back(self) -> tuple[int, None] | None:
         """Whether the last nights of a red segment are more probably of the level before it (Page's cumulative sum)."""
@@ -272,8 +267,7 @@ class _Walk(DriftingLevel):
             for place, segment in enumerate(self.over)
             if segment.first >= self.start and segment.standing in ("usual", "accepted")
         ]
-        if found:
-            begun.append((len(self.over), self.now.places[0]))
+        begun.append((len(self.over), self.now.places[0]))
         asked = found[0] if found else len(self.now.places) + len(self.off)  # of the last nights
         for place, first in begun:
             nights = [i for i in range(max(first, self.until - BASE), self.until) if self.timed[i]]
@@ -311,7 +305,7 @@ class _Walk(DriftingLevel):
         if count >= len(nights):  # the segment is as young: what was before it
             first = max(self.start, place - WINDOW - SETTLED)
             nights = [i for i in range(first, place + 1) if self.timed[i]]
-        old, noise, threshold = self._level()
+        _, noise, threshold = self._level()
         near = nights[-WINDOW - count :]
         where = boundary(near, self._costs(near), count)
         first = where.best
