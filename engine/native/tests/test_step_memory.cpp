@@ -132,9 +132,9 @@ void what_rests_allocates_nothing() {
 
 void what_falls_grows_arrays_and_no_more() {
     for (const SolverKind solver : every) {
-        falls_again_without_allocating("heap of spheres", heap(solver, 48, false), 90);
-        falls_again_without_allocating("mixed heap", heap(solver, 36, true), 90);
-        falls_again_without_allocating("mixed heap that rebounds", heap(solver, 24, true, 0.4), 90);
+        falls_again_without_allocating("heap of spheres", heap(solver, 48, false), 60);
+        falls_again_without_allocating("mixed heap", heap(solver, 24, true), 60);
+        falls_again_without_allocating("mixed heap that rebounds", heap(solver, 24, true, 0.4), 60);
     }
 }
 
