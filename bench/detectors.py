@@ -30,7 +30,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 import itertools
 
 from spook_tracker.tracker.judge.run_times import judge_noisy
-from spook_tracker.tracker.judge.shifts import NORMAL, RARE
+from spook_tracker.tracker.judge.segments import NORMAL
+from spook_tracker.tracker.judge.shifts import RARE
 from tests import noise_battery as battery
 
 LEARNING, NIGHTS = 60, 560

@@ -26,23 +26,16 @@ class DriftingLevel(PresentLevel):
     def _anchors(self, place: int, release: bool) -> None:
         if release and len(self.anchor) >= CREEP:
             self.anchor, self.crept = [place], 0.0
-        elif len(self.anchor) < CREEP and place not in self.anchor:
+        elif len(self.anchor) < CREEP:
             self.anchor = [*self.anchor, place]
             self.anchored = median(self.values[i] for i in self.anchor)
 
-    def _ends(self) -> tuple[float, float] | None:
-        """The middle of the nights at the last release, and of the last ones."""
+    def _crept(self) -> tuple[float, float] | None:
+        """Drift against the last release, where both ends have nights enough: red until half of it is gone."""
         last = self.now.places[-CREEP:]
         if len(self.anchor) < CREEP or len(last) < CREEP:
             return None
-        return self.anchored, median([self.values[i] for i in last])
-
-    def _crept(self) -> tuple[float, float] | None:
-        """Drift against the last release, where both ends have nights enough: red until half of it is gone."""
-        ends = self._ends()
-        if ends is None:
-            return None
-        old, recent = ends
+        old, recent = self.anchored, median([self.values[i] for i in last])
         change, threshold = self._worse_by(old, recent), self._level()[2]
         enough = min(threshold, 0.5 * self.crept) if self.crept else threshold
         if self.crept and change <= enough:  # a few fast nights do not end it

@@ -21,6 +21,7 @@ from spook_tracker.tracker.judge.segments import (
     begins_apart,
     earlier_level,
     inner_split,
+    middle_and_noise,
 )
 from spook_tracker.tracker.judge.shifts import (
     BASE,
@@ -45,7 +46,6 @@ CLEAR = 8.0  # noises, below the floor: the noise of few nights may be told too 
 SIGMAS = 4.0
 REACH = 1.25  # times the second largest deviation of nights that hold
 UNSEEN = 25  # nights: of fewer, as much again may be reached by those to come
-SECOND = 2.5  # standard deviations that the second largest of two hundred nights reaches
 ROOM = 400  # powers of two about one: squares of so large values, summed, are doubles
 CREEP = 5  # nights in each median that is compared for drift
 APART_BY_CHANCE = 1.25  # times the distance of two clusters that medians of their nights may be apart
@@ -165,11 +165,7 @@ class PresentLevel:
         import numpy as np
 
         base = self._base()
-        if (
-            len(base) < FEWEST_BASE
-            or not math.isfinite(change)
-            or not (memory := remembered(base, self._earlier()))
-        ):
+        if len(base) < FEWEST_BASE or not (memory := remembered(base, self._earlier())):
             return True
         far = RANGES * float(np.max(base) - np.min(base))  # whatever they remember
         return change * median_of_sorted(np.sort(base)) > min(standard_error(base, 1, memory), far)
@@ -267,8 +263,8 @@ class PresentLevel:
         import numpy as np
 
         base = np.array(self._costs(self.now.places[-BASE:]))
-        middle = median_of_sorted(np.sort(base))
-        far = CLIP * NORMAL * median_of_sorted(np.sort(np.abs(base - middle)))
+        middle, noise = middle_and_noise(base)
+        far = CLIP * noise
         return np.minimum(np.maximum(base, middle - far), middle + far) if far > 0.0 else base
 
     def _earlier(self) -> list[float]:
@@ -297,11 +293,9 @@ class PresentLevel:
     def _chance(self, nights: Sequence[int]) -> float:
         """How probable it is that these nights lie so far off by chance: the tail of Student's t."""
         level, noise, _ = self._level()
-        own, reached = len(self.now.places), self._reached()
-        off = [self._costlier_by(level, self.values[i]) for i in nights]
-        off, side = (list(map(way_back, x)) if self.better else x for x in (off, reached))
-        if len(side) > 1:
-            noise = max(noise, second_largest(side) / SECOND)
+        own, off = len(self.now.places), [self._costlier_by(level, self.values[i]) for i in nights]
+        if self.better:
+            off = list(map(way_back, off))
         known = min(own, WINDOW) if own >= ENOUGH else min(WINDOW, own + len(self.remembers))
         if known < FEWEST:
             noise = max(noise, FEW_NIGHTS_FLOOR / SIGMAS)

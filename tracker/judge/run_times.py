@@ -40,7 +40,7 @@ from spook_tracker.tracker.judge.shifts import (
     drawn_anew,
     shift,
 )
-from spook_tracker.tracker.judge.slower import CONFIRM, LEAST, Usual, change_in_words, slower
+from spook_tracker.tracker.judge.slower import CONFIRM, LEAST, Usual, change_in_words, slower, worse_by
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import with_recoveries
 
@@ -145,15 +145,12 @@ class _Walk(DriftingLevel):
 
     def _without_a_level(self, place: int) -> Noisy:
         """Before the first number there is nothing to be worse than."""
-        number = self.timed[place]
-        if number:
+        if self.timed[place]:
             self._start(place)
-        new = place == self.start
-        verdict = Verdict(word="new", sentence="the first value") if new else slower(-math.inf, 0.0, 0.0, "")
-        if not new:
-            words = "the first number" if number else "no number yet"
-            verdict = Verdict(word="improved" if number else "same", sentence=words)
-        return Noisy(verdict=verdict, state="green", against=None if new else place - 1)
+        if place == self.start:
+            return Noisy(verdict=Verdict(word="new", sentence="the first value"), state="green")
+        verdict = Verdict(word="same", sentence="no number yet")
+        return Noisy(verdict=verdict, state="green", against=place - 1)
 
     def _start(self, place: int) -> None:
         """A history that begins here."""
@@ -200,7 +197,8 @@ class _Walk(DriftingLevel):
     def _together(self) -> tuple[int, Shift | None] | None:
         """Several nights that together lie above the segment's others."""
         level = self._level()[0]
-        if level <= 0.0 or (mean := self._last_above(level)) < LEAST:
+        few = len(self.now.places) + len(self.off) < FEWEST_BASE + FEWEST_SPAN
+        if few or level <= 0.0 or (mean := self._last_above(level)) < LEAST:
             return None  # most nights: nothing to count
         nights = [*self.now.places[-BASE - LONGEST_SPAN :], *self.off]
         age = self.ages[nights[-1]] - self.ages[self.start]
@@ -212,9 +210,9 @@ class _Walk(DriftingLevel):
         if not self.over or self.now.standing == "red" or len(self.now.places) >= BASE:
             return None
         level = self._level()[0]
-        if self._last_above(level) < 0.5 * LEAST:
-            return None
         first = max(self.start, self.until - BASE - LONGEST_SPAN)
+        if self.until - first < FEWEST_BASE + FEWEST_SPAN or self._last_above(level) < 0.5 * LEAST:
+            return None
         nights = [i for i in range(first, self.until) if self.timed[i]]
         found = shift(self._costs(nights), True, self.ages[nights[-1]] - self.ages[self.start])
         told = found is not None and found.apart and found.change > self._tolerated(level)
@@ -222,8 +220,9 @@ class _Walk(DriftingLevel):
 
     def _last_above(self, level: float) -> float:
         """How far the mean of the last few nights lies above a level."""
-        last = [*self.now.places[-FEWEST_SPAN:], *self.off][-FEWEST_SPAN:]
-        return self._worse_by(level, sum([self.values[i] for i in last]) / len(last))
+        nights = [*self.now.places[-FEWEST_SPAN:], *self.off] if self.off else self.now.places
+        last = [self.values[i] for i in nights[-FEWEST_SPAN:]]
+        return worse_by(level, sum(last) / len(last), self.larger_is_better)
 
     def _came_back(self) -> tuple[int, None] | None:
         """Whether the last nights of a red segment are more probably of the level before it (Page's cumulative sum)."""
@@ -239,7 +238,7 @@ class _Walk(DriftingLevel):
         for recent, i in enumerate(reversed([*self.now.places[-SETTLED:], *self.off]), start=1):
             off = self._worse_by(self.reference.level, self.values[i]) / noise
             total += max(-WEIGHT, min(WEIGHT, apart * (0.5 * apart - off)))
-            if total > BACK and recent < len(self.now.places) + len(self.off):
+            if total > BACK:
                 return recent, None
             if total < -BACK:
                 return None
@@ -337,7 +336,7 @@ class _Walk(DriftingLevel):
                 self.reference, self.now.standing, self.now.stay = held, "flaky", stay
                 return self._flaky_night(level)
             self.reference, self.now.standing, self.now.size = held, "red", change
-            if was != "red" or self.first is None:
+            if was != "red":
                 self.first = before[-1], where.best
             if rose and told is not None:
                 words += f" over {told.span} nights, by chance once in {1.0 / told.probability:.0e}"
@@ -380,7 +379,7 @@ class _Walk(DriftingLevel):
     def _flaky(self, held: Reference, level: float, nights: int) -> int:
         """How long a level may last that was reached and left again before, often; zero of another."""
         change = self._worse_by(held.level, level)
-        near = max(LEAST, 0.15 * change, SIGMAS * max(held.noise, LEAST) / math.sqrt(nights))
+        near = SIGMAS * max(held.noise, LEAST) / math.sqrt(nights)
         been = [
             segment.last - segment.first + 1
             for segment in self.over
@@ -411,12 +410,9 @@ class _Walk(DriftingLevel):
             self._anchors(place, release)
         good = self.now.places[0]
         was = self.crept > 0.0
-        if not (self.off and not self.better) and (creep := self._crept()) is not None:
+        if (creep := self._crept()) is not None:
             return self._drifted(*creep, news=not was)
         if self.off and not self.better:
-            if self.crept:
-                old, recent = self._ends() or (level, level)
-                return self._drifted(old, recent, news=False)
             verdict = slower(change, level, self.values[place], "")
             return Noisy(verdict=verdict, state="suspected", against=good, levels=(level, self.values[place]))
         words = change_in_words(change)

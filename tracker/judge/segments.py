@@ -65,6 +65,14 @@ def spread_of(values: Sequence[float], level: float) -> float:
     return NORMAL * median([abs(value - level) for value in values]) / abs(level) if values and level else 0.0
 
 
+def middle_and_noise(values: Values) -> tuple[float, float]:
+    """The median, and the standard deviation that the median distance from it tells."""
+    import numpy as np
+
+    middle = median_of_sorted(np.sort(values))
+    return middle, NORMAL * median_of_sorted(np.sort(np.abs(values - middle)))
+
+
 def boundary(places: Sequence[int], costs: Sequence[float], after: int) -> Boundary:
     """Where the level changed among these nights, of which the last `after` lie behind it as far as is known."""
     import numpy as np

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from spook_tracker.tracker.document.middle import median_of_sorted
 from spook_tracker.tracker.judge.normal_nights import MEMORY, chance, student
+from spook_tracker.tracker.judge.segments import middle_and_noise
 from spook_tracker.tracker.judge.slower import LEAST
 
 if TYPE_CHECKING:  # NumPy takes a fifth of a second to import, and most histories ask for nothing here
@@ -32,11 +33,10 @@ FEWEST_BASE = 16  # fewer give no probability as small as this:
 RARE = 5e-5  # of an alarm in one series on one night: of a thousand series, a night in twenty has a false one
 RAREST = 1e-5  # of what no second test has to confirm
 REACHED = 200  # nights of which is remembered what they reached, how they moved and how far off they lay
-LEARNING = 60  # nights: of a longer history, less is spent on each night
 ROUNDING = 1e-12  # relative: nights that differ by less are equal
+LEARNING = 60  # nights: of a longer history, less is spent on each night
 CLIP = 6.0  # noises: what lies further out counts as if it lay there
 GRID = 300  # steps between the smallest and the largest value
-NORMAL = 1.4826  # standard deviations in a median absolute deviation
 CHANCE = 2.6  # standard deviations of an autocorrelation that is none
 APART = (
     5.0  # standard deviations inside two clusters between their middles; noise of one hump cut in two shows 3
@@ -167,8 +167,7 @@ def _tried(base: Values, last: Values, rare: float, before: Sequence[float] = ()
     import numpy as np
 
     pooled = np.concatenate([base, last])
-    middle = median_of_sorted(np.sort(base))
-    noise = NORMAL * median_of_sorted(np.sort(np.abs(base - middle)))
+    middle, noise = middle_and_noise(base)
     if noise > 0.0:
         far = max(CLIP * noise, 2.0 * LEAST * middle)
         pooled = np.minimum(np.maximum(pooled, middle - far), middle + far)
