@@ -177,7 +177,7 @@ void ReducedContacts::reduce(const MixedSystem& system) {
         matrix_.reach(touched_, reached_);
         for (int i = 0; i < unit.size; ++i) {
             const int row = unit.row + i;
-            const std::size_t at = static_cast<std::size_t>(unit.at + i);
+            const auto at = static_cast<std::size_t>(unit.at) + static_cast<std::size_t>(i);
             double* column = response_.data() + all * at;
             put(block, row, 1.0, column);
             if (!floored_) matrix_.forward(reached_, column);
@@ -230,7 +230,7 @@ void ReducedContacts::couple_refined(const MixedSystem& system) {
         matrix_.solve_refined(right_.data(), column, refinements_of_floored);
         for (const Unit& other : units_)
             for (int j = 0; j < other.size; ++j) {
-                const std::size_t to = static_cast<std::size_t>(other.at + j);
+                const auto to = static_cast<std::size_t>(other.at) + static_cast<std::size_t>(j);
                 if (to > at) continue;
                 w_[n * at + to] = w_[n * to + at] = along(system.rows[other.block], other.row + j, column);
             }

@@ -6,6 +6,7 @@
 #include <map>
 
 #include "linear/disjoint_sets.hpp"
+#include "run/quantities.hpp"
 
 namespace spook {
 
@@ -14,12 +15,6 @@ namespace {
 constexpr double DAMPED_ABOVE = 0.3;    // of T h²/(m l)
 constexpr double STRING_DAMPING = 1.0;  // D̃/K̃ there: a damping time of h/4
 constexpr double IN_A_ROW = 1e-14;  // of det J / (tr J)³: points that lie to 1e-7 of their extent on a line
-
-void put(double* out, Vec3 v) noexcept {
-    out[0] = v.x;
-    out[1] = v.y;
-    out[2] = v.z;
-}
 
 void add(double* block, const Mat3& m, double sign) noexcept {
     for (int i = 0; i < 9; ++i) block[i] += sign * m.m[i];

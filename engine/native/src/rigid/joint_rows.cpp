@@ -1,11 +1,10 @@
 #include "rigid/joint_rows.hpp"
 
 #include "linear/elementary.hpp"
+#include "run/quantities.hpp"
 
 namespace spook {
 namespace {
-
-void put(double* out, Vec3 v) noexcept { out[0] = v.x, out[1] = v.y, out[2] = v.z; }
 
 /// What all rows of one joint share.
 struct Ends {
