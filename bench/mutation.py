@@ -22,7 +22,7 @@ JUDGE = "tracker/judge"
 TESTS = (
     "tests/test_judge_rules.py", "tests/test_judge_detection.py", "tests/test_tracker_verdict.py", "tests/test_tracker_noise.py",
     "tests/test_tracker_compare.py", "tests/test_tracker_analyse.py", "tests/test_tracker_accepted.py",
-    "tests/test_judge_normal_nights.py",
+    "tests/test_judge_normal_nights.py", "tests/test_judge_segments.py",
 )  # fmt: skip
 RUN = "import sys; sys.path[:0] = sys.argv[1:3]; import pytest; sys.exit(pytest.main(sys.argv[3:]))"
 
@@ -84,6 +84,11 @@ MUTANTS = (
     mutant("one-night-mends", "run_times", "BACK, WEIGHT = 9.0, 6.0", "BACK, WEIGHT = 9.0, 99.0"),
     mutant("blame-is-never-looked-at-again", "run_times", "SETTLED = 30", "SETTLED = 0"),
     mutant("all-nights-are-of-one-age", "run_times", "age = self.ages[nights[-1]] - self.ages[self.start]", "age = 0"),
+    mutant("a-fast-night-is-never-far", "run_times", "faster = way_back(change) if", "faster = -change if"),
+    mutant("a-rate-falls-by-itself", "level", "return way_back(-change) if self.larger_is_better", "return change if self.larger_is_better"),
+    mutant("first-nights-are-of-the-level", "level", "inner_split(costs, 1.0) or earlier_level(base)", "inner_split(costs, 1.0)"),
+    mutant("any-first-nights-are-older", "segments", "math.comb(count, split) >= CHOICES and", ""),
+    mutant("a-way-is-two-levels", "segments", "> APART * noise:\n            return int(split)", "> 0.0:\n            return int(split)"),
     mutant("bounded-is-growing", "verdict", '"bounded": 1, "growing": 2', '"bounded": 1, "growing": 1'),
     mutant("unknown-cell-is-best", "verdict", "CELL_RANK.get(cell, len(CELL_RANK))", "CELL_RANK.get(cell, 0)"),
     mutant("diverged-is-not-finite", "verdict", '"diverged": 4,\n    "crashed"', '"diverged": 3,\n    "crashed"'),
