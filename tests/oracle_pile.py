@@ -20,9 +20,10 @@ SKIN = 0.1  # m: pairs nearer than this beyond touching are looked at until a bo
 ASIDE = 0.005  # m: how far another start is from the pile's own, and none overlaps yet
 
 
-def _turned(arm: np.ndarray, force: np.ndarray) -> np.ndarray:
-    moment: np.ndarray = np.cross(arm, force)
-    return moment
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """(n, 3) products of rows; numpy.cross takes three times as long for a few hundred of them."""
+    (ax, ay, az), (bx, by, bz) = a.T, b.T
+    return np.stack((ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), axis=1)
 
 
 def _dragged(speed: np.ndarray, load: np.ndarray, drag: float) -> np.ndarray:
@@ -59,10 +60,10 @@ def floor_loads(
         closing = v[b] - v[a]
         along = np.einsum("ij,ij->i", closing, u)
         load = np.maximum(0.0, stiffness * (2.0 * radius - apart) - pair_damping * along)
-        slip = closing - along[:, None] * u - radius * np.cross(w[a] + w[b], u)
+        slip = closing - along[:, None] * u - radius * _cross(w[a] + w[b], u)
         rub = _dragged(slip, load, drag)
         push = rub + load[:, None] * u
-        moment = -radius * _turned(u, rub)
+        moment = -radius * _cross(u, rub)
         force, torque = np.zeros((count, 3)), np.zeros((count, 3))
         force[:, 2] = -mass * gravity
         for k in range(3):
@@ -70,12 +71,12 @@ def floor_loads(
             torque[:, k] += np.bincount(b, moment[:, k], count) + np.bincount(a, moment[:, k], count)
         low = np.flatnonzero(x[:, 2] < radius)
         held = np.maximum(0.0, stiffness * (radius - x[low, 2]) - floor_damping * v[low, 2])
-        slip = v[low] + np.cross(w[low], down)
+        slip = v[low] + _cross(w[low], down)
         slip[:, 2] = 0.0
         rub = _dragged(slip, held, drag)
         force[low] += rub
         force[low, 2] += held
-        torque[low] += _turned(down, rub)
+        torque[low] += _cross(down, rub)
         v += step / mass * force
         w += step / inertia * torque
         x += step * v

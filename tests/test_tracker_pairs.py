@@ -229,7 +229,7 @@ def test_a_pull_request_needs_no_history(pebble: Pebble) -> None:
     pebble.commit("Say it otherwise")
     good = asked()
     pebble.commit("Pull harder", GRAVITY.replace("time_step", "1.01 * time_step"))
-    bad = asked()
+    bad = asked("--quick")
 
     assert good.exit_code == 0, good.output
     assert f"base {pebble.commits[0][:12]} is built" in good.output
@@ -245,7 +245,7 @@ def test_where_the_base_does_not_build_the_commit_before_it_is_the_base(pebble: 
     git(pebble.folder, "checkout", "-q", "-B", "change")
     pebble.commit("Mend it")
 
-    shown = asked()
+    shown = asked("--quick")
 
     assert shown.exit_code == 0, shown.output
     assert f"base {pebble.commits[0][:12]} is built: 1 before it could not be" in shown.output
@@ -276,7 +276,7 @@ def test_the_base_is_where_the_service_says_that_the_change_leaves_its_branch(
 def test_a_change_that_does_not_build_is_said_in_a_line(pebble: Pebble) -> None:
     pebble.commit("Break it", "no C++")
 
-    shown = asked()
+    shown = asked("--quick")
 
     assert shown.exit_code == 2
     assert f"{pebble.commits[-1][:12]} does not build" in shown.stderr
@@ -292,9 +292,9 @@ def test_a_change_of_settings_and_questions_is_judged_by_those_of_the_base(pebbl
         "tracker.toml": settings.replace("-O1", "-O2"),
     }
     pebble.commit("Ask otherwise", files=files)
-    alike = asked()
+    alike = asked("--quick")
     pebble.commit("Pull harder", GRAVITY.replace("time_step", "1.01 * time_step"))
-    worse = asked()
+    worse = asked("--quick")
 
     assert alike.exit_code == 0, alike.output
     assert worse.exit_code == 1, worse.output
@@ -310,7 +310,7 @@ def test_a_question_that_is_deleted_is_red(pebble: Pebble) -> None:
     git(pebble.folder, "checkout", "-q", "-B", "change")
     pebble.commit("Ask once", files={"tracking/questions.py": questions})
 
-    shown = asked()
+    shown = asked("--quick")
 
     assert shown.exit_code == 1, shown.output
     assert "removed" in shown.output
