@@ -109,6 +109,50 @@ def test_no_step_of_a_body_that_comes_to_lie_takes_many_rounds():
     assert run.result().residual <= 5e-5  # m/s, of the worst solve
 
 
+def whips(limbs: int, links: int) -> Scene:
+    """Chains of stiff links that stand on a plate which is about to fall over, a stop in each of their joints."""
+    rough = Material(friction=0.6)
+    bodies = [
+        RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough),
+        RigidBody(
+            name="trunk",
+            mass=2.0,
+            shape=Box((0.5, 0.3, 0.1)),
+            position=(0.0, 0.0, 0.06),
+            material=rough,
+            angular_velocity=(0.3, 0.5, 0.0),
+        ),
+    ]
+    joints = []
+    for limb in range(limbs):
+        below, y = "trunk", -0.15 + 0.3 * limb / (limbs - 1)
+        for k in range(links):
+            name, z = f"{limb} {k}", 0.11 + 0.05 * k
+            bodies.append(
+                RigidBody(name=name, mass=0.05, inertia=(2e-5, 2e-5, 1e-5), position=(0.0, y, z + 0.025))
+            )
+            joints.append(
+                Hinge(
+                    name=f"under {name}",
+                    between=(below, name),
+                    at=(0.0, y, z),
+                    axis=(0, 1, 0) if k % 2 else (1, 0, 0),
+                    compliance=0.0,
+                    limit=Limit(lower=-0.1 - 0.02 * limb, upper=0.15),
+                )
+            )
+            below = name
+    return Scene(bodies=tuple(bodies), constraints=tuple(joints), gravity=(0.0, 0.0, -G))
+
+
+def test_a_body_with_many_stops_and_few_contacts_is_solved() -> None:
+    """130 stops beside four points, few of which are reached at once."""
+    run = simulate(whips(5, 26), duration=0.5, time_step=1 / 240)
+    assert run.status == "completed"
+    assert run.counters.get("unsettled_solves", 0) == 0
+    assert run.residual <= 1e-9  # m/s, of the worst solve
+
+
 def frame(mu: float, half_angle: float) -> Scene:
     """Two bars of 1 kg hinged at their tops, that stand on a floor."""
     length, radius = 1.0, 0.02

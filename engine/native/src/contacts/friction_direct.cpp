@@ -371,9 +371,10 @@ bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, Fr
 /// Joints and contacts, or contacts with friction of turning: Newton's method on the whole, at the cost of its pattern, which
 /// knows no friction of turning; where its path ends, the joints are eliminated, and iterations and Newton's method go on
 /// over contacts alone; in turns, each from the best so far, which is the answer.
+/// `kept`: work() has a copy of the system already.
 void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points, DirectSolver& direct,
-                         FrictionReport& report) {
-    MixedSystem& best = work().best;
+                         bool kept, FrictionReport& report) {
+    MixedSystem &best = work().best, &start = work().start;
     best = system;
     report.residual = unbounded;
     const auto take = [&](double residual) {
@@ -388,18 +389,26 @@ void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points
     direct.newton.near_enough = fair;
     direct.newton.max_losses = 1;
     direct.newton.max_frozen = max_frozen;
-    const int turns = std::any_of(points.begin(), points.end(), spook::turns) ? turning_turns : joint_turns;
-    for (int turn = 0; turn < turns && !(report.residual <= (turn == 0 ? fair : near)); ++turn) {
-        if (newton && turn == 0) {
-            const ConeReport found = direct.newton.solve(system, points);
-            report.rounds += found.iterations;
-            take(found.residual);
-            if (report.residual <= fair) break;
-        }
+    const auto by_newton = [&] {
+        const ConeReport found = direct.newton.solve(system, points);
+        report.rounds += found.iterations;
+        take(found.residual);
+    };
+    const auto reduced = [&](int turn) {
         const ReducedContacts::Report found =
             direct.reduced.solve(system, points, first_iterations << (2 * turn));
         report.rounds += found.newton_steps, report.pgs_iterations += found.iterations;
         take(found.residual);
+    };
+    // Where points are few beside many bodies, the joints are eliminated first.
+    const std::size_t bodies = system.mass.size();
+    const bool few = bodies >= worth_eliminating && points.size() * bodies_a_point <= bodies;
+    if (newton && few && !kept) start = system;
+    const int turns = std::any_of(points.begin(), points.end(), spook::turns) ? turning_turns : joint_turns;
+    for (int turn = 0; turn < turns && !(report.residual <= (turn == 0 ? fair : near)); ++turn) {
+        if (newton && turn == 0 && !few) by_newton();
+        if (turn > 0 || !(report.residual <= fair)) reduced(turn);
+        if (newton && turn == 0 && few && !(report.residual <= fair)) system = start, by_newton();
     }
     direct.newton.max_losses = ConeNewton{}.max_losses;
     direct.newton.max_frozen = 0;
@@ -454,7 +463,7 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
     if ((model == FrictionModel::cone || points.empty()) && ReducedContacts::takes(system, points)) {
         bool kept = false;
         if (!settle_quickly(system, points, model, direct, true, false, kept, report))
-            solve_beside_joints(system, points, direct, report);
+            solve_beside_joints(system, points, direct, kept, report);
         return report;
     }
     if (is_for_newton(system, points, model)) {

@@ -36,7 +36,8 @@ struct DirectSolver {
 /// 1e-4 of the speeds is the answer, and converged within 1e-9; else iterations finish.
 /// Beside joints the cone, and systems without friction under any law, get a few rounds, then (with friction) Newton's method with
 /// the joints in its factor, and where that ends beyond 1e-9 contacts alone, the joints eliminated
-/// (`contacts/reduced_contacts.hpp`), up to three times from the best so far.
+/// (`contacts/reduced_contacts.hpp`), up to three times from the best so far. From 64 bodies on with few points, contacts
+/// alone are asked first.
 /// On return FrictionPoint::normal is the normal impulse; for the box it stays what bounds friction.
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
                                      FrictionModel model, DirectSolver& direct, int max_rounds = 60);

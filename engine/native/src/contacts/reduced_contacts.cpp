@@ -40,14 +40,14 @@ void put(const RowBlock& block, int row, double z, double* p) {
 }  // namespace
 
 bool ReducedContacts::takes(const MixedSystem& system, const std::vector<FrictionPoint>& points) {
-    int bounded = 0;
+    int bounded = 0, touching = 0;
     const bool turning = std::any_of(points.begin(), points.end(), turns);
     bool reduces = turning;
     for (const RowBlock& block : system.rows)
         for (int i = 0; i < block.size; ++i)
             if (BilateralRows::is_bilateral(block, i)) reduces = true;
-            else ++bounded;
-    return reduces && bounded > 0 && bounded <= (turning ? most_turning_rows : most_rows);
+            else ++bounded, touching += block.is_contact ? 1 : 0;
+    return reduces && bounded > 0 && bounded <= most_bounded_rows && (turning || touching <= most_rows);
 }
 
 void ReducedContacts::analyse(const MixedSystem& system) {

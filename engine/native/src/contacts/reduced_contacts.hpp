@@ -27,8 +27,9 @@ namespace spook {
 
 class ReducedContacts {
 public:
-    static constexpr int most_rows = 120;          // bounded: three of a contact with friction
-    static constexpr int most_turning_rows = 400;  // up to six of one, for which there is no other Newton
+    static constexpr int most_rows = 120;  // of contacts: three of one with friction
+    // With stops and drives, few of which are at their bounds; and of friction of turning, which no other Newton knows.
+    static constexpr int most_bounded_rows = 400;
 
     struct Report {
         int iterations = 0, newton_steps = 0;
