@@ -13,6 +13,14 @@ from typing import Literal
 
 Format = Literal["MJCF", "URDF", "SDF"]
 DRIVES = ("zero", "hold", "table", "sinusoid", "function")
+PARTS = (
+    "contacts",
+    "limits",
+    "ties",
+    "dry friction",
+    "actuators",
+    "damping",
+)  # of a model, that can be left out
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -78,4 +86,6 @@ class ModelRun:
     conservative: bool = False  # without all that takes or gives energy but gravity and springs
     swing: float = 0.0  # rad/s and m/s: conservative, without equality constraints, joints started by up to that at random
     gain: float = 1.0  # times the file's own, of its servos
+    without: frozenset[str] = frozenset()  # of PARTS: what is left out to see what it does
+    stiffer: float = 1.0  # times faster, contacts, limits and ties that give way: the engine's own softness
     elsewhere: bool = False  # in a process of its own

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from spook_tracker.tracker.cli.main import main
+from spook_tracker.tracker.cli.models import markdown_of
 from spook_tracker.tracker.measure.model_files import ModelFileError
 from spook_tracker.tracker.measure.model_packages import files_of, loaded, looked_at, stood
 from spook_tracker.tracker.measure.model_standing import Standing
@@ -72,27 +74,73 @@ def test_the_command_counts_them(folder: Path) -> None:
 
 
 SWING = '<mujoco><worldbody><body pos="0 0 2"><joint axis="0 1 0"/><geom type="capsule" size=".02 .3" pos=".3 0 0"/></body></worldbody></mujoco>'
-SOFT = """<mujoco><worldbody><geom type="plane" size="1 1 1"/><body name="ball" pos="0 0 .1"><freejoint/>
+SOFT = """<mujoco><worldbody><geom type="plane" size="1 1 1"/><body name="ball" pos="0 0 .4"><freejoint/>
 <geom size=".1" solref="-500 -20"/></body></worldbody></mujoco>"""
 
 
-def test_of_several_engines_it_is_told_which_stand_together(tmp_path: Path) -> None:
+LEANS = """<mujoco><worldbody><body pos="0 0 2"><joint name="arm" axis="0 1 0" {joint}/>
+<geom type="capsule" size=".02 .3" pos=".3 0 0"/></body></worldbody></mujoco>"""
+FILES = {
+    "swing": SWING,
+    "soft": SOFT,
+    "outside": LEANS.format(joint='limited="true" range="20 90"'),  # where its limit pushes it back
+    "rubs": LEANS.format(joint='frictionloss="2" solreffriction=".3 1"'),
+    "broken": "<mujoco>",
+}
+
+
+@pytest.fixture(scope="module")
+def told(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Standing | str]:
+    """Of each file where three engines take it, one of which is none."""
     pytest.importorskip(
         "mujoco", reason="the extra mujoco is not installed: pip install 'spook-tracker[mujoco]'"
     )
-    (tmp_path / "swing.xml").write_text(SWING)
-    (tmp_path / "soft.xml").write_text(SOFT)
+    folder = tmp_path_factory.mktemp("models")
+    for name, text in FILES.items():
+        (folder / f"{name}.xml").write_text(text)
+    return {path.name: one for path, one in stood(files_of(str(folder)), ("mujoco", "spook", "no_such"))}
 
-    found = {
-        path.name: one for path, one in stood(files_of(str(tmp_path)), ("mujoco", "spook", "no_such_engine"))
-    }
 
-    swing, soft = found["swing.xml"], found["soft.xml"]
+def test_of_several_engines_it_is_told_which_stand_together(told: dict[str, Standing | str]) -> None:
+    swing, soft = told["swing.xml"], told["soft.xml"]
     assert isinstance(swing, Standing) and isinstance(soft, Standing)
     assert {one.groups for one in swing.checkpoints} == {(("mujoco", "spook"),)}
+    assert swing.cause is None
     assert soft.checkpoints[-1].groups == (("mujoco",), ("spook",))  # one sinks in, the other lies on top
-    assert soft.checkpoints[-1].distance["mujoco", "spook"] > 5e-4
-    assert "no_such_engine" in swing.refused
+    assert soft.checkpoints[-1].apart("spook", "mujoco") > 5e-4
+    assert "no_such" in swing.refused
+
+
+@pytest.mark.parametrize(
+    ("name", "part", "gives_way"),
+    [("soft", "contacts", True), ("outside", "limits", True), ("rubs", "dry friction", False)],
+)
+def test_the_part_is_named_over_which_two_engines_part(
+    told: dict[str, Standing | str], name: str, part: str, gives_way: bool
+) -> None:
+    found = told[f"{name}.xml"]
+
+    assert isinstance(found, Standing) and found.cause
+    assert found.cause.parts == (part,)
+    assert found.cause.left < 0.1 * found.cause.apart
+    assert (found.cause.softness > 0.5 * found.cause.apart) == gives_way
+
+
+def test_a_table_says_up_to_when_engines_stand_with_the_first_and_why_not_longer(
+    told: dict[str, Standing | str],
+) -> None:
+    lines = list(markdown_of(("mujoco", "spook", "no_such"), told))
+
+    rows = {line.split("|")[1].strip(" `"): line for line in lines if line.startswith("| `")}
+    assert set(rows) == {f"{name}.xml" for name in FILES if name != "broken"}
+    assert [cell.strip() for cell in rows["swing.xml"].split("|")[3:6]] == ["5 s", "=", "-"]
+    assert re.search(r"\| = to 0.5 s, then 0.00[0-9]+ m \| - \|$", rows["soft.xml"])
+    said = "\n".join(lines)
+    assert "- `soft.xml`: mujoco and spook part at" in said and "eight times faster" in said
+    assert re.search(
+        "- no_such: there is no engine .*: `outside.xml`, `rubs.xml`, `soft.xml`, `swing.xml`.", said
+    )
+    assert "the file is no XML" in said and "`broken.xml`." in said
 
 
 @pytest.mark.timeout(120)  # s: fewer than the 300 that a worker is waited for
@@ -109,12 +157,14 @@ def test_the_command_says_it_at_each_time(tmp_path: Path) -> None:
     )
     file = tmp_path / "soft.xml"
     file.write_text(SOFT)
-    asked = ["models", str(file), "--engine", "mujoco", "--engine", "spook"]
-    ran = CliRunner().invoke(main, asked, prog_name="tracker")
+    ran = CliRunner().invoke(main, ["models", str(file), "--engine", "mujoco", "--engine", "spook"])
+    alone = CliRunner().invoke(main, ["models", str(file), "--markdown"])
 
     assert ran.exit_code == 0, ran.output
     assert "5.00 s  mujoco" in ran.output
     assert "of both errors" in ran.output
+    assert "over contacts" in ran.output
+    assert alone.exit_code == 2 and "several engines" in alone.output
 
 
 def test_a_swing_is_compared_with_mujocos(tmp_path: Path) -> None:

@@ -22,6 +22,7 @@ from spook_tracker.engine.peers.model_loop import (
     packages,
     refuse_settings,
     resident,
+    said,
 )
 from spook_tracker.engine.peers.stepped import quiet
 from spook_tracker.engine.protocol import NotSupported
@@ -61,7 +62,7 @@ def _loaded(run: ModelRun) -> Any:
             parser = dart.utils.SdfParser if run.model.format == "SDF" else dart.utils.MjcfParser
             world = parser.readWorld(str(path))
     except (RuntimeError, ValueError, TypeError) as error:
-        raise NotSupported(f"dart refuses {path.name}: {' '.join(str(error).split())[:200]}") from None
+        raise NotSupported(f"dart refuses {path.name}: {said(error, path)}") from None
     if world is None or not world.getNumSkeletons():
         raise NotSupported(f"dart finds no model in {path.name}")
     return world

@@ -25,6 +25,7 @@ from spook_tracker.engine.peers.model_loop import (
     packages,
     refuse_settings,
     resident,
+    said,
 )
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result
@@ -77,7 +78,7 @@ class _Simulation(LoadedModel):
         try:
             made = parser.AddModels(str(path))
         except RuntimeError as error:
-            raise NotSupported(f"drake refuses {path.name}: {' '.join(str(error).split())[:200]}") from None
+            raise NotSupported(f"drake refuses {path.name}: {said(error, path)}") from None
         if run.model.format != "URDF":
             return
         for model in made:

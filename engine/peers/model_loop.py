@@ -62,8 +62,15 @@ def refuse_settings(engine: str, run: ModelRun) -> None:
         or run.swing
         or run.accurate
         or run.gain != 1.0
+        or run.without
+        or run.stiffer != 1.0
     ):
         raise NotSupported(f"{engine} is asked without controls, keyframes and other settings than its own")
+
+
+def said(error: Exception, path: Path) -> str:
+    """A loader's message on one line, without the folder of the file."""
+    return " ".join(str(error).split()).replace(f"{path.parent}/", "")[:200]
 
 
 def packages(run: ModelRun) -> dict[str, str]:

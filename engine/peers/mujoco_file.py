@@ -25,6 +25,14 @@ from spook_tracker.engine.result import Result
 BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 READS = ("MJCF", "URDF")
 DAMPING = ("dof_damping", "dof_dampingpoly", "tendon_damping", "tendon_dampingpoly")  # of joints and tendons
+SWITCHES = {  # of the parts a model can be asked without
+    "contacts": "mjDSBL_CONTACT",
+    "limits": "mjDSBL_LIMIT",
+    "ties": "mjDSBL_EQUALITY",
+    "dry friction": "mjDSBL_FRICTIONLOSS",
+    "actuators": "mjDSBL_ACTUATION",
+}
+SOFTNESS = ("geom_solref", "pair_solref", "jnt_solref", "tendon_solref_lim", "eq_solref")
 LOADS = 3  # times a file is loaded to tell how long it takes
 
 
@@ -116,7 +124,7 @@ class _Simulation(LoadedModel):
         super().__init__(run, time_step, time_limit)
         self.model = model
         model.opt.timestep = time_step
-        stiffen(model, run.gain)
+        alter(model, run)
         _set(model, run)
         self.data = mujoco.MjData(model)
         start_at(run, model, self.data)
@@ -210,7 +218,32 @@ class _Simulation(LoadedModel):
         return overlap, held / (strength * float(np.asarray(m.body_mass)[self.moving].sum()))
 
 
-def stiffen(model: Any, gain: float) -> None:
+def alter(model: Any, run: ModelRun) -> None:
+    """What a run asks of the compiled model beside the file: parts left out, gains and softness other than its own."""
+    off = mujoco.mjtDisableBit
+    for part in run.without:
+        if part == "damping":
+            _undamp(model)
+        else:
+            model.opt.disableflags |= int(getattr(off, SWITCHES[part]))
+    if run.stiffer != 1.0:
+        for name in SOFTNESS:
+            reference = getattr(model, name)  # a time constant and a ratio, or -stiffness and -damping
+            direct = reference[:, 0] < 0.0
+            reference[~direct, 0] /= run.stiffer
+            reference[direct] *= (run.stiffer**2, run.stiffer)
+            impedance = getattr(model, name.replace("ref", "imp"))  # of 1 where nothing gives way
+            impedance[:, :2] = 1.0 - (1.0 - impedance[:, :2]) / run.stiffer
+    _stiffen(model, run.gain)
+
+
+def _undamp(model: Any) -> None:
+    for name in DAMPING:
+        if hasattr(model, name):
+            getattr(model, name)[:] = 0.0
+
+
+def _stiffen(model: Any, gain: float) -> None:
     """Give the position servos so many times their own gains."""
     if gain == 1.0:
         return
@@ -232,9 +265,7 @@ def _set(model: Any, run: ModelRun) -> None:
         model.opt.disableflags |= int(off.mjDSBL_CONTACT) | int(off.mjDSBL_LIMIT) | int(off.mjDSBL_ACTUATION)
         model.opt.disableflags |= int(off.mjDSBL_FRICTIONLOSS)
         model.opt.density = model.opt.viscosity = 0.0
-        for name in DAMPING:
-            if hasattr(model, name):
-                getattr(model, name)[:] = 0.0
+        _undamp(model)
 
 
 def _servos(model: Any) -> Any:

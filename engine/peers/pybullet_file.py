@@ -14,7 +14,14 @@ import numpy as np
 import pybullet as bullet
 
 from spook_tracker.engine.model_file import ModelRun, Watched
-from spook_tracker.engine.peers.model_loop import Array, LoadedModel, elsewhere, refuse_settings, resident
+from spook_tracker.engine.peers.model_loop import (
+    Array,
+    LoadedModel,
+    elsewhere,
+    refuse_settings,
+    resident,
+    said,
+)
 from spook_tracker.engine.peers.stepped import quiet
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result
@@ -51,7 +58,7 @@ def _loaded(run: ModelRun, client: int) -> list[int]:
         loader = bullet.loadSDF if run.model.format == "SDF" else bullet.loadMJCF
         return list(loader(str(path), physicsClientId=client))
     except bullet.error as error:
-        raise NotSupported(f"pybullet refuses {path.name}: {' '.join(str(error).split())[:200]}") from None
+        raise NotSupported(f"pybullet refuses {path.name}: {said(error, path)}") from None
 
 
 class _Simulation(LoadedModel):

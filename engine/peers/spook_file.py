@@ -25,7 +25,7 @@ from spook_tracker.engine.observe import (
     Violation,
 )
 from spook_tracker.engine.peers.model_loop import Array, LoadedModel, elsewhere, resident
-from spook_tracker.engine.peers.mujoco_file import LOADS, bodies_of, driven, load, size_of, start_at, stiffen
+from spook_tracker.engine.peers.mujoco_file import LOADS, alter, bodies_of, driven, load, size_of, start_at
 from spook_tracker.engine.peers.mujoco_scene import Translated, servo_name, translate
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result, SimulationFailed
@@ -79,7 +79,7 @@ class _Simulation(LoadedModel):
     def __init__(self, run: ModelRun, time_step: float, time_limit: float | None, method: Method) -> None:
         super().__init__(run, time_step, time_limit)
         model = compiled(run)
-        stiffen(model, run.gain)
+        alter(model, run)
         self.model, self.data = model, mujoco.MjData(model)
         start_at(run, model, self.data)
         self.drive = driven(run.model.drive, model, self.data)

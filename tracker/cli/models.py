@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import takewhile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,13 +14,13 @@ from spook_tracker.tracker.cli.options import example
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.measure.model_packages import Looked
-    from spook_tracker.tracker.measure.model_standing import Checkpoint, Standing
+    from spook_tracker.tracker.measure.model_standing import Cause, Checkpoint, Standing
 
 WORDS = {"model": "·", "runs": "✓", "part": "-", "refused": "✗", "fails": "✗"}
 
 
 @click.command("models", epilog=example("tracker models gymnasium --engine mujoco"))
-@click.argument("package", metavar="PACKAGE|DIR|FILE")
+@click.argument("packages", metavar="PACKAGE|DIR|FILE...", nargs=-1, required=True)
 @click.option(
     "--engine", "engines", metavar="NAME", multiple=True,
     help="Also load each in this engine and take ten steps; of several, say which stand together at growing times.",
@@ -27,24 +28,38 @@ WORDS = {"model": "·", "runs": "✓", "part": "-", "refused": "✗", "fails": "
 @click.option(
     "--agree", is_flag=True, help="Also compare its swing, without contacts and losses, with MuJoCo's."
 )
+@click.option("--markdown", is_flag=True, help="Of several engines: a table for a document.")
 @click.option("--all", "everything", is_flag=True, help="Also list files that are parts of others.")
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1, 256))
 def models_command(
-    package: str, engines: tuple[str, ...], agree: bool, everything: bool, workers: int
+    packages: tuple[str, ...],
+    engines: tuple[str, ...],
+    agree: bool,
+    markdown: bool,
+    everything: bool,
+    workers: int,
 ) -> None:
-    """List the MJCF, URDF and SDF files of an installed package, and say which are models and which load."""
+    """List the MJCF, URDF and SDF files of installed packages, and say which are models and which load."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.measure.model_packages import files_of, loaded, looked_at, stood
 
-    paths = files_of(package)
+    paths = [path for package in packages for path in files_of(package)]
     if not paths:
-        say(f"{package} holds no .xml, .mjcf, .urdf or .sdf files")
+        say(f"{' and '.join(packages)}: no .xml, .mjcf, .urdf or .sdf files there")
         return
     common = _common(paths)
+    if markdown and len(engines) < 2:
+        raise click.UsageError("--markdown is of several engines; say which with --engine")
     if len(engines) > 1:
-        for path, found_together in stood(paths, engines, workers):
-            for line in _standing_lines(str(path.relative_to(common)), found_together):
-                say(line)
+        told = (
+            (
+                str(path.absolute().relative_to(common)),
+                one.replace(f"{common}/", "") if isinstance(one, str) else one,
+            )
+            for path, one in stood(paths, engines, workers)
+        )
+        for line in markdown_of(engines, dict(told)) if markdown else _lines(told):
+            say(line)
         return
     engine = engines[0] if engines else None
     found: list[Looked] = []
@@ -54,7 +69,7 @@ def models_command(
         found.append(looked)
         if looked.word == "part" and not everything:
             continue
-        name = str(looked.path.relative_to(common))
+        name = str(looked.path.absolute().relative_to(common))
         what = f"{looked.format}, {looked.bodies} bodies, {looked.files} files" if looked.format else ""
         sentence = looked.sentence.replace(f"{common}/", "")
         say(f"{WORDS[looked.word]} {name:<44} {what:<28} {_swing(looked)}{sentence}".rstrip())
@@ -80,16 +95,73 @@ def _swing(looked: Looked) -> str:
     return f"{sign} {found.apart:7.1e} (steps {found.own:.0e}, {found.reference:.0e}) "
 
 
-def _standing_lines(name: str, found: Standing | str) -> list[str]:
-    """One model: a line for each time, with the groups of engines and how far they are apart."""
-    if isinstance(found, str):
-        return [f"{name}: {found}"]
-    lines = [f"{name}, {found.size:.3g} m: engines within their own step errors stand together"]
-    for point in found.checkpoints:
-        first = point.groups[0]
-        groups = " | ".join(_group(point, group, first) for group in point.groups)
-        lines.append(f"  {point.time:5.2f} s  {groups}")
-    return lines + [f"  {engine}: {why}" for engine, why in found.refused.items()]
+def _lines(told: Iterable[tuple[str, Standing | str]]) -> Iterator[str]:
+    """Of each model a line for each time, with the groups of engines and how far they are apart."""
+    for name, found in told:
+        if isinstance(found, str):
+            yield f"{name}: {found}"
+            continue
+        yield f"{name}, {found.size:.3g} m: engines within their own step errors stand together"
+        for point in found.checkpoints:
+            first = point.groups[0]
+            groups = " | ".join(_group(point, group, first) for group in point.groups)
+            yield f"  {point.time:5.2f} s  {groups}"
+        if found.cause:
+            yield f"  {_because(found.cause)}"
+        yield from (f"  {engine}: {why}" for engine, why in found.refused.items())
+
+
+def markdown_of(engines: Sequence[str], told: Mapping[str, Standing | str]) -> Iterator[str]:
+    """A row for each model: up to when each engine stands with the first, and how far from it it ends; then why."""
+    first, *others = engines
+    found = {name: one for name, one in sorted(told.items()) if not isinstance(one, str)}
+    yield f"| model | size, m | ends | {' | '.join(others)} |"
+    yield f"|---|---|---|{'---|' * len(others)}"
+    for name, one in found.items():
+        end = f"{one.checkpoints[-1].time:g} s" if one.checkpoints else ""
+        cells = " | ".join(_cell(one, first, other) for other in others)
+        yield f"| `{name}` | {one.size:.3g} | {end} | {cells} |"
+    yield from (
+        "",
+        f"Why {first} and another engine part, where both can be asked without parts of the model:",
+        "",
+    )
+    yield from (f"- `{name}`: {_because(one.cause)}." for name, one in found.items() if one.cause)
+    yield from ("", "What takes no part, or breaks off:", "")
+    alike: dict[str, list[str]] = {}  # names by what is said of them
+    for name, answer in sorted(told.items()):
+        refused = {"": answer} if isinstance(answer, str) else answer.refused
+        for engine, why in refused.items():
+            sentence = f"{engine}: {why}" if engine else why
+            alike.setdefault(sentence.replace(Path(name).name, "the file"), []).append(f"`{name}`")
+    yield from (f"- {why}: {', '.join(names)}." for why, names in sorted(alike.items()))
+
+
+def _cell(found: Standing, first: str, other: str) -> str:
+    """Up to which time they stand together, and how far they are apart at the end; ? where their errors are too large to tell."""
+    shared = [one for one in found.checkpoints if first in one.error and other in one.error]
+    if not shared:
+        return "-"
+    alike = list(takewhile(lambda one: one.together(first, other) and not one.blurred(first, other), shared))
+    if len(alike) == len(found.checkpoints):
+        return "="
+    end = shared[-1]
+    if end.blurred(first, other) and end.together(first, other):
+        then = "?"
+    else:
+        then = f"{end.apart(first, other):.1g} m"
+    return f"= to {alike[-1].time:g} s, then {then}" if alike else then
+
+
+def _because(cause: Cause) -> str:
+    """Why two engines part, in a sentence."""
+    said = f"{' and '.join(cause.engines)} part at {cause.time:g} s, by {cause.apart:.2g} m"
+    if not cause.parts:
+        return f"{said}, whatever part of the model is left out"
+    said += f", over {' and '.join(cause.parts)}: without, {cause.left:.1g} m"
+    if cause.softness:
+        said += f"; mujoco itself moves {cause.softness:.1g} m where these give way eight times faster"
+    return said
 
 
 def _group(point: Checkpoint, group: tuple[str, ...], first: tuple[str, ...]) -> str:
@@ -97,11 +169,7 @@ def _group(point: Checkpoint, group: tuple[str, ...], first: tuple[str, ...]) ->
     names = " = ".join(f"{engine} ±{point.error[engine]:.1e}" for engine in group)
     if group == first:
         return names
-    far, errors = min(
-        (point.distance[(a, b) if (a, b) in point.distance else (b, a)], point.error[a] + point.error[b])
-        for a in group
-        for b in first
-    )
+    far, errors = min((point.apart(a, b), point.error[a] + point.error[b]) for a in group for b in first)
     return (
         f"{names}, {far:.2g} m away, {far / errors:.2g} of both errors"
         if errors
@@ -113,4 +181,4 @@ def _common(paths: Sequence[Path]) -> Path:
     """The folder that holds them all."""
     import os
 
-    return Path(os.path.commonpath([path.parent for path in paths]))
+    return Path(os.path.commonpath([path.absolute().parent for path in paths]))

@@ -107,7 +107,7 @@ def _said(path: Path, reading: Reading, word: LookedWord, sentence: str = "") ->
 
 def _model(path: Path, reading: Reading) -> ModelFile:
     return ModelFile(
-        path=str(path),
+        path=str(path.resolve()),  # DART takes no other
         format=reading.format,
         digest=reading.digest,
         time_step=reading.time_step,

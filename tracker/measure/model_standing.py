@@ -1,22 +1,33 @@
 """One model in several engines: how far they are apart at growing times, and which of them stand together.
 
-Each engine runs the file as its users do, at the file's own time step and at half of it; twice of what that changes is
-the engine's own error, as it is of a first order. Two engines stand together where they are no further apart than both of their errors.
+Each engine runs the file as its users do, at the file's own time step and at half of it. Three times what that changes, at
+this time or the one before, counts as the engine's own error: twice, as it is of a first order, and half as much for what is
+not yet; an error that changes its sign passes through zero. Two engines stand together where they are no further apart than both of their errors.
+
+Where two that can leave parts of a model out stand apart, those parts are named without which they do not: both are asked
+again without contacts, without limits, and so on, up to the first time at which they part.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any
 
 import numpy as np
 
 from spook_tracker.engine.errors import EngineError
 from spook_tracker.engine.find import find
-from spook_tracker.engine.model_file import ModelFile, ModelRun
+from spook_tracker.engine.model_file import PARTS, ModelFile, ModelRun
 from spook_tracker.engine.result import Result
 from spook_tracker.scalar_tests.model_file.facts import CHECKPOINTS, apart
 
+ERROR = 3.0  # times what halving the step changes
+SPLIT = ("mujoco", "spook")  # engines that can leave parts of a model out
+GONE = 0.1  # of a distance: what is left of it without the parts that make it
+SOFT = {"contacts", "limits", "ties"}  # parts that give way in MuJoCo
+STIFFER = 8.0  # times faster they do so, to see what that changes
 LEAST = 1e-9  # of the size: errors below it are rounding
 LIMIT = 60.0  # s, of one run
 
@@ -27,8 +38,42 @@ class Checkpoint:
 
     time: float  # s
     error: Mapping[str, float]  # m, of each engine's step; infinite where its half step broke off
-    distance: Mapping[tuple[str, str], float]  # m, of every two
-    groups: tuple[tuple[str, ...], ...]  # that stand together, the largest first
+    distance: Mapping[tuple[str, str], float]  # m, of every two, in the order they were asked in
+    size: float  # m
+    groups: tuple[tuple[str, ...], ...] = ()  # that stand together, the largest first
+
+    def apart(self, one: str, other: str) -> float:
+        """How far [m] two engines are apart; infinite where one is not there."""
+        return self.distance.get((one, other), self.distance.get((other, one), np.inf))
+
+    def beyond(self, one: str, other: str) -> float:
+        """How much further [m] than both of their errors."""
+        both = self.error.get(one, 0.0) + self.error.get(other, 0.0)
+        return self.apart(one, other) - both - LEAST * self.size
+
+    def together(self, one: str, other: str) -> bool:
+        """Whether they are no further apart than that."""
+        return self.beyond(one, other) <= 0.0
+
+    def blurred(self, one: str, other: str) -> bool:
+        """Whether their errors are too large to tell: a tenth of the size, or without end."""
+        return not self.error.get(one, 0.0) + self.error.get(other, 0.0) < 0.1 * self.size
+
+
+@dataclass(frozen=True, slots=True)
+class Cause:
+    """Why two engines part: without `parts` of the model they stand together at that time, or `left` of the distance is small.
+
+    `parts` is empty where no parts explain it. `softness` is how far MuJoCo itself moves where what gives way in it does so
+    eight times faster, at an eighth of the step; 0 where no such part is among them.
+    """
+
+    engines: tuple[str, str]
+    time: float  # s, the first checkpoint at which they stand apart
+    apart: float  # m, there
+    parts: tuple[str, ...]
+    left: float  # m
+    softness: float = 0.0  # m
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +83,7 @@ class Standing:
     size: float  # m, the largest that an engine says
     checkpoints: tuple[Checkpoint, ...]
     refused: Mapping[str, str]
+    cause: Cause | None = None
 
 
 def standing(model: ModelFile, engines: Sequence[str], duration: float = CHECKPOINTS[-1]) -> Standing:
@@ -47,7 +93,10 @@ def standing(model: ModelFile, engines: Sequence[str], duration: float = CHECKPO
     refused: dict[str, str] = {}
     for engine in engines:
         try:
-            whole, half = (_ran(model, engine, model.time_step / parts, times) for parts in (1, 2))
+            # some engines die of some files
+            whole, half = (
+                _ran(model, engine, model.time_step / parts, times, elsewhere=True) for parts in (1, 2)
+            )
         except EngineError as error:
             refused[engine] = str(error)
             continue
@@ -55,30 +104,72 @@ def standing(model: ModelFile, engines: Sequence[str], duration: float = CHECKPO
         if whole.failure:
             refused[engine] = whole.failure
     size = max((float(whole.partial["size"]) for whole, _ in runs.values()), default=0.0)
-    found = (_checkpoint(place, time, runs, size) for place, time in enumerate(times))
-    return Standing(size, tuple(one for one in found if one.error), refused)
+    found = _checkpoints(times, runs, size)
+    cause = None
+    both = (one for one in found if all(engine in one.error for engine in SPLIT))
+    if parted := next((one for one in both if not one.together(*SPLIT)), None):
+        cause = _cause(model, tuple(t for t in times if t <= parted.time), parted.apart(*SPLIT), size)
+    return Standing(size, found, refused, cause)
 
 
-def _ran(model: ModelFile, engine: str, step: float, times: tuple[float, ...]) -> Result:
-    asked = ModelRun(model=model, samples=times, elsewhere=True)  # some engines die of some files
-    done: Result = find(engine).simulate(asked, time_step=step, duration=times[-1], time_limit=LIMIT)
+def _ran(model: ModelFile, engine: str, step: float, times: tuple[float, ...], **asked: Any) -> Result:
+    run = ModelRun(model=model, samples=times, **asked)
+    done: Result = find(engine).simulate(run, time_step=step, duration=times[-1], time_limit=LIMIT)
     return done
 
 
-def _checkpoint(
-    place: int, time: float, runs: Mapping[str, tuple[Result, Result]], size: float
-) -> Checkpoint:
-    reached = [engine for engine, (whole, _) in runs.items() if len(whole.partial["position"]) > place]
-    error = {engine: 2.0 * _at(place, *runs[engine], size) for engine in reached}
-    distance = {
-        (one, other): _at(place, runs[one][0], runs[other][0], size)
-        for k, one in enumerate(reached)
-        for other in reached[k + 1 :]
-    }
-    together = {
-        pair for pair, far in distance.items() if far <= error[pair[0]] + error[pair[1]] + LEAST * size
-    }
-    return Checkpoint(time, error, distance, _groups(reached, together))
+def _cause(model: ModelFile, times: tuple[float, ...], apart_now: float, size: float) -> Cause:
+    """All parts are left out; those that can come back one by one without the engines parting are not the cause."""
+
+    def without(parts: tuple[str, ...]) -> Checkpoint | None:
+        """Where the engines are then, if that is together or nearly so."""
+        runs = {
+            engine: (
+                _ran(model, engine, model.time_step, times, without=frozenset(parts)),
+                _ran(model, engine, model.time_step / 2, times, without=frozenset(parts)),
+            )
+            for engine in SPLIT
+        }
+        point = _checkpoints(times, runs, size)[-1]
+        alike = point.together(*SPLIT) and not point.blurred(*SPLIT)
+        return point if alike or point.apart(*SPLIT) < GONE * apart_now else None
+
+    parts: tuple[str, ...] = PARTS
+    point = without(parts)
+    if point is None:
+        return Cause(SPLIT, times[-1], apart_now, (), apart_now)
+    for part in reversed(PARTS):
+        rest = tuple(one for one in parts if one != part)
+        if alike := without(rest):
+            parts, point = rest, alike
+    left = point.apart(*SPLIT)
+    softness = 0.0
+    if SOFT.intersection(parts):
+        step = model.time_step / STIFFER
+        own, stiff = (_ran(model, SPLIT[0], step, times, stiffer=stiffer) for stiffer in (1.0, STIFFER))
+        softness = _at(len(times) - 1, own, stiff, size)
+    return Cause(SPLIT, times[-1], apart_now, parts, left, softness)
+
+
+def _checkpoints(
+    times: Sequence[float], runs: Mapping[str, tuple[Result, Result]], size: float
+) -> tuple[Checkpoint, ...]:
+    """Those that some engine has reached."""
+    found: list[Checkpoint] = []
+    before: dict[str, float] = {}  # at the time before
+    for place, time in enumerate(times):
+        reached = [engine for engine, (whole, _) in runs.items() if len(whole.partial["position"]) > place]
+        if not reached:
+            break
+        now = {engine: ERROR * _at(place, *runs[engine], size) for engine in reached}
+        distance = {
+            pair: _at(place, runs[pair[0]][0], runs[pair[1]][0], size) for pair in combinations(reached, 2)
+        }
+        error = {engine: max(now[engine], before.get(engine, 0.0)) for engine in reached}
+        before = now
+        point = Checkpoint(time, error, distance, size)
+        found.append(replace(point, groups=_groups(reached, point)))
+    return tuple(found)
 
 
 def _at(place: int, one: Result, other: Result, size: float) -> float:
@@ -86,12 +177,12 @@ def _at(place: int, one: Result, other: Result, size: float) -> float:
     return float(found[place]) if place < len(found) else float(np.inf)
 
 
-def _groups(engines: Sequence[str], together: set[tuple[str, str]]) -> tuple[tuple[str, ...], ...]:
+def _groups(engines: Sequence[str], point: Checkpoint) -> tuple[tuple[str, ...], ...]:
     """Engines in groups of which all stand with all, each in the first that takes it."""
     groups: list[list[str]] = []
     for engine in engines:
         for group in groups:
-            if all((one, engine) in together or (engine, one) in together for one in group):
+            if all(point.together(one, engine) for one in group):
                 group.append(engine)
                 break
         else:
