@@ -437,7 +437,7 @@ MUTANTS = (
         "where larger is better, more is called worse",
         "test_judge_rules.py::test_where_larger_is_better_less_is_worse",
         "judge/slower.py",
-        "return -change if larger_is_better else change",
+        "return -change if larger_is_better == (level > 0.0) else change",
         "return change",
     ),
 )

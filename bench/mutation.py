@@ -52,7 +52,7 @@ MUTANTS = (
     mutant("lenient-start", "level", "FEW_NIGHTS_FLOOR = 0.5", "FEW_NIGHTS_FLOOR = 0.6"),
     mutant("one-night-confirms", "run_times", "len(self.off) > 1 and", "len(self.off) > 0 and"),
     mutant("no-normal", "segments", "NORMAL = 1.4826", "NORMAL = 1.0"),
-    mutant("larger-is-not-better", "slower", "return -change if larger_is_better else change", "return change"),
+    mutant("larger-is-not-better", "slower", "return -change if larger_is_better == (level > 0.0) else change", "return change"),
     mutant("no-creep", "drift", "if len(self.anchor) < CREEP or len(last) < CREEP:", "if True:"),
     mutant("clusters-are-not-learnt", "level", "\nREACH = 1.25", "\nREACH = 0.0"),
     mutant("no-flaky-levels", "run_times", "OFTEN = 2 ", "OFTEN = 200 "),

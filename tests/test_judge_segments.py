@@ -12,6 +12,7 @@ from bench.detectors import AT, MIXES, one_step
 from spook_tracker.tracker.judge.noisy import Noisy
 from spook_tracker.tracker.judge.run_times import judge_noisy, judged_and_segments
 from spook_tracker.tracker.judge.segments import earlier_level
+from spook_tracker.tracker.judge.slower import worse_by
 
 
 def told_of(values: Any, **options: Any) -> list[Noisy]:
@@ -186,3 +187,36 @@ def test_values_at_the_ends_of_the_doubles_are_judged_as_any_others(exponent: in
     assert [night.verdict.sentence for night in told] == [night.verdict.sentence for night in near]
     assert told[-1].levels == tuple(float(np.ldexp(level, exponent)) for level in near[-1].levels)  # type: ignore[union-attr]
     assert told[-1].state == "detected"
+
+
+@pytest.mark.parametrize("values", [[0.0] * 24 + [3.0] * 6, [0.0] * 24 + [*(1e-7 * noise(4, 0.01, 6))]])
+def test_what_begins_at_0_is_blamed_on_the_night_it_begins(values: list[float]) -> None:
+    told = told_of(values)
+
+    assert {night.state for night in told[25:]} == {"detected"}
+    assert {night.accused for night in told[25:]} == {(23, 24)}
+    assert told[-1].verdict.sentence.startswith("from 0 for the worse")
+    assert told[-1].levels is not None and told[-1].levels[0] == 0.0
+
+
+def test_a_rate_that_falls_to_0_is_slower_and_none_that_is_not_finite() -> None:
+    told = told_of([*(5.0 * noise(5, 0.01, 20)), 0.0, 0.0, 0.0], larger_is_better=True)
+
+    assert told[-1].state == "detected"
+    assert told[-1].verdict.name == "slower"
+    assert told[-1].verdict.sentence.startswith("+100.0 % for the worse")
+
+
+@pytest.mark.parametrize("larger", [False, True])
+def test_negative_values_are_judged_as_their_mirror_is(larger: bool) -> None:
+    values = [*noise(6, 0.01, 30), *(1.3 * noise(7, 0.01, 10))]
+    near, told = (
+        told_of(values, larger_is_better=larger),
+        told_of([-v for v in values], larger_is_better=not larger),
+    )
+
+    assert [night.state for night in told] == [night.state for night in near]
+    assert [night.verdict.sentence for night in told] == [night.verdict.sentence for night in near]
+    assert told[-1].levels == tuple(-level for level in near[-1].levels)  # type: ignore[union-attr]
+    assert (told[-1].state == "detected") != larger
+    assert worse_by(-100.0, -70.0, larger) == pytest.approx(-0.3 if larger else 0.3)  # as compare asks

@@ -214,6 +214,14 @@ def test_the_same_instructions_need_a_gross_change_to_be_believed():
     assert compare_times([], []) is None
 
 
+def test_a_time_of_0_is_none():
+    none = Timing(seconds=(0.0, 0.0, 0.0), runs_per_repeat=1)
+
+    assert compare_times([none], [timing(1, 1e-3)]) is None
+    assert compare_times([timing(1, 1e-3)], [none]) is None
+    assert compare_times([none, *ladder(1)], [none, *ladder(2, 2.0)]).rungs == 6
+
+
 def test_one_slow_rung_is_not_a_slower_engine():
     after = ladder(2)
     after[3] = timing(7, 20.0)

@@ -32,7 +32,7 @@ from spook_tracker.tracker.judge.shifts import (
     remembered,
     standard_error,
 )
-from spook_tracker.tracker.judge.slower import LEAST, worse_by
+from spook_tracker.tracker.judge.slower import FROM_NONE, LEAST, worse_by
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.judge.shifts import Shift, Values
@@ -330,3 +330,20 @@ def times_two_to(exponent: int, value: float) -> float:
         return math.ldexp(value, exponent)
     except OverflowError:
         return math.copysign(math.inf, value)
+
+
+def negated(value: float) -> float:
+    """Without a negative zero."""
+    return 0.0 - value
+
+
+def least_for_none(values: Sequence[float]) -> float:
+    """What stands for a value of 0 among positive ones, so that changes from it are as finite as others; 0: nothing has to."""
+    if not any(value == 0.0 for value in values):
+        return 0.0
+    return min((value for value in values if value > 0.0), default=0.0) / FROM_NONE
+
+
+def none_of(least: float, value: float) -> float:
+    """Back again."""
+    return 0.0 if value <= least else value

@@ -9,6 +9,7 @@ from msgspec.structs import replace
 from spook_tracker.tracker.document.run_document import Sample
 from spook_tracker.tracker.judge.verdict import Verdict
 
+FROM_NONE = 1e9  # times as much stands for something in place of a value of 0
 LEAST = 0.01  # relative: no change of a time below is told, whatever the evidence
 CONFIRM = "to be confirmed by another night"
 Usual = tuple[float, float]  # level, and the relative change that stands clear of its noise
@@ -46,7 +47,7 @@ def judge_time(usual: Usual, value: float, larger_is_better: bool = False) -> Ve
 
 
 def worse_by(level: float, value: float, larger_is_better: bool) -> float:
-    """Relative change for the worse; infinite for what is not finite."""
+    """Change for the worse, relative to how large the level is; infinite for what is not finite."""
     if not math.isfinite(value):
         return math.inf if math.isfinite(level) else 0.0
     if not math.isfinite(level):
@@ -54,7 +55,7 @@ def worse_by(level: float, value: float, larger_is_better: bool) -> float:
     if level == 0.0:
         return 0.0 if value == 0.0 else math.copysign(math.inf, -value if larger_is_better else value)
     change = value / level - 1.0
-    return -change if larger_is_better else change
+    return -change if larger_is_better == (level > 0.0) else change
 
 
 def slower(change: float, level: float, value: float, name: str) -> Verdict:
@@ -65,12 +66,9 @@ def slower(change: float, level: float, value: float, name: str) -> Verdict:
         )
     if not name:
         return Verdict(word="same", sentence=f"{change_in_words(change)}, {CONFIRM}")
-    return Verdict(
-        word="regressed",
-        sentence=change_in_words(change),
-        name=name,
-        decades=math.log10(abs(value / level)) if level and value else None,
-    )
+    ratio = abs(value / level) if level else 0.0
+    decades = math.log10(ratio) if 2.0 / FROM_NONE < ratio < 0.5 * FROM_NONE else None
+    return Verdict(word="regressed", sentence=change_in_words(change), name=name, decades=decades)
 
 
 def by_outcome(verdict: Verdict, sample: Sample) -> Verdict:
@@ -89,4 +87,5 @@ def by_outcome(verdict: Verdict, sample: Sample) -> Verdict:
 
 def change_in_words(change: float) -> str:
     """A relative change, and whether for the worse."""
-    return f"{100.0 * change:+.1f} % for the {'worse' if change > 0.0 else 'better'}"
+    size = "from 0" if change >= 0.5 * FROM_NONE else f"{100.0 * change:+.1f} %"
+    return f"{size} for the {'worse' if change > 0.0 else 'better'}"

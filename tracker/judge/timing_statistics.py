@@ -51,11 +51,11 @@ class TimeChange:
 def compare_times(
     before: Sequence[Timing], after: Sequence[Timing], tolerance: float = 0.0
 ) -> TimeChange | None:
-    """The change over rungs measured on both sides, pairwise; None if there are none.
+    """The change over rungs measured on both sides, pairwise; None if there are none. A time of 0 is none.
 
     `tolerance`: the relative change below which the series' own definition tells none.
     """
-    rungs = list(zip(before, after, strict=True))
+    rungs = [pair for pair in zip(before, after, strict=True) if all(min(t.seconds) > 0.0 for t in pair)]
     if not rungs:
         return None
     own = all(t.cpu_seconds and t.calibration for pair in rungs for t in pair)
