@@ -61,7 +61,7 @@ def data(
     return "window.BENCHMARK_DATA = " + json.dumps({"repoUrl": "r", "entries": {"B": entries}})
 
 
-class Told:
+class Strangers:
     """What the command says of a database."""
 
     def __init__(self, folder: Path) -> None:
@@ -75,9 +75,9 @@ class Told:
         return list(json.loads(self("trend", test, "--json")[1])[0]["nights"])
 
 
-def imported(folder: Path, *contents: str) -> Told:
+def imported(folder: Path, *contents: str) -> Strangers:
     """Each content a file, all of them imported by one command."""
-    told, files = Told(folder), []
+    told, files = Strangers(folder), []
     for place, content in enumerate(contents):
         files.append(folder / f"{place}.{'json' if content.startswith('{') else 'js'}")
         files[-1].write_text(content)
@@ -86,35 +86,35 @@ def imported(folder: Path, *contents: str) -> Told:
 
 
 @pytest.fixture(scope="module")
-def told(tmp_path_factory: pytest.TempPathFactory) -> Told:
+def told(tmp_path_factory: pytest.TempPathFactory) -> Strangers:
     series = {name: [1000.0 * float(value) for value in values] for name, values in SERIES.items()}
     return imported(tmp_path_factory.mktemp("strangers"), data(series))
 
 
-def test_the_right_commit_is_named(told: Told) -> None:
+def test_the_right_commit_is_named(told: Strangers) -> None:
     named = [told.nights(name)[-1]["first_bad"][:4] for name in STEPS]
 
     assert named.count("0080") >= 7
 
 
-def test_one_fast_night_closes_no_red(told: Told) -> None:
+def test_one_fast_night_closes_no_red(told: Strangers) -> None:
     nights = told.nights("fast")
 
     assert {night["state"] for night in nights[42:]} == {"detected"}
     assert (sum(night["news"] for night in nights), nights[-1]["first_bad"][:4]) == (1, "0040")
 
 
-def test_levels_of_long_ago_hide_no_change(told: Told) -> None:
+def test_levels_of_long_ago_hide_no_change(told: Strangers) -> None:
     assert told.nights("old")[-1]["state"] == "detected"
 
 
-def test_a_second_regression_on_a_red_run_time_is_new_and_blamed_on_its_own_commit(told: Told) -> None:
+def test_a_second_regression_on_a_red_run_time_is_new_and_blamed_on_its_own_commit(told: Strangers) -> None:
     code, said = told("judge", "latest", "--test", "second")
 
     assert (code, "1 new tonight" in said, f"bad since {LAST:04d}" in said) == (1, True, True)
 
 
-def test_two_versions_are_compared_with_each_other(told: Told) -> None:
+def test_two_versions_are_compared_with_each_other(told: Strangers) -> None:
     """Both are slow, the second confirms the first: nothing became worse between them."""
     for more, ended in (((), 0), (("--against-history",), 1)):
         assert told("compare", f"{LAST:04d}", f"{LAST + 1:04d}", "--test", "slow", *more)[0] == ended
@@ -126,7 +126,7 @@ def test_two_versions_are_compared_with_each_other(told: Told) -> None:
     assert (code, percent) == (1, pytest.approx(float(pair[3]), abs=0.1))
 
 
-def test_a_night_says_what_recovered(told: Told) -> None:
+def test_a_night_says_what_recovered(told: Strangers) -> None:
     code, said = told("judge", "latest", "--test", "back")
 
     assert (code, "1 recovered" in said, "✓ back/default/run_time: recovered" in said) == (0, True, True)
@@ -139,7 +139,7 @@ def test_values_at_the_end_of_the_doubles_are_no_defect(tmp_path: Path) -> None:
     assert (code, "x/default/run_time: slower" in said) == (1, True)
 
 
-def test_an_accepted_run_time_is_red_after_its_day(told: Told, tmp_path: Path) -> None:
+def test_an_accepted_run_time_is_red_after_its_day(told: Strangers, tmp_path: Path) -> None:
     accepted = tmp_path / "accepted.toml"
     for until, ended in (("2025-04-07", 0), ("2025-04-06", 1)):
         accepted.write_text(
@@ -148,7 +148,7 @@ def test_an_accepted_run_time_is_red_after_its_day(told: Told, tmp_path: Path) -
         assert told("judge", "latest", "--test", "known", "--accepted", accepted)[0] == ended
 
 
-def test_where_time_alone_orders_commits_it_is_said(told: Told) -> None:
+def test_where_time_alone_orders_commits_it_is_said(told: Strangers) -> None:
     assert "ordered by time, as neither parents nor git" in told("judge", "latest", "--test", "second")[1]
 
 

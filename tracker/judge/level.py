@@ -8,8 +8,9 @@ so is by how much twenty of them usually lie off the twenty before, so that a le
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.document.middle import median, median_of_sorted
@@ -332,18 +333,35 @@ def times_two_to(exponent: int, value: float) -> float:
         return math.copysign(math.inf, value)
 
 
-def negated(value: float) -> float:
+def as_usual(
+    values: Sequence[float], absolute: float
+) -> tuple[list[float], float, bool, Callable[[float], float]] | None:
+    """Values whose squares and ratios are doubles, and a tolerance in their unit; whether signs are turned, and the way back.
+
+    None where they are that already.
+    """
+    if any(value < 0.0 for value in values) and not any(value > 0.0 for value in values):
+        return [-value for value in values], absolute, True, _negated
+    if exponent := exponent_of(values):
+        near = [times_two_to(-exponent, value) for value in values]
+        return near, times_two_to(-exponent, absolute), False, partial(times_two_to, exponent)
+    if least := _least_for_none(values):
+        return [value or least for value in values], absolute, False, partial(_none_of, least)
+    return None
+
+
+def _negated(value: float) -> float:
     """Without a negative zero."""
     return 0.0 - value
 
 
-def least_for_none(values: Sequence[float]) -> float:
+def _least_for_none(values: Sequence[float]) -> float:
     """What stands for a value of 0 among positive ones, so that changes from it are as finite as others; 0: nothing has to."""
     if not any(value == 0.0 for value in values):
         return 0.0
     return min((value for value in values if value > 0.0), default=0.0) / FROM_NONE
 
 
-def none_of(least: float, value: float) -> float:
+def _none_of(least: float, value: float) -> float:
     """Back again."""
     return 0.0 if value <= least else value

@@ -11,7 +11,6 @@ import dataclasses
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import TypedDict, Unpack
 
 from msgspec.structs import replace
@@ -24,11 +23,7 @@ from spook_tracker.tracker.judge.level import (
     WINDOW,
     Growing,
     Reference,
-    exponent_of,
-    least_for_none,
-    negated,
-    none_of,
-    times_two_to,
+    as_usual,
     way_back,
 )
 from spook_tracker.tracker.judge.noisy import Noisy
@@ -84,19 +79,9 @@ def judged_and_segments(
     `tolerance` and `absolute`: the change, relative and in the unit of the values, up to which the series' definition
     tells none, whatever its noise. `ages`: how many nights each value lies after the first, where some are left out.
     """
-    mirrored = any(value < 0.0 for value in values) and not any(value > 0.0 for value in values)
-    if mirrored or (exponent := exponent_of(values)):
-        back = negated if mirrored else partial(times_two_to, exponent)
-        near = [-value if mirrored else times_two_to(-exponent, value) for value in values]
-        absolute = absolute if mirrored else times_two_to(-exponent, absolute)
-        larger_is_better = larger_is_better != mirrored
-    elif least := least_for_none(values):
-        back = partial(none_of, least)
-        near = [value or least for value in values]
-    else:
-        back = None
-    if back:
-        nights, segments = judged_and_segments(near, larger_is_better=larger_is_better, releases=releases, accepted=accepted, tolerance=tolerance, absolute=absolute, ages=ages)  # fmt: skip
+    if (usual := as_usual(values, absolute)) is not None:
+        near, absolute, mirrored, back = usual
+        nights, segments = judged_and_segments(near, larger_is_better=larger_is_better != mirrored, releases=releases, accepted=accepted, tolerance=tolerance, absolute=absolute, ages=ages)  # fmt: skip
         segments = [dataclasses.replace(segment, level=back(segment.level)) for segment in segments]
         return [night.scaled(back) for night in nights], segments
     walk = _Walk(values, larger_is_better, tolerance, absolute, ages=ages or range(len(values)))

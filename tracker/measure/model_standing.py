@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
-from typing import Any
 
 import numpy as np
 
@@ -112,8 +111,18 @@ def standing(model: ModelFile, engines: Sequence[str], duration: float = CHECKPO
     return Standing(size, found, refused, cause)
 
 
-def _ran(model: ModelFile, engine: str, step: float, times: tuple[float, ...], **asked: Any) -> Result:
-    run = ModelRun(model=model, samples=times, **asked)
+def _ran(
+    model: ModelFile,
+    engine: str,
+    step: float,
+    times: tuple[float, ...],
+    without: tuple[str, ...] = (),
+    stiffer: float = 1.0,
+    elsewhere: bool = False,
+) -> Result:
+    run = ModelRun(
+        model=model, samples=times, without=frozenset(without), stiffer=stiffer, elsewhere=elsewhere
+    )
     done: Result = find(engine).simulate(run, time_step=step, duration=times[-1], time_limit=LIMIT)
     return done
 
@@ -125,8 +134,8 @@ def _cause(model: ModelFile, times: tuple[float, ...], apart_now: float, size: f
         """Where the engines are then, if that is together or nearly so."""
         runs = {
             engine: (
-                _ran(model, engine, model.time_step, times, without=frozenset(parts)),
-                _ran(model, engine, model.time_step / 2, times, without=frozenset(parts)),
+                _ran(model, engine, model.time_step, times, parts),
+                _ran(model, engine, model.time_step / 2, times, parts),
             )
             for engine in SPLIT
         }
