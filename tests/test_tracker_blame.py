@@ -29,7 +29,7 @@ def test_each_regression_of_a_red_series_is_blamed_on_its_own_commit() -> None:
 
     assert [judged.news for judged in nights] == [False, False, True, False, True, False]
     assert [j.first_bad.run.id for j in nights[2:] if j.first_bad] == ["run-2"] * 4
-    assert known(told, "run-3", "run-4").first_bad["t/c/m"] == (f"{3:040d}"[:12], f"{4:040d}"[:12])
+    assert known(told, ("run-3",), ("run-4",)).first_bad["t/c/m"] == (f"{3:040d}"[:12], f"{4:040d}"[:12])
 
 
 def test_a_range_of_commits_is_blamed_where_not_every_commit_was_measured() -> None:

@@ -230,3 +230,97 @@ def test_a_hosted_runner_has_a_baseline_whatever_it_is_called(tmp_path: Path) ->
     )
 
     assert told("judge", "latest")[0] == 1
+
+
+def csv(machines: int, factor: float) -> str:
+    """A history of one benchmark on some machines a commit; the first is slower from night 20 on."""
+    rows = ["commit,date,machine,benchmark,value,unit"]
+    for night in range(30):
+        for machine in range(machines):
+            slower = factor if machine == 0 and night >= 20 else 1.0
+            value = (machine + 1.0) * float(noise(machine)[night]) * slower
+            rows.append(
+                f"{night:04d}{'e' * 36},2025-01-{night + 1:02d}T0{machine}:00:00Z,m{machine},heap,{value},ms"
+            )
+    return "\n".join(rows)
+
+
+@pytest.fixture(scope="module")
+def machines(tmp_path_factory: pytest.TempPathFactory) -> Strangers:
+    folder = tmp_path_factory.mktemp("machines")
+    (folder / "x.csv").write_text(csv(3, 1.3))
+    told = Strangers(folder)
+    assert told("import", folder / "x.csv")[0] == 0
+    return told
+
+
+def test_a_version_is_judged_on_every_machine_that_measured_it(machines: Strangers, tmp_path: Path) -> None:
+    for name in ("latest", "previous", f"{28:04d}"):
+        code, said = machines("judge", name, "--json", "--junit", tmp_path / "x.xml")
+        found = {finding["machine"][:2]: finding["red"] for finding in json.loads(said)}
+
+        assert (code, found) == (1, {"m0": True, "m1": False, "m2": False})
+        assert re.findall(r'name="default/run_time on (m\d)', (tmp_path / "x.xml").read_text())[0] == "m0"
+
+
+def test_versions_are_compared_machine_by_machine(machines: Strangers) -> None:
+    """The commit before the latest is the previous one, not another machine's run of the latest."""
+    code, said = machines("compare", f"{15:04d}", "latest")
+    document = json.loads(machines("compare", "previous", "latest", "--format", "json")[1])
+    junit = machines("compare", f"{15:04d}", "latest", "--format", "junit")[1]
+
+    assert (code, "✗ 1 worse" in said, "compared on 3 machines: m2" in said) == (1, True, True)
+    assert "first bad commit 0020" in said
+    assert [place[:2] for place in re.findall(r"heap run_time .* on (m\d)", said)] == ["m0"]
+    assert (document["before"]["version"][:4], document["exit_code"]) == ("0028", 0)
+    assert [change["machine"][:2] for change in document["changes"]] == ["m2", "m1", "m0"]
+    assert (junit.count("<testcase"), junit.count("<failure")) == (3, 1)
+    ids = re.findall(r'"run":"(\w+)"', json.dumps(document).replace(" ", ""))
+    assert json.loads(machines("compare", *ids, "--format", "json")[1])["counts"] == {"same": 1}
+
+
+def test_what_one_version_alone_measured_is_named(tmp_path: Path) -> None:
+    """A machine that is gone, and an environment of another; neither is a benchmark lost."""
+    told = imported(
+        tmp_path,
+        *(
+            asv(night, {"a.time_x": [[float(noise(place)[night])], [], "v"]}).replace('"e"', f'"py{place}"').replace('"m"', f'"{machine}"')
+            for night in range(12)
+            for place, machine in enumerate(("m", "m", "gone"))
+            if night < 11 or place == 1
+        ),
+    )  # fmt: skip
+    code, said = told("compare", "previous", "latest")
+
+    assert (code, "1 machine that measured 0010dddddd alone: " in said, "only 0010dddddd has: a.time_x/py0" in said) == (0, True, True)  # fmt: skip
+
+
+@pytest.mark.parametrize("slower", [0, 1])
+def test_every_environment_of_a_commit_is_judged_and_compared(slower: int, tmp_path: Path) -> None:
+    told = imported(
+        tmp_path,
+        *(
+            asv(night, {"a.time_x": [[float(noise(place)[night]) * (1.5 if night >= 12 and place == slower else 1.0)], [], "v"]})
+            .replace('"e"', f'"py{place}"')
+            for night in range(18)
+            for place in range(2)
+        ),
+    )  # fmt: skip
+    for command in (("judge", "latest"), ("compare", f"{8:04d}", "latest")):
+        code, said = told(*command)
+
+        assert (code, "✗ 1 worse" in said, f"a.time_x/py{slower}/run_time, slower" in said) == (1, True, True)
+
+
+@pytest.mark.parametrize("slower", ["A", "B"])
+def test_every_suite_of_a_page_is_judged(slower: str, tmp_path: Path) -> None:
+    entries = {}
+    for place, suite in enumerate("AB"):
+        steps = noise(place) * (from_night(80, 1.3) if suite == slower else 1.0)
+        page = json.loads(data({"x": [1000.0 * float(value) for value in steps]}).partition("=")[2])
+        entries[suite] = page["entries"]["B"]
+    page = {"repoUrl": "https://example.org/o/proj", "entries": entries}
+    told = imported(tmp_path, f"window.BENCHMARK_DATA = {json.dumps(page)}")
+    code, said = told("judge", "latest")
+
+    assert (code, f"x/{slower}/run_time, slower" in said) == (1, True)

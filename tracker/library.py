@@ -159,18 +159,41 @@ def fork_point(history: StoredHistory, after: str) -> RunInfo:
 
 def _earlier(history: StoredHistory, before: str, after: str) -> RunInfo:
     """The run that `before` stands for beside `after`."""
-    from spook_tracker.tracker.judge.lane import line_of
-
     if before == FORK_POINT:
         return fork_point(history, after)
     whose, _, word = after.rpartition("@")
     if word == "latest" and before == (f"{whose}@previous" if whose else "previous"):
-        line = line_of(
-            history.runs(), history.resolve(after)
-        )  # as the run is judged: other branches are not before it
-        if len(line) > 1:
-            return line[-2]
+        return _previous(history, after) or history.resolve(before)
     return history.resolve(before)
+
+
+def _previous(history: StoredHistory, name: str) -> RunInfo | None:
+    """The run before another as that is judged: on its branch, and of its version only if it measured the same there."""
+    from spook_tracker.tracker.judge.lane import line_of, of_version
+
+    *line, run = line_of(history.runs(), history.resolve(name))
+    version = {other.id for other in of_version(line, run)}
+    for other in reversed(line):
+        if other.id not in version:
+            return other
+        if other.machine.fingerprint == run.machine.fingerprint and (
+            history.samples(other.id).keys() & history.samples(run.id).keys()
+        ):
+            return other
+    return None
+
+
+def _runs_of(history: StoredHistory, name: str, run: RunInfo) -> list[RunInfo]:
+    """The runs that are meant by a name that stands for `run`: that one by its id, else all of its version."""
+    from spook_tracker.tracker.judge.lane import of_version
+
+    return [run] if _by_id(name, run) else of_version(history.runs(), run)
+
+
+def _by_id(name: str, run: RunInfo) -> bool:
+    """Whether a name that stands for a run is its id, or the start of it."""
+    word = name.rpartition("@")[2]
+    return run.id.startswith(word) and word != run.engine.version
 
 
 @no_collection()
@@ -183,36 +206,53 @@ def compare(
 ) -> CompareDocument:
     """What changed between two versions, each named as on the command line; `before` may be fork-point.
 
-    With `against_history` run times that are red against their history are red here, too.
+    A version is all runs of its commit: they are compared on every machine that measured both, and what only one of
+    them has is named in a note. With `against_history` run times that are red against their history are red here, too.
     """
     from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
+    from spook_tracker.tracker.judge.lane import machine_of
+    from spook_tracker.tracker.judge.machine_pairs import joined, paired, together
     from spook_tracker.tracker.judge.maps import may_be_dropped
     from spook_tracker.tracker.judge.work import with_work
 
     new = history.resolve(after)
     old = _earlier(history, before, after)
-    dropped = may_be_dropped(history, (old, new))
-    earlier, later = (
-        ComparedRun(
-            side=side_of(run),
-            samples=with_work(history.samples(run.id), run.engine),
-            maps=history.maps(run.id),
-            dropped=dropped[run.id],
+    olds, news = _runs_of(history, before, old), _runs_of(history, after, new)
+    if old in news and old.id != new.id:  # one version measured twice
+        olds, news = [old], [new]
+    found = paired(olds, news, lambda run: history.samples(run.id))
+    dropped = may_be_dropped(history, [side[0] for pair in found.pairs for side in pair])
+
+    def side(runs: Sequence[RunInfo]) -> ComparedRun:
+        samples, maps = together(runs, history.samples, history.maps)
+        return ComparedRun(
+            side=side_of(runs[0]),
+            samples=with_work(samples, runs[0].engine),
+            maps=maps,
+            dropped=dropped[runs[0].id],
+            runs=tuple(run.id for run in runs),
         )
-        for run in (old, new)
-    )
-    return compare_in(history, (old, earlier), (new, later), accepted, against_history)
+
+    documents = [
+        compare_in(history, (earlier[0], side(earlier)), (later[0], side(later)), accepted, against_history)
+        for earlier, later in found.pairs
+    ]
+    return joined(documents, [machine_of(later[0]) for _, later in found.pairs], found.left_out)
 
 
 @no_collection()
 def judge_run(history: StoredHistory, run: str, accepted: Sequence[Accepted] = ()) -> list[Finding]:
     """What became of a recorded run, against everything measured before it; red first.
 
-    `latest` is the latest night of every machine: what is red of the last runs of others within a day is among it.
+    A version is all runs of its commit, of each series on each machine the last. `latest` is the latest night of every
+    machine: what is red of the last runs of others within a day is among it.
     """
     from spook_tracker.tracker.judge.tonight import tonight
 
-    return tonight(history, history.resolve(run), accepted, others=run.rpartition("@")[2] == "latest")
+    whose, at, word = run.rpartition("@")
+    before = _previous(history, f"{whose}{at}latest") if word == "previous" else None
+    meant = before or history.resolve(run)
+    return tonight(history, meant, accepted, version=not _by_id(run, meant), others=word == "latest")
 
 
 def idle_entries(

@@ -110,7 +110,8 @@ def compare(
 
     V is an engine version, a git tag, the start of a commit hash, a run id, latest, previous or last-green; or V1 and
     V2 are two engines by name, which are ranked: at equal error, which is ahead where and by what factor.
-    Previous to the latest is the run before it on its own branch.
+    A version is all runs of its commit; each machine that measured both is compared. Previous to the latest is the
+    version before it on its own branch, or an earlier run of its own that measured the same on that machine.
     V1 may be fork-point: the nearest measured commit of the main line that V2 builds on. The formats comment and
     annotations are for pull requests, and empty when nothing became worse.
     """
@@ -214,8 +215,9 @@ def judge_command(
 ) -> None:
     """Judge a recorded or imported run against everything measured before it.
 
-    RUN is named as for compare; latest is the latest night of every machine: what is red of the last runs of other
-    machines within a day is told, too. What is red ends with exit code 1, a run that measured nothing with 3, as do old
+    RUN is named as for compare: a version is all runs of its commit, of each series on each machine the last; a run's
+    id is that run alone. Latest is the latest night of every machine: what is red of the last runs of other machines
+    within a day is told, too. What is red ends with exit code 1, a run that measured nothing with 3, as do old
     questions some of whose values cannot be told.
     """
     from spook_tracker.tracker.cli.console import say

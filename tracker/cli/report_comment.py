@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from spook_tracker.tracker.cli.report_compare import both, escape, name_of, red_lines
+from spook_tracker.tracker.cli.report_compare import both, escape, name_of, red_lines, where
 from spook_tracker.tracker.document.wording import clean
 from spook_tracker.tracker.judge.choice import worst_change
 from spook_tracker.tracker.judge.comparison_document import CompareDocument
@@ -22,13 +22,13 @@ def comment(document: CompareDocument) -> str:
     )
     lines = [
         f"**✗ {count} worse than at {escape(name_of(document.before))}**; the worst: "
-        f"{escape(worst.series)}, {escape(worst.name or worst.word)}",
+        f"{escape(where(worst))}, {escape(worst.name or worst.word)}",
         "",
     ]
     for change in [worst, *(change for change in reds if change is not worst)][:MOST]:
         values = " → ".join(both(change))
         how = f"{change.name or change.word}: {values}, {change.sentence}"
-        lines.append(f"- {escape(change.series)}: {escape(how)}")
+        lines.append(f"- {escape(where(change))}: {escape(how)}")
     if len(reds) > MOST:
         lines.append(f"- and {len(reds) - MOST} more")
     return "\n".join([*lines, "", f"{escape(name_of(document.after))}; all of it: `tracker compare`"])

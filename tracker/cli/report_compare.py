@@ -68,10 +68,11 @@ def _limit(limit: float | tuple[float, float] | None) -> str:
 def red_lines(changes: Sequence[Change]) -> list[str]:
     """A line for each red series; of a ladder its worst rung speaks for the others."""
     lines: list[str] = []
-    rungs: dict[tuple[str, str, str], list[Change]] = {}
+    rungs: dict[tuple[str, ...], list[Change]] = {}
     for change in changes:
         if change.red and change.kind == "ladder":
-            rungs.setdefault((change.test, change.metric, change.configuration), []).append(change)
+            place = change.test, change.metric, change.configuration, change.machine
+            rungs.setdefault(place, []).append(change)
         elif change.red:
             lines.append(red_line(change))
     for group in rungs.values():
@@ -79,6 +80,11 @@ def red_lines(changes: Sequence[Change]) -> list[str]:
         more = f"; and {len(group) - 1} more of its time steps" if len(group) > 1 else ""
         lines.append(red_line(worst) + more)
     return lines
+
+
+def where(change: Change) -> str:
+    """The series, and the machine where there are several."""
+    return f"{change.series} on {change.machine}" if change.machine else change.series
 
 
 def red_line(change: Change) -> str:
@@ -92,6 +98,8 @@ def red_line(change: Change) -> str:
     ]
     if change.first_bad:
         parts.append(f"first bad commit {change.first_bad}, last good {change.last_good or 'unknown'}")
+    if change.machine:
+        parts.append(f"on {change.machine}")
     parts.append(f"see {page_of(change.test)}")
     return clean("; ".join(part for part in parts if part))
 
@@ -105,7 +113,7 @@ def compare_table(document: CompareDocument, everything: bool = False, room: int
         rows = [
             (
                 _what(change),
-                change.series,
+                where(change),
                 *both(change),
                 _how(change),
             )
@@ -137,7 +145,7 @@ def _worst(document: CompareDocument) -> list[str]:
     if worst is None:
         return []
     reds = sum(change.red for change in document.changes)
-    words = f"✗ {reds} worse; the worst: {clean(worst.series)}, {clean(worst.name or worst.word)}"
+    words = f"✗ {reds} worse; the worst: {clean(where(worst))}, {clean(worst.name or worst.word)}"
     return [click.style(words, fg="red", bold=True)]
 
 
@@ -163,21 +171,20 @@ def _paint(_row: int, text: str) -> str:
 def _moved(document: CompareDocument) -> list[Frontier]:
     """Ladders on which an error or the run time changed; what is inside the noise is not told."""
     moved = {
-        (change.test, change.metric.split(":")[1], change.configuration)
+        (change.test, change.metric.split(":")[1], change.configuration, change.machine)
         for change in document.changes
         if change.metric.startswith("ladder:")
         and change.kind in ("ladder", "run_time")
         and change.word not in QUIET
     }
-    return [f for f in document.frontiers if (f.test, f.ladder, f.configuration) in moved]
+    return [f for f in document.frontiers if (f.test, f.ladder, f.configuration, f.machine) in moved]
 
 
 def _frontier_lines(told: Sequence[Frontier], room: int) -> list[str]:
     if not told:
         return []
     rows = [
-        (f"{f.test} {f.ladder}", f.configuration, *(f"{r:.3g}" if r else "-" for r in _ratios(f)))
-        for f in told
+        (f"{f.test} {f.ladder}", _of_ladder(f), *(f"{r:.3g}" if r else "-" for r in _ratios(f))) for f in told
     ]
     columns = (
         Column("error against run time", flexible=True),
@@ -191,6 +198,10 @@ def _frontier_lines(told: Sequence[Frontier], room: int) -> list[str]:
 
 def _ratios(frontier: Frontier) -> tuple[float | None, float | None, float | None]:
     return frontier.time_at_equal_error, frontier.error_at_equal_time, frontier.work_at_equal_error
+
+
+def _of_ladder(frontier: Frontier) -> str:
+    return f"{frontier.configuration} on {frontier.machine}" if frontier.machine else frontier.configuration
 
 
 def counted(document: CompareDocument) -> str:
@@ -218,7 +229,7 @@ def compare_markdown(document: CompareDocument) -> str:
     for change in shown[:MOST_ROWS]:
         cells = (
             _what(change),
-            change.series,
+            where(change),
             *both(change),
             _limit(change.limit),
             change.sentence + (f"; first bad commit {change.first_bad}" if change.first_bad else ""),
@@ -232,7 +243,7 @@ def compare_markdown(document: CompareDocument) -> str:
         lines += ["|---|---:|---:|"]
     for f in moved[:MOST_ROWS]:
         ratios = [f"{ratio:.3g}" if ratio else "-" for ratio in _ratios(f)[:2]]
-        lines.append(f"| {escape(f'{f.test} {f.ladder} {f.configuration}')} | {' | '.join(ratios)} |")
+        lines.append(f"| {escape(f'{f.test} {f.ladder} {_of_ladder(f)}')} | {' | '.join(ratios)} |")
     lines += ["", *(f"- {escape(note)}" for note in document.notes)]
     return "\n".join(lines).rstrip() + "\n"
 
@@ -314,7 +325,9 @@ def summary(findings: Sequence[Finding]) -> str:
     left = words.total() - sum(words[word] for word in APART) - sum(f.suspected for f in findings)
     parts = [f"{left} series hold their level"] if left or also or not words else []
     parts += [f"{words[word]} {said}" for word, said in APART.items() if words[word]]
-    return click.style("✓ " + "; ".join(parts) + also, fg="green")
+    machines = len({finding.machine for finding in findings})
+    on = f"; judged on {machines} machines" if machines > 1 else ""
+    return click.style("✓ " + "; ".join(parts) + also + on, fg="green")
 
 
 def _held(finding: Finding) -> str:

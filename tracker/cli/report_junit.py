@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import spook_tracker.tracker.document.outside as outside
-from spook_tracker.tracker.cli.report_compare import red_line
+from spook_tracker.tracker.cli.report_compare import red_line, where
 from spook_tracker.tracker.cli.report_table import limit, measured, pairs
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
@@ -88,7 +88,7 @@ def junit_of_comparison(document: CompareDocument) -> str:
 
 def _of_change(change: Change, asked: str = "") -> Case:
     return Case(
-        name=change.series.partition("/")[2] + asked,
+        name=where(change).partition("/")[2] + asked,
         failure=red_line(change) if change.red else "",
         skipped=change.sentence if change.word in ("not_comparable", "not_measured") else "",
     )

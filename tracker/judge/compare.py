@@ -20,7 +20,7 @@ from spook_tracker.tracker.judge.compare_ladders import frontiers, run_times
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Side
 from spook_tracker.tracker.judge.explaining import TIMES, beside_run_times, calm
 from spook_tracker.tracker.judge.judged import BY_TIME, Judged, of_one_lineage, red_class
-from spook_tracker.tracker.judge.known import Known, judged_in, known
+from spook_tracker.tracker.judge.known import Known, known, newest_in
 from spook_tracker.tracker.judge.lane import (
     Records,
     asked_for,
@@ -54,6 +54,7 @@ class ComparedRun:
     whole: bool = False  # the whole catalogue was asked: what is not there was removed
     asked: Mapping[str, set[str]] | None = None  # tests by family; None: those it measured
     dropped: Collection[str] = ()  # keys of maps it may have had (tracker.judge.maps.may_be_dropped)
+    runs: tuple[str, ...] = ()  # ids, the newest first, where the samples are of several
 
     @property
     def night(self) -> date:
@@ -117,7 +118,8 @@ def compare_in(
     """
     (old, earlier), (new, later) = before, after
     runs = [run for run in records.runs() if run.engine.name == new.engine.name]
-    newest = next((run for run in reversed(runs) if run.id in (old.id, new.id)), new)
+    olds, news = earlier.runs or (old.id,), later.runs or (new.id,)
+    newest = next((run for run in reversed(runs) if run.id in (*olds, *news)), new)
     line = line_of(runs, newest)
     rungs = {key for key, (d, s) in later.samples.items() if d.kind == "ladder" and s.timing is not None}
     alone = {key for key, (d, _) in later.samples.items() if d.kind == "time" and not is_read_off(d)}
@@ -126,18 +128,29 @@ def compare_in(
         told |= judge_all(run_time_histories(records, line, rungs), accepted)
     if alone and len(line) > 1:
         told |= judge_all(histories(records, line, alone), accepted)
-    later = replace(later, whole=asked_whole(new), asked=asked_for(new, later.samples))
-    document = compare(earlier, later, accepted, known(told, old.id, new.id))
+    measured = [run for run in runs if run.id in news] or [new]
+    whole = any(map(asked_whole, measured))
+    later = replace(later, whole=whole, asked=_asked(measured, later.samples))
+    document = compare(earlier, later, accepted, known(told, olds, news))
     reds = {change.series for change in document.changes if change.red} - told.keys()
     times = dict(told)
     if reds:
         told |= judge_all(histories(records, line, reds), accepted)
-        document = compare(earlier, later, accepted, known(told, old.id, new.id))
-    standing = {key: judged for key, judged in judged_in(times, (new.id,))[new.id].items() if judged.red}
+        document = compare(earlier, later, accepted, known(told, olds, news))
+    standing = {key: judged for key, judged in newest_in(times, news).items() if judged.red}
     document = _beside_history(document, standing, against_history)
     if of_one_lineage(line) or not any(change.first_bad for change in document.changes):
         return document
     return msgspec.structs.replace(document, notes=(*document.notes, f"the history is {BY_TIME}"))
+
+
+def _asked(runs: Sequence[Run], samples: Samples) -> dict[str, set[str]]:
+    """The tests that the runs of one side were asked for together, by family."""
+    asked: dict[str, set[str]] = {}
+    for run in runs:
+        for family, tests in asked_for(run, samples).items():
+            asked.setdefault(family, set()).update(tests)
+    return asked
 
 
 def _beside_history(

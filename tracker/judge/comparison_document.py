@@ -53,6 +53,7 @@ class Change(Struct, frozen=True, kw_only=True):
     last_good: Text = ""
     accepted: Text = ""  # by which person and why, if accepted.toml takes this level
     rounding: Number | None = None  # where it was measured: a difference up to that is none
+    machine: Text = ""  # where the versions were compared on several
 
 
 class Frontier(Struct, frozen=True, kw_only=True):
@@ -64,6 +65,7 @@ class Frontier(Struct, frozen=True, kw_only=True):
     time_at_equal_error: float | None  # later / earlier, median over the errors both reach; machines equal
     error_at_equal_time: float | None  # later / earlier, median over the times both take; machines equal
     work_at_equal_error: float | None  # the same in exact steps, on any machine
+    machine: Text = ""  # where the versions were compared on several
 
 
 class CompareDocument(Struct, frozen=True, kw_only=True):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from spook_tracker.tracker.judge.judged import Judged, commit_of
@@ -21,13 +21,18 @@ class Known:
     first_bad: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # last good, first bad commit
 
 
-def known(told: Mapping[str, Told], before: str, after: str) -> Known:
-    """What judged histories know about two runs, by their ids.
+def known(told: Mapping[str, Told], before: Sequence[str], after: Sequence[str]) -> Known:
+    """What judged histories know about two sides, by the ids of their runs, the newest first.
 
     Times are compared with the earlier run's own: of the history they have the noise alone. A red series is blamed on the commit where it last became worse up to the later run.
     """
-    found = judged_in(told, (before, after))
-    return known_of(told, found[before], found[after])
+    return known_of(told, newest_in(told, before), newest_in(told, after))
+
+
+def newest_in(told: Mapping[str, Told], runs: Sequence[str]) -> dict[str, Judged]:
+    """By series, the verdict of the newest of these runs, named newest first, that has one."""
+    found = judged_in(told, runs)
+    return {key: judged for run in reversed(runs) for key, judged in found[run].items()}
 
 
 def judged_in(told: Mapping[str, Told], runs: Collection[str]) -> dict[str, dict[str, Judged]]:

@@ -63,6 +63,19 @@ def line_of(runs: Sequence[OneRun], run: OneRun) -> list[OneRun]:
     return [*before, of_engine[place]]
 
 
+def of_version(runs: Sequence[OneRun], run: OneRun) -> list[OneRun]:
+    """The runs of a run's version among these, in their order: all of its commit; of a build without one, itself alone."""
+    if not is_placed(run):
+        return [run]
+    version = run.engine.name, run.engine.git_hash
+    return [o for o in runs if is_placed(o) and (o.engine.name, o.engine.git_hash) == version]
+
+
+def machine_of(run: Run) -> str:
+    """A run's machine in a few words that tell it from others."""
+    return f"{run.machine.processor} ({run.machine.fingerprint[:8]})"
+
+
 def forked_from(runs: Sequence[OneRun], run: OneRun, main_line: set[str]) -> OneRun | None:
     """The nearest measured ancestor of a run on the main line; where that is not known, the run before it.
 

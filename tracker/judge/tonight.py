@@ -13,9 +13,10 @@ from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.events import name_of
 from spook_tracker.tracker.judge.explaining import beside_findings
 from spook_tracker.tracker.judge.judged import Judged, blame, blame_of, commit_of
-from spook_tracker.tracker.judge.lane import Records, histories, line_of
+from spook_tracker.tracker.judge.known import judged_in
+from spook_tracker.tracker.judge.lane import Records, histories, line_of, machine_of, of_version
 from spook_tracker.tracker.judge.maps import ToldMap, stands_of, told_maps
-from spook_tracker.tracker.judge.series_history import Told, judge_all
+from spook_tracker.tracker.judge.series_history import Told, is_noisy, judge_all
 from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, WORSE_THAN_EXPECTED, Class, State
 
@@ -97,19 +98,58 @@ class Finding:
 
 
 def tonight(
-    records: Records, run: Run, accepted: Sequence[Accepted] = (), others: bool = False
+    records: Records,
+    run: Run,
+    accepted: Sequence[Accepted] = (),
+    *,
+    version: bool = False,
+    others: bool = False,
 ) -> list[Finding]:
     """Findings of one recorded run against its history (tracker.store.history.History); red first.
 
-    `others`: also what is red of the last runs of other machines within a day, as far as the run does not say so.
+    `version`: also of the other runs of its version before it, whatever no later one tells on that machine. `others`:
+    also what is red of the last runs of other machines within a day, as far as the run does not say so.
     """
     line = line_of(records.runs(), run)
     told = judge_all(histories(records, line), accepted)
     findings = of_run(told, run.id)
     findings += [_of_map(told) for told in told_maps(records, line, accepted) if told.tonight]
+    if version:
+        findings = _with_version(line, told, findings)
     if others:
         findings += _on_other_machines(line, told, findings)
     return worst_first(findings)
+
+
+def _with_version(
+    line: Sequence[Run], told: Mapping[str, Told], findings: Sequence[Finding]
+) -> list[Finding]:
+    """The findings of the last run, and those of earlier runs of its version: of each series on each machine the last."""
+    of_last, *before = reversed(of_version(line, line[-1]))
+    found = judged_in(told, [run.id for run in before])
+    every, seen = (
+        {of_last.id: list(findings)},
+        {_place(told[f.series], f.judged) for f in findings if f.judged},
+    )
+    for run in before:
+        fresh = {
+            key: judged for key, judged in found[run.id].items() if _place(told[key], judged) not in seen
+        }
+        seen |= {_place(told[key], judged) for key, judged in fresh.items()}
+        every[run.id] = beside_findings([_finding(key, told[key], judged) for key, judged in fresh.items()])
+    machines = {run.id: machine_of(run) for run in (of_last, *before) if every[run.id]}
+    several = len(set(machines.values())) > 1
+    return [
+        replace(finding, machine=machines[run_id] if several else "")
+        for run_id, of_run in every.items()
+        for finding in of_run
+    ]
+
+
+def _place(series: Told, judged: Judged) -> tuple[str, str]:
+    """A series and where it is judged by itself: times on a machine, values in a float environment."""
+    machine = judged.night.run.machine
+    return series.key, machine.fingerprint if is_noisy(series.definition) else machine.float_environment
 
 
 def _on_other_machines(
@@ -118,16 +158,18 @@ def _on_other_machines(
     run = line[-1]
     last = {other.machine.fingerprint: other for other in line}
     night = {
-        other.id: f"{other.machine.processor} ({fingerprint[:8]})"
+        other.id: machine_of(other)
         for fingerprint, other in last.items()
         if fingerprint != run.machine.fingerprint and abs(started(other) - started(run)) < NIGHT
     }
     if not night:
         return
     said = {finding.series for finding in findings if finding.red and not _of_a_clock(finding)}
+    told_of = {(finding.series, id(finding.judged)) for finding in findings}
     for key, series in told.items():
         for judged in series.nights:
-            if judged.red and judged.night.run.id in night and key not in said:
+            here = judged.red and judged.night.run.id in night
+            if here and key not in said and (key, id(judged)) not in told_of:
                 yield replace(_finding(key, series, judged), machine=night[judged.night.run.id])
 
 

@@ -279,18 +279,24 @@ def _asv_unit(name: str, described: Mapping[str, Any]) -> Unit:
 
 
 def _github_action(said: Mapping[str, Any], _: Beside) -> Iterator[ShortRun]:
+    """A suite is an engine where it is alone; several are configurations of what the repository holds."""
+    several = len(said["entries"]) > 1
+    project = str(said["repoUrl"]).rstrip("/").rpartition("/")[2]
     for suite, entries in said["entries"].items():
         for entry in entries:
             commit = entry["commit"]
             better = DIRECTIONS.get(str(entry.get("tool", "")))
             yield ShortRun(
-                engine=suite,
+                engine=project if several and project else suite,
                 version=commit["id"][:10],
                 commit=commit["id"],
                 commit_time=commit.get("timestamp") or "",
                 started=_moment(entry["date"]),
                 processor=MIXED,
-                results=tuple(_bench(one, better) for one in entry["benches"]),
+                results=tuple(
+                    msgspec.structs.replace(bench, configuration=suite) if several else bench
+                    for bench in (_bench(one, better) for one in entry["benches"])
+                ),
             )
 
 
