@@ -198,14 +198,17 @@ function judgeSize(definition, old, now, decades, ulps) {
 }
 
 // --- run times: against what was usual ---
+const FROM_NONE = 1e9; // times as much stands for something in place of a value of 0
+
 function judgeTime([level, threshold], value, larger) {
   let change = !Number.isFinite(value) ? (Number.isFinite(level) ? Infinity : 0) : !Number.isFinite(level) ? -Infinity :
-    level === 0 ? (value === 0 ? 0 : Infinity) : (larger ? -1 : 1) * (value / level - 1);
-  const percent = !Number.isFinite(change) ? (change > 0 ? "+inf" : "-inf") : `${change < 0 || Object.is(change, -0) ? "-" : "+"}${fixed(Math.abs(100 * change), 1)}`;
-  const words = `${percent} % for the ${change > 0 ? "worse" : "better"}`;
+    level === 0 ? (value === 0 ? 0 : (larger ? -value : value) > 0 ? Infinity : -Infinity) : (larger === (level > 0) ? -1 : 1) * (value / level - 1);
+  const percent = change >= 0.5 * FROM_NONE ? "from 0" : !Number.isFinite(change) ? (change > 0 ? "+inf %" : "-inf %") : `${change < 0 || Object.is(change, -0) ? "-" : "+"}${fixed(Math.abs(100 * change), 1)} %`;
+  const words = `${percent} for the ${change > 0 ? "worse" : "better"}`;
   if (change > threshold) {
     if (!Number.isFinite(value)) { return verdict("regressed", `no finite value any more, ${general(level)} before`, { name: "not finite" }); }
-    return verdict("regressed", words, { name: "slower", decades: level ? Math.log10(Math.abs(value / level)) : null });
+    const ratio = level ? Math.abs(value / level) : 0;
+    return verdict("regressed", words, { name: "slower", decades: ratio > 2 / FROM_NONE && ratio < 0.5 * FROM_NONE ? Math.log10(ratio) : null });
   }
   if (-change > threshold) { return verdict("improved", words); }
   return verdict("same", `${words}, inside the noise (±${fixed(100 * threshold, 0)} %)`);
