@@ -82,6 +82,9 @@ def test_a_second_regression_on_a_red_run_time_is_news_and_blamed_on_its_own_com
         assert not any("on top of that" in night.verdict.sentence for night in [*told[30:40], *told[41:]])
         assert (told[39].worse_at, told[-1].worse_at, told[-1].first_bad) == (30, 40, 30)
         assert told[-1].accused == (39, 40)
+        alone = re.search(r"; the last step alone is \+([\d.]+) %$", told[-1].verdict.sentence)
+        assert alone is not None and float(alone[1]) == pytest.approx(100.0 * (second - 1.0), rel=0.05)
+        assert not any("alone" in night.verdict.sentence for night in told[30:41])
 
 
 OLD_LEVELS = {

@@ -429,7 +429,11 @@ class _Walk(DriftingLevel):
             verdict = replace(verdict, sentence=words)
         where = self.now.where
         good, first = self.first
-        risen = self._worse_by(self.over[-1].level, level) > 0.0
+        step = self._worse_by(self.over[-1].level, level)
+        risen = step > 0.0
+        if risen and where.best != first:
+            words = f"{verdict.sentence}; the last step alone is {100.0 * step:+.1f} %"
+            verdict = replace(verdict, sentence=words)
         return Noisy(
             verdict=verdict, state="detected", against=good, first_bad=first, last_good=good,
             worse_at=where.best if risen else first, news=news, accused=(max(where.places[0] - 1, 0), where.places[-1]),

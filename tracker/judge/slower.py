@@ -75,14 +75,10 @@ def by_outcome(verdict: Verdict, sample: Sample) -> Verdict:
     """The same, where a night without a number is called what became of it."""
     if verdict.name != "not finite" or sample.outcome == "value":
         return verdict
-    if sample.outcome == "not_finite":
-        why = f"{sample.failure}; " if sample.failure else ""
-        return replace(verdict, sentence=f"{why}{verdict.sentence}")
     if sample.outcome == "missing":
         return replace(verdict, word="missing", name="missing", sentence=sample.failure or verdict.sentence)
-    name = sample.outcome.replace("_", " ")
-    why = f": {sample.failure}" if sample.failure else ""
-    return replace(verdict, name=name, sentence=f"{name}{why}; {verdict.sentence}")
+    why = f"{sample.failure}; " if sample.failure else ""
+    return replace(verdict, name=sample.outcome.replace("_", " "), sentence=f"{why}{verdict.sentence}")
 
 
 def change_in_words(change: float) -> str:
