@@ -196,5 +196,6 @@ def test_what_is_told_first_tonight_is_new_for_the_judge_and_on_the_page(tmp_pat
     page = (tmp_path / "public" / "index.html").read_text(encoding="utf-8")
 
     assert judged.startswith("✗ 1 worse than the history, 1 new tonight")
+    assert "One series is red" in page and "1 test ran on gravel" in page  # nothing has a limit
     assert "One commit made one series worse tonight." in page
     assert "Nothing became worse tonight" not in page

@@ -107,7 +107,9 @@ def lead(book: Book, causes: Sequence[Cause]) -> Lead:
     return {
         "state": state,
         "night": book.tonight,
-        "headline": _headline(state, found, tonight(book), _red_maps(book)),
+        "headline": _headline(state, found, tonight(book), _red_maps(book))
+        if any(test.gates() for test in book.tests)
+        else _headline_without_limits(red),
         "summary": summary(book),
         "new": new,
         "old": old[:MOST_OLD],
@@ -179,6 +181,12 @@ def _headline(state: Class, found: Count, fresh: Sequence[Trend], maps: Sequence
     return "Every limit is kept tonight"
 
 
+def _headline_without_limits(red: Sequence[ToldCause]) -> str:
+    """Of histories that other tools measured: whatever is red, on the newest night or before it."""
+    series = sum(len(cause.hits) for cause in red)
+    return ("One series is red" if series == 1 else f"{series} series are red") if red else "No series is red"
+
+
 def summary(book: Book) -> str:
     """Tonight in two sentences."""
     fresh = [(test, t) for test in book.tests for t in test.gates() if t.nights[-1] == book.tonight.index]
@@ -190,7 +198,7 @@ def summary(book: Book) -> str:
         verb = "is" if len(seven) == 1 else "are"
         how_many = every if kept == len(seven) else f"{kept} of {len(seven)} limits"
         parts.append(f"{how_many} from the thesis {verb} kept.")
-    put = {test.name for test, _ in fresh}
+    put = {test.name for test in book.tests for t in test.trends if t.nights[-1] == book.tonight.index}
     engine = f"{clean(book.tonight.engine.name)} {version(book.tonight.engine)}"
     parts.append(f"{len(put)} {'test' if len(put) == 1 else 'tests'} ran on {engine}.")
     missed = [test for test in book.tests if test.gates() and test.name not in put]
