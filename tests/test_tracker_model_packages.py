@@ -8,8 +8,11 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from spook_tracker.engine.model_reading import read
+from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.cli.models import markdown_of
+from spook_tracker.tracker.measure import model_packages, model_standing
 from spook_tracker.tracker.measure.model_files import ModelFileError
 from spook_tracker.tracker.measure.model_packages import files_of, loaded, looked_at, stood
 from spook_tracker.tracker.measure.model_standing import Standing
@@ -124,6 +127,31 @@ def test_the_part_is_named_over_which_two_engines_part(
     assert found.cause.parts == (part,)
     assert found.cause.left < 0.1 * found.cause.apart
     assert (found.cause.softness > 0.5 * found.cause.apart) == gives_way
+
+
+@pytest.mark.parametrize("breaks", ["refuses", "stops"])
+def test_engines_that_cannot_be_asked_without_a_part_are_told_to_part_all_the_same(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, breaks: str
+) -> None:
+    pytest.importorskip(
+        "mujoco", reason="the extra mujoco is not installed: pip install 'spook-tracker[mujoco]'"
+    )
+    (tmp_path / "soft.xml").write_text(SOFT.replace("0 0 .4", "0 0 .1"))
+    monkeypatch.chdir(tmp_path)
+    ran = model_standing._ran
+
+    def broken(model, engine, step, times, without=(), stiffer=1.0, elsewhere=False):
+        assert Path(model.path).is_absolute()  # DART takes no other
+        if without and breaks == "refuses":
+            raise NotSupported("not without")
+        return ran(model, engine, step, (1e9,) if without else times, without, stiffer)
+
+    monkeypatch.setattr(model_standing, "_ran", broken)
+    monkeypatch.setattr(model_standing, "LIMIT", 0.2)
+    file = Path("soft.xml")
+    found = model_standing.standing(model_packages._model(file, read(file)), ("mujoco", "spook"), 0.1)
+
+    assert found.cause is not None and found.cause.parts == ()
 
 
 def test_a_table_says_up_to_when_engines_stand_with_the_first_and_why_not_longer(

@@ -131,15 +131,21 @@ def _cause(model: ModelFile, times: tuple[float, ...], apart_now: float, size: f
     """All parts are left out; those that can come back one by one without the engines parting are not the cause."""
 
     def without(parts: tuple[str, ...]) -> Checkpoint | None:
-        """Where the engines are then, if that is together or nearly so."""
-        runs = {
-            engine: (
-                _ran(model, engine, model.time_step, times, parts),
-                _ran(model, engine, model.time_step / 2, times, parts),
-            )
-            for engine in SPLIT
-        }
-        point = _checkpoints(times, runs, size)[-1]
+        """Where the engines are then, if that is together or nearly so; None also where one breaks off."""
+        try:
+            runs = {
+                engine: (
+                    _ran(model, engine, model.time_step, times, parts),
+                    _ran(model, engine, model.time_step / 2, times, parts),
+                )
+                for engine in SPLIT
+            }
+        except EngineError:
+            return None
+        reached = _checkpoints(times, runs, size)
+        if len(reached) < len(times) or not all(engine in reached[-1].error for engine in SPLIT):
+            return None
+        point = reached[-1]
         alike = point.together(*SPLIT) and not point.blurred(*SPLIT)
         return point if alike or point.apart(*SPLIT) < GONE * apart_now else None
 
@@ -156,7 +162,8 @@ def _cause(model: ModelFile, times: tuple[float, ...], apart_now: float, size: f
     if SOFT.intersection(parts):
         step = model.time_step / STIFFER
         own, stiff = (_ran(model, SPLIT[0], step, times, stiffer=stiffer) for stiffer in (1.0, STIFFER))
-        softness = _at(len(times) - 1, own, stiff, size)
+        moved = _at(len(times) - 1, own, stiff, size)
+        softness = moved if np.isfinite(moved) else 0.0  # it broke off
     return Cause(SPLIT, times[-1], apart_now, parts, left, softness)
 
 
