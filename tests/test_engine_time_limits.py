@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import gc
 import signal
 import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -37,6 +38,16 @@ from tests.contact_scenes import DOWN, TIME_STEP
 LIMIT = 0.2  # s
 LATE = 0.1  # s of processor time: what is left of it cannot be told from a busy machine
 ROUGH = Material(friction=0.5)
+
+
+@pytest.fixture(autouse=True)
+def uncollected() -> Iterator[None]:
+    """A collection of the test process's own garbage takes .1 s, as much as is asked here."""
+    gc.disable()
+    yield
+    gc.enable()
+
+
 Made = tuple[Scene, Method]
 
 
@@ -163,7 +174,7 @@ def test_a_time_limit_holds_before_the_first_step(observe: dict[str, Trace]) -> 
         assert np.isnan(state[7:]).all()  # not found
 
 
-@pytest.mark.parametrize(("side", "limit"), [(30, 0.005), (60, 0.5)], ids=["in Python", "in the core"])
+@pytest.mark.parametrize(("side", "limit"), [(30, 0.005), (90, 0.8)], ids=["in Python", "in the core"])
 def test_the_clock_runs_while_a_scene_is_compiled(side: int, limit: float) -> None:
     """Compiling the larger takes seconds, four fifths of them in the core."""
     scene, method = sheet(side)
@@ -267,7 +278,7 @@ def test_the_keyboard_interrupts_a_step_at_once(name: str) -> None:
 
 
 def test_the_keyboard_interrupts_compiling_at_once() -> None:
-    scene, method = sheet(60)
+    scene, method = sheet(90)
     late = interrupted_after(3 * LIMIT, lambda: compile(scene, time_step=TIME_STEP, method=method))
 
     assert late is not None
