@@ -69,7 +69,7 @@ def definitions() -> tuple[SeriesDefinition, ...]:
 
 
 def night(number: int, series: tuple[SeriesDefinition, ...], chance: random.Random) -> RunDocument:
-    day = f"{2000 + number // 336}-{number // 28 % 12 + 1:02}-{number % 28 + 1:02}"
+    day = f"{1996 + number // 336}-{number // 28 % 12 + 1:02}-{number % 28 + 1:02}"
     return RunDocument(
         schema_version=1,
         id=f"{number:032x}",

@@ -39,7 +39,7 @@ GUARDS = (
     Guard("a catalogue that asks nothing is no green", APART, "if not run.samples:", "if False:", "test_tracker_gates asks_nothing"),
     Guard("what supports nothing is no green", "tracker/cli/main.py", 'if any(sample.outcome != "not_supported" for sample in document.samples):', "if True:", "test_tracker_gates supports_nothing"),
     Guard("what is no longer supported is lost", "tracker/judge/exact_values.py", "return state.level is not None and (state.red", "return False and (state.red", "test_tracker_support_lost"),
-    Guard("another definition hides no loss", "tracker/judge/series_history.py", "return found.get(next(before, -1))", "return None", "test_tracker_support_lost definition"),
+    Guard("another definition hides no loss", "tracker/judge/series_history.py", "return next((nights[i] for i in before), None)", "return None", "test_tracker_support_lost definition"),
     Guard("a worker that ended has not answered", WORKERS, 'return (Lost("crashed", DIED, self.place.value),)', 'return (Lost("not_supported", DIED, self.place.value),)', "test_tracker_gates exit_code_0"),
     Guard("modules of ours are looked for in no folder of theirs", APART, '* sys.flags.no_site + ["-P"]', "* sys.flags.no_site", "test_tracker_gates called_like_a_module"),
     Guard("a snapshot is of its bytes", "engine/snapshot.py", "if len(data) < CONTENT or data[HASHED:CONTENT] != _hash(data[:HASHED], data[CONTENT:]):", "if len(data) < CONTENT:", "test_engine_snapshots no_snapshot"),

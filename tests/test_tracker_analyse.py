@@ -8,6 +8,7 @@ import random
 from dataclasses import dataclass
 
 import msgspec
+import pytest
 
 from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import (
@@ -276,13 +277,21 @@ def test_a_series_of_times_is_held_to_its_own_tolerance():
         assert any(night.red for night in judged) is told
 
 
-def test_nights_between_equal_nights_are_judged_without_a_look_and_alike(monkeypatch):
+@pytest.mark.parametrize(
+    "definition",
+    [lambda i: "1", lambda i: "12"[i > 30], lambda i: "12"[i % 3 == 0], lambda i: "12"[20 < i < 40]],
+    ids=["one definition", "two in turn", "two mixed", "one within another"],
+)
+def test_nights_between_equal_nights_are_judged_without_a_look_and_alike(monkeypatch, definition):
     values = [*([0.01] * 50), 0.02, *([0.01] * 50)]
-    nights = history(*values, releases=(0, 20))
+    nights = [
+        night._replace(test_version=definition(i))
+        for i, night in enumerate(history(*values, releases=(0, 20)))
+    ]
     short = judge_history("t/c/m", SERIES, nights)
     monkeypatch.setattr(exact_values, "_repeats", lambda before, after: False)
 
-    assert judge_history("t/c/m", SERIES, nights) == short
+    assert list(judge_history("t/c/m", SERIES, nights)) == list(short)
 
 
 def test_maps_are_judged_cell_by_cell():

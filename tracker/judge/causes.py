@@ -12,10 +12,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from spook_tracker.tracker.document.run_document import Point, Run, SeriesDefinition
+from spook_tracker.tracker.document.run_document import Point, Run, Runs, SeriesDefinition
 from spook_tracker.tracker.document.wording import number, times
 from spook_tracker.tracker.judge.events import name_of
 from spook_tracker.tracker.judge.judged import Judged, blame
+from spook_tracker.tracker.judge.repeats import Nights
 from spook_tracker.tracker.judge.series_history import Told
 from spook_tracker.tracker.judge.standing import expected
 from spook_tracker.tracker.judge.tonight import Finding
@@ -239,10 +240,18 @@ def _rank(hit: Hit) -> tuple[int, int, bool, float, str]:
 def _order(told: Mapping[str, Told]) -> dict[str, int]:
     """The place of every run: as in the longest history, runs it lacks after it."""
     place: dict[str, int] = {}
+    known: set[Runs] = set()  # most series were measured in the same
     for series in sorted(told.values(), key=lambda found: -len(found.nights)):
-        for judged in series.nights:
-            place.setdefault(judged.night.run.id, len(place))
+        runs = _runs(series.nights)
+        if runs not in known:
+            known.add(runs)
+            for run in runs:
+                place.setdefault(run.id, len(place))
     return place
+
+
+def _runs(nights: Sequence[Judged]) -> Runs:
+    return nights.points.runs if isinstance(nights, Nights) else Runs(judged.night.run for judged in nights)
 
 
 def _id(run: Run | None) -> str:

@@ -1,6 +1,7 @@
 """Values without noise: a machine that takes a history night by night.
 
-`step` takes a series, what is known of it and one more night; it returns what is known then, and the night's verdict. A
+`step` takes a series, what is known of it and one more night; it returns what is known then, and the night's verdict.
+Nights that repeat a calm one are passed over by `judge_values` before it comes to that. A
 series is in one of four states, named by the last verdict that said anything:
 
 | state   | the last night | what it may become |
@@ -15,21 +16,24 @@ A night is looked at by the rules of `step`, from top to bottom; each is a funct
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from bisect import bisect_left
+from collections.abc import Sequence
+from functools import lru_cache
+from itertools import islice
 from typing import Literal
 
 import msgspec
 from msgspec.structs import replace
 
-from spook_tracker.tracker.document.run_document import Point, SeriesDefinition
+from spook_tracker.tracker.document.run_document import Point, Points, Runs, SeriesDefinition, columns
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.judged import Judged, commit_of, is_release, night_of, red_class, same_commit
+from spook_tracker.tracker.judge.repeats import Nights
 from spook_tracker.tracker.judge.standing import NOT_SUPPORTED, standing
 from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict, judge, same_bits
 from spook_tracker.tracker.judge.vocabulary import WORSE_THAN_EXPECTED, Class
 
 LONG_DRIFT = 5.0  # tolerances a series may lose over many releases before that is called drift, too
-IDENTICAL = Verdict(word="identical", sentence="the same bits", ulps=0)
 UNASKED = Verdict(word="not_comparable", sentence="not supported by this engine")
 BROKEN: tuple[Class, ...] = ("fail", "watch")  # what a night is on its own, whatever was before
 NOT_GOOD: tuple[Class, ...] = (*BROKEN, "none")
@@ -66,20 +70,54 @@ class Seen(msgspec.Struct, frozen=True):
     against: Point | None
 
 
-def judge_values(series: Series, history: Sequence[Point], before: Judged | None = None) -> Iterator[Judged]:
+def judge_values(series: Series, history: Sequence[Point], before: Judged | None = None) -> Nights:
     """Every night's verdict, oldest first; `before` is the last night of another definition of the test."""
-    state = KnownValue()
+    state, points = KnownValue(), columns(history)
     if before is not None and (level := _last_answer(before)) is not None:
         state = KnownValue("held", level, level, level)
-    for night in history:
-        state, judged = step(series, state, night)
-        yield judged
+    told: dict[int, Judged] = {}
+    i, count = 0, len(points)
+    while i < count:
+        again = _repeating(state, points, i)
+        if again > i:
+            last = _last_release(points.runs, i, again)
+            state = _stood_still(state, points[again - 1], state.release if last is None else points[last])
+            i = again
+        else:
+            state, told[i] = step(series, state, points[i])
+            i += 1
+    return Nights(points, told)
+
+
+def _repeating(state: KnownValue, points: Points, start: int) -> int:
+    """The place after the last night from `start` on that repeats the calm night before; `start` if it does not."""
+    if state.name != "calm" or state.level is None:
+        return start
+    level, end = state.level, start
+    for sample, *_ in islice(points.said, start, None):
+        if sample is not level.sample or sample.value != sample.value:
+            night = points[end]
+            if not _repeats(level, night):
+                break
+            level = night
+        end += 1
+    return end
+
+
+def _last_release(runs: Runs, start: int, end: int) -> int | None:
+    """The last place of a release among these."""
+    places = _releases(runs)
+    before = bisect_left(places, end)
+    return places[before - 1] if before and places[before - 1] >= start else None
+
+
+@lru_cache(maxsize=16)
+def _releases(runs: Runs) -> list[int]:
+    return [i for i, run in enumerate(runs) if is_release(run)]
 
 
 def step(series: Series, state: KnownValue, night: Point) -> tuple[KnownValue, Judged]:
     """One more night."""
-    if state.name == "calm" and state.level is not None and _repeats(state.level, night):
-        return _again(state, night)
     if state.lent is not None and state.lent[1].over(night_of(night.run)):
         state = _given_back(state, state.lent[0])
     own = standing(series.definition, night.sample)
@@ -104,11 +142,10 @@ def step(series: Series, state: KnownValue, night: Point) -> tuple[KnownValue, J
 # Rules: what becomes of a night.
 
 
-def _again(state: KnownValue, night: Point) -> tuple[KnownValue, Judged]:
-    """The same bits under the same definition: nothing to judge."""
-    s, release = state, night if is_release(night.run) else state.release
-    again = KnownValue("calm", night, release, s.settled, s.stands, None, s.gone, None, s.failing)
-    return again, Judged(night=night, verdict=IDENTICAL, state="green", stands=s.stands, against=s.level)
+def _stood_still(state: KnownValue, night: Point, release: Point | None) -> KnownValue:
+    """The same bits under the same definition up to this night: nothing to judge."""
+    s = state
+    return KnownValue("calm", night, release, s.settled, s.stands, None, s.gone, None, s.failing)
 
 
 def _given_back(state: KnownValue, level: Point) -> KnownValue:

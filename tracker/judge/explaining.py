@@ -16,6 +16,7 @@ import msgspec
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
 from spook_tracker.tracker.judge.calibration import geometric_mean
 from spook_tracker.tracker.judge.comparison_document import Change
+from spook_tracker.tracker.judge.repeats import Nights
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.judge.judged import Judged
@@ -44,20 +45,15 @@ def calm_nights(definition: SeriesDefinition, nights: Sequence[Judged]) -> Seque
     """The same of a history."""
     if definition.role != EXPLAINING:
         return nights
-    return [
-        msgspec.structs.replace(
-            night,
-            state="green",
-            verdict=msgspec.structs.replace(
-                night.verdict, word="changed", name="", sentence=f"{night.verdict.sentence}, does not decide"
-            ),
-        )
-        if night.red or night.verdict.red
-        else msgspec.structs.replace(night, state="green")
-        if night.state == "recovered"
-        else night
-        for night in nights
-    ]
+    return nights.changed(_calm_night) if isinstance(nights, Nights) else list(map(_calm_night, nights))
+
+
+def _calm_night(night: Judged) -> Judged:
+    if night.red or night.verdict.red:
+        sentence = f"{night.verdict.sentence}, does not decide"
+        verdict = msgspec.structs.replace(night.verdict, word="changed", name="", sentence=sentence)
+        return msgspec.structs.replace(night, state="green", verdict=verdict)
+    return msgspec.structs.replace(night, state="green") if night.state == "recovered" else night
 
 
 def beside_run_times(changes: Sequence[Change], before: Samples, after: Samples) -> list[Change]:

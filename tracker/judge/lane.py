@@ -7,7 +7,7 @@ are made here and nowhere else, so that every judge of a history judges them, to
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from functools import cache, partial
+from functools import cache
 from typing import Protocol, TypeVar
 
 import msgspec
@@ -17,15 +17,17 @@ from spook_tracker.tracker.document.json_form import NAN, Number
 from spook_tracker.tracker.document.run_document import (
     MapData,
     Point,
+    Points,
     Run,
+    Runs,
     Sample,
     SeriesDefinition,
     SeriesHistory,
+    columns,
 )
 from spook_tracker.tracker.judge.calibration import ladder_timing, that_counts
 from spook_tracker.tracker.judge.work import FAMILIES, Samples, families_of, with_work
 
-_point = partial(tuple.__new__, Point)  # a point of its four parts, in a third of the time
 OneRun = TypeVar("OneRun", bound=Run)
 RECENT = 60  # runs read with all their evidence: state hashes, failures, counters, timings;
 SPARSE = 16  # of those before them one in so many, so that what was lost then is not forgotten
@@ -156,31 +158,31 @@ def histories(
     looked_at = [runs[i] for i in looked_at_again(len(runs), RECENT)]
     recent = records.samples_of([run.id for run in looked_at], tests)
     found: dict[str, SeriesHistory] = {}
-    known: dict[
-        int, tuple[Run | None, Samples]
-    ] = {}  # of a stored run: its run here (None: not of this line), its evidence
-    nothing: Samples = {}
+    known: dict[Runs, tuple[list[int] | None, Runs, list[tuple[int, Samples]]]] = {}
     for key, stored in records.series(keys, evidence=False).items():
-        for run in {
-            id(point.run): point.run for point in stored.points if id(point.run) not in known
-        }.values():
-            ours = place.get(run.id)
-            known[id(run)] = ours, nothing if ours is None else recent.get(ours.id, nothing)
-        points = [
-            point
-            if ours is point.run and key not in evidence
-            else _point(
-                (ours, evidence[key][1] if key in evidence else point.sample, point.test_version, True)
-            )
-            for point in stored.points
-            for ours, evidence in (known[id(point.run)],)
-            if ours is not None
-        ]
-        if points:
-            found[key] = SeriesHistory(stored.definition, tuple(points))
+        points = columns(stored.points)
+        if points.runs not in known:
+            known[points.runs] = _of_line(points.runs, place, recent)
+        chosen, ours, evidence = known[points.runs]
+        said = list(points.said) if chosen is None else [points.said[i] for i in chosen]
+        for i, samples in evidence:
+            if key in samples:
+                said[i] = samples[key][1], said[i][1], True
+        if said:
+            found[key] = SeriesHistory(stored.definition, Points(ours, said))
     whole = None if tests is None else cache(lambda run_id: _families(records.answered([run_id])[run_id]))
     found = with_missing(found, runs, recent, whole)
     return found | run_times(found) | work(looked_at, recent, tests)
+
+
+def _of_line(
+    runs: Runs, place: Mapping[str, Run], recent: Mapping[str, Samples]
+) -> tuple[list[int] | None, Runs, list[tuple[int, Samples]]]:
+    """Which of these runs stand in the line (None: all), as they stand there, and the places of those with evidence."""
+    chosen = [i for i, run in enumerate(runs) if run.id in place]
+    ours = Runs(place[runs[i].id] for i in chosen)
+    evidence = [(i, recent[run.id]) for i, run in enumerate(ours) if recent.get(run.id)]
+    return None if len(chosen) == len(runs) else chosen, ours, evidence
 
 
 def run_time_histories(
@@ -254,6 +256,12 @@ def with_missing(
     def asked(i: int) -> dict[str, set[str]]:
         return asked_for(runs[i], measured.get(ids[i], {}))
 
+    @cache
+    def silences(answered: Runs) -> list[int]:
+        """Places of the runs that tell, and come after the first of these without being one of them."""
+        first, having = place[answered[0].id], {run.id for run in answered}
+        return [i for i in telling if i > first and ids[i] not in having]
+
     def removed(i: int, family: str, gate: bool) -> bool:
         """Whether a run was asked for everything of a family, so that a gate of a test it was not asked for is gone."""
         if not gate or not asked_whole(runs[i]):
@@ -267,10 +275,8 @@ def with_missing(
         if definition.kind == "work" or not families:
             told[key] = series
             continue
-        points = list(series.points)
-        answered = {point.run.id for point in points}
-        first = place[points[0].run.id]
-        silent = [i for i in telling if i > first and ids[i] not in answered]
+        silent = silences(columns(series.points).runs)
+        points = list(series.points) if silent else []
         begun = _begun(series, place) if silent and definition.kind == "time" else None
         for i in silent:
             if runs[i].engine.name != points[0].run.engine.name:
@@ -289,7 +295,8 @@ def with_missing(
             points.append(Point(runs[i], lost, definition.test_version, recorded=False))
         if len(points) > len(series.points):
             points.sort(key=lambda point: place[point.run.id])
-        told[key] = SeriesHistory(definition, tuple(points))
+            series = SeriesHistory(definition, tuple(points))
+        told[key] = series
     return told
 
 
@@ -336,7 +343,7 @@ def run_times(found: Mapping[str, SeriesHistory]) -> dict[str, SeriesHistory]:
     ladders: dict[str, list[SeriesHistory]] = {}
     for series in found.values():
         definition = series.definition
-        if definition.kind == "ladder" and any(p.sample.timing for p in series.points):
+        if definition.kind == "ladder" and any(sample.timing for sample, *_ in columns(series.points).said):
             key = f"{definition.test}/{definition.configuration}/{definition.metric}:run-time"
             ladders.setdefault(key, []).append(series)
     return {key: _run_time(key, rungs) for key, rungs in ladders.items()}

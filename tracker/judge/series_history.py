@@ -12,14 +12,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
-from operator import attrgetter
+from functools import cached_property, lru_cache, partial
 
 import msgspec
 from msgspec.structs import replace
 
 from spook_tracker.tracker.document.collection import no_collection
-from spook_tracker.tracker.document.run_document import Point, SeriesDefinition, SeriesHistory
+from spook_tracker.tracker.document.run_document import (
+    Point,
+    Points,
+    Runs,
+    SeriesDefinition,
+    SeriesHistory,
+    columns,
+)
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.calibration import engines_own, taken_again, unquiet
 from spook_tracker.tracker.judge.exact_values import Series, judge_values, why_not
@@ -28,6 +34,7 @@ from spook_tracker.tracker.judge.judged import Judged, is_release, night_of, red
 from spook_tracker.tracker.judge.lane import looked_at_again
 from spook_tracker.tracker.judge.lent import walk_with
 from spook_tracker.tracker.judge.noisy import Noisy
+from spook_tracker.tracker.judge.repeats import Nights, looked_at
 from spook_tracker.tracker.judge.run_times import judged_and_segments
 from spook_tracker.tracker.judge.slower import by_outcome, only_followed
 from spook_tracker.tracker.judge.standing import NOT_SUPPORTED, standing
@@ -44,7 +51,7 @@ class Told:
 
     key: str
     definition: SeriesDefinition
-    nights: tuple[Judged, ...]
+    nights: Sequence[Judged]
 
     @cached_property
     def lanes(self) -> list[tuple[list[Judged], Judged | None]]:
@@ -54,7 +61,7 @@ class Told:
         worse, as in most series: there is nothing to look for in them.
         """
         nights = self.nights
-        if {judged.state for judged in nights}.isdisjoint(("detected", "accepted")):
+        if {judged.state for judged in looked_at(nights)}.isdisjoint(("detected", "accepted")):
             return []
         lane = on_one_clock if is_noisy(self.definition) else _question
         found = []
@@ -64,9 +71,6 @@ class Told:
         return found
 
 
-VERSION, MACHINE = attrgetter("test_version"), attrgetter("run.machine")  # of a night
-
-
 @no_collection()
 def judge_all(histories: Mapping[str, SeriesHistory], accepted: Sequence[Accepted] = ()) -> dict[str, Told]:
     """Every series with the verdict of each of its nights, by key."""
@@ -74,9 +78,7 @@ def judge_all(histories: Mapping[str, SeriesHistory], accepted: Sequence[Accepte
         key: Told(
             key,
             found.definition,
-            tuple(
-                calm_nights(found.definition, judge_history(key, found.definition, found.points, accepted))
-            ),
+            calm_nights(found.definition, judge_history(key, found.definition, found.points, accepted)),
         )
         for key, found in histories.items()
     }
@@ -84,41 +86,45 @@ def judge_all(histories: Mapping[str, SeriesHistory], accepted: Sequence[Accepte
 
 def judge_history(
     key: str, definition: SeriesDefinition, history: Sequence[Point], accepted: Sequence[Accepted] = ()
-) -> list[Judged]:
+) -> Sequence[Judged]:
     """Every night's verdict, oldest first."""
     taken = [level for level in accepted if level.names(key)]
     if is_noisy(definition):
-        return _judge_times(key, definition, history, taken)
-    series = Series(key, definition, taken)
-    lanes = lanes_of(history, _question)
+        return _judge_times(key, definition, list(history), taken)
+    series, points = Series(key, definition, taken), columns(history)
+    lanes = lanes_of(points, _question)
     if len(lanes) < 2:
-        return list(judge_values(series, history))
+        return judge_values(series, points)
     found: dict[int, Judged] = {}
     for places in lanes:
-        before = _under_another_definition(history, found, places[0])
-        told = judge_values(series, [history[i] for i in places], before)
-        found |= zip(places, told, strict=True)
-        if (start := places[0]) > 0 and found[start].verdict.word == "new":
-            why = Verdict(word="not_comparable", sentence=why_not(history[start - 1], history[start]))
+        start, end = places[0], places[-1] + 1
+        before = _under_another_definition(points, found, start)
+        if end - start == len(places):
+            told = judge_values(series, points[start:end], before)
+            found |= {start + i: judged for i, judged in told.told.items()}
+        else:  # beside another lane: the night before is not the one that a night repeats
+            told = judge_values(series, [points[i] for i in places], before)
+            found |= zip(places, told, strict=True)
+        if start > 0 and found[start].verdict.word == "new":
+            why = Verdict(word="not_comparable", sentence=why_not(points[start - 1], points[start]))
             found[start] = msgspec.structs.replace(found[start], verdict=why)
-    return [found[place] for place in range(len(history))]
+    return Nights(points, found)
 
 
-def _under_another_definition(
-    history: Sequence[Point], found: Mapping[int, Judged], start: int
-) -> Judged | None:
+def _under_another_definition(history: Points, found: Mapping[int, Judged], start: int) -> Judged | None:
     """The night before one that cannot be asked: an engine does not get rid of a question by another definition."""
     if history[start].sample.outcome != NOT_SUPPORTED:
         return None
     floats = history[start].run.machine.float_environment
     before = (i for i in reversed(range(start)) if history[i].run.machine.float_environment == floats)
-    return found.get(next(before, -1))
+    nights = Nights(history, found)
+    return next((nights[i] for i in before), None)
 
 
 def lanes_of(history: Sequence[Point], lane: Callable[[Point], Hashable]) -> list[list[int]]:
     """The places of the nights that can be compared with each other, lane by lane, in the order of their firsts."""
-    versions, machines = set(map(VERSION, history)), set(map(id, map(MACHINE, history)))
-    if len(versions) == len(machines) == 1:
+    one_machine = isinstance(history, Points) and len(_machines(history.runs)) == 1
+    if isinstance(history, Points) and one_machine and len({said[1] for said in history.said}) == 1:
         return [list(range(len(history)))]
     known: dict[
         tuple[str, int], list[int]
@@ -133,6 +139,11 @@ def lanes_of(history: Sequence[Point], lane: Callable[[Point], Hashable]) -> lis
                 places = known[version, id(machine)] = lanes.setdefault(lane(night), [])
         places.append(place)
     return list(lanes.values())
+
+
+@lru_cache(maxsize=16)
+def _machines(runs: Runs) -> set[int]:
+    return {id(run.machine) for run in runs}
 
 
 def _question(night: Point) -> Hashable:
@@ -164,8 +175,8 @@ def _judge_times(
     old = Verdict(word="same", sentence="too long ago to be judged again")
     for every in lanes_of(history, on_one_clock):
         loud = {place: why for place in every if (why := unquiet(history[place]))}
-        looked_at = looked_at_again(len(every), NOISY_NIGHTS)
-        again = [every[i] for i in looked_at]
+        looked = looked_at_again(len(every), NOISY_NIGHTS)
+        again = [every[i] for i in looked]
         for place in (*sorted(set(every) - set(again)), *loud):
             own = standing(definition, history[place].sample)
             said = Verdict(word="not_comparable", sentence=loud[place]) if place in loud else old
@@ -186,7 +197,7 @@ def _judge_times(
             releases=[is_release(night.run) for night in lane],
             tolerance=definition.relative_tolerance,
             absolute=definition.tolerance,
-            ages=[i for i in looked_at if every[i] not in loud],
+            ages=[i for i in looked if every[i] not in loud],
         )
         verdicts, segments = walk_with(walk, taken, [night_of(night.run) for night in lane])
         level_of = {i: segment for segment in segments for i in range(segment.first, segment.last + 1)}

@@ -16,6 +16,7 @@ from spook_tracker.tracker.judge.judged import Judged, blame, blame_of, commit_o
 from spook_tracker.tracker.judge.known import judged_in
 from spook_tracker.tracker.judge.lane import Records, histories, line_of, machine_of, of_version
 from spook_tracker.tracker.judge.maps import ToldMap, stands_of, told_maps
+from spook_tracker.tracker.judge.repeats import looked_at
 from spook_tracker.tracker.judge.series_history import Told, is_noisy, judge_all
 from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, WORSE_THAN_EXPECTED, Class, State
@@ -167,7 +168,7 @@ def _on_other_machines(
     said = {finding.series for finding in findings if finding.red and not _of_a_clock(finding)}
     told_of = {(finding.series, id(finding.judged)) for finding in findings}
     for key, series in told.items():
-        for judged in series.nights:
+        for judged in looked_at(series.nights):
             here = judged.red and judged.night.run.id in night
             if here and key not in said and (key, id(judged)) not in told_of:
                 yield replace(_finding(key, series, judged), machine=night[judged.night.run.id])

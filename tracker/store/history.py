@@ -7,12 +7,14 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from operator import lt
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar, cast
 
 from spook_tracker.tracker.document import run_document as document
 from spook_tracker.tracker.document.collection import no_collection
@@ -21,7 +23,10 @@ from spook_tracker.tracker.document.run_document import (
     EngineVersion,
     Machine,
     Point,
+    Points,
     RunDocument,
+    Runs,
+    Said,
     Sample,
     SeriesDefinition,
     SeriesHistory,
@@ -30,7 +35,15 @@ from spook_tracker.tracker.store import git, rows
 from spook_tracker.tracker.store.ancestry import commit_order, lineages
 from spook_tracker.tracker.store.damage import told_of_damage
 from spook_tracker.tracker.store.identity import identity
-from spook_tracker.tracker.store.reader import CHUNK, Reader, SessionReader, SqlValue, file_reader, listed
+from spook_tracker.tracker.store.reader import (
+    CHUNK,
+    Reader,
+    Row,
+    SessionReader,
+    SqlValue,
+    file_reader,
+    listed,
+)
 from spook_tracker.tracker.store.release_order import in_release_order
 from spook_tracker.tracker.store.versions import RunInfo, resolve
 
@@ -76,7 +89,7 @@ class History:
     def __init__(
         self, source: Session | Reader, repository: Path | None = None, ahead: timedelta = A_DAY
     ) -> None:
-        self._reader = source if hasattr(source, "rows") else SessionReader(source)
+        self._reader = cast("Reader", source) if hasattr(source, "rows") else SessionReader(source)
         self.repository = repository or Path.cwd()
         every, latest = self._read_runs(), datetime.now(UTC) + ahead
         self._runs = tuple(run for run in every if run.started_at <= latest)
@@ -189,9 +202,11 @@ class History:
             return self._gathered(where, evidence)
 
     def _gathered(self, where: str, evidence: bool) -> dict[str, SeriesHistory]:
+        if not evidence:
+            return self._bare(where)
         gathered: dict[str, dict[int, tuple[SeriesDefinition, Sample]]] = {}
         place = {run.key: i for i, run in enumerate(self._runs)}
-        for run, series_id, definition, sample in self._read_samples(where, {}, evidence):
+        for run, series_id, definition, sample in self._read_samples(where, {}):
             key = self._canonical.get(series_id, definition.key)
             here = place.get(run.key)
             if here is None:  # dated ahead
@@ -207,6 +222,41 @@ class History:
                 Point(self._runs[i], sample, d.test_version) for i in ordered for d, sample in (points[i],)
             ]
             result[key] = SeriesHistory(points[ordered[-1]][0], tuple(told))
+        return result
+
+    def _bare(self, where: str) -> dict[str, SeriesHistory]:
+        """The same without evidence: what says the same night after night is read into one object."""
+        place = {run.key: i for i, run in enumerate(self._runs)}
+        gathered: dict[
+            int, tuple[array[int], array[int]]
+        ] = {}  # by series id: places of runs, and of what they say
+        known: dict[Row, int] = {}  # rows without run and series
+        query = f"SELECT {SAMPLE} FROM sample s" + (f" WHERE {where}" if where else "")
+        for run_key, series_id, *told in self._reader.each_row(query):
+            here = place.get(run_key)
+            if here is None:  # dated ahead, or recorded by another process since
+                continue
+            if (columns := gathered.get(series_id)) is None:
+                columns = gathered[series_id] = array("l"), array("l")
+            columns[0].append(here)
+            columns[1].append(known.setdefault(tuple(told), len(known)))
+        definitions = self._read_definitions(told[0] for told in known)
+        said = [
+            (definitions[i], (_bare_sample(definitions[i].key, *told), definitions[i].test_version, True))
+            for i, *told in known
+        ]
+        by_key: dict[str, list[int]] = {}
+        for series_id, (_, of_series) in gathered.items():
+            key = self._canonical.get(series_id, said[of_series[0]][0].key)
+            by_key.setdefault(key, []).append(series_id)
+        shared: dict[bytes, Runs] = {}
+        result = {}
+        for key in sorted(by_key):
+            places, what = _in_order(key, [gathered.pop(i) for i in by_key[key]], said)
+            name = places.tobytes()
+            if name not in shared:
+                shared[name] = Runs(self._runs[i] for i in places)
+            result[key] = SeriesHistory(said[what[-1]][0], Points(shared[name], [said[i][1] for i in what]))
         return result
 
     def figures(self, run_id: str) -> tuple[document.FigureData, ...]:
@@ -359,31 +409,25 @@ class History:
                 self._definitions[definition_id] = rows.definition_of(body)
         return self._definitions
 
-    def _read_samples(
-        self, where: str, parameters: dict[str, SqlValue], evidence: bool = True, by_run: bool = False
-    ) -> list[Found]:
+    def _read_samples(self, where: str, parameters: dict[str, SqlValue], by_run: bool = False) -> list[Found]:
         """Samples in the order of time, then of their document; `by_run` where the conditions name runs."""
-        query = f"SELECT {SAMPLE}{EVIDENCE if evidence else ''} FROM "
+        query = f"SELECT {SAMPLE}{EVIDENCE} FROM "
         query += (
             "run r CROSS JOIN sample s" if by_run else "sample s"
         )  # SQLite keeps to the order of a cross join
-        query += (BESIDE if evidence else "") + (f" WHERE {where}" if where else "")
+        query += BESIDE + (f" WHERE {where}" if where else "")
         stored = self._reader.rows(f"{query} ORDER BY s.started_at, s.run_key, s.position", **parameters)
         definitions = self._read_definitions(row[2] for row in stored)
         runs = {run.key: run for run in self._by_id.values()}
-        made: dict[Any, Sample] = {}  # what says the same night after night is one object
         found = []
         for row in stored:
             if row[0] not in runs:  # recorded by another process since
                 continue
             definition = definitions[row[2]]
-            if not evidence and (read := made.get(row[2:8])) is not None:
-                found.append((runs[row[0]], row[1], definition, read))
-                continue
             more: dict[str, Any] = {}
-            if evidence and row[8] is not None:
+            if row[8] is not None:
                 more = {"failure": row[8], "state_hash": row[9], "counters": rows.counters_of(row[10])}
-            if evidence and row[11] is not None:
+            if row[11] is not None:
                 more["timing"] = rows.timing_of(*row[11:18])
             read = Sample(
                 series=definition.key,
@@ -393,8 +437,6 @@ class History:
                 set_point_held=bool(row[7]),
                 **more,
             )
-            if not evidence:
-                made[row[2:8]] = read
             found.append((runs[row[0]], row[1], definition, read))
         return found
 
@@ -403,6 +445,34 @@ class History:
         return tuple(
             rows.unpacked(body, kind) for (body,) in self._reader.rows(query, run=self.run(run_id).key)
         )
+
+
+def _in_order(
+    key: str, parts: Sequence[tuple[array[int], array[int]]], said: Sequence[tuple[SeriesDefinition, Said]]
+) -> tuple[array[int], array[int]]:
+    """The columns of a series over the runs in their order; today's name wins over an earlier one in the same run."""
+    (places, told), *others = parts
+    if not others and all(map(lt, places, places[1:])):
+        return places, told
+    chosen: dict[int, int] = {}
+    for here, what in ((here, what) for part in parts for here, what in zip(*part, strict=True)):
+        if here not in chosen or said[what][0].key == key:
+            chosen[here] = what
+    ordered = array("l", sorted(chosen))
+    return ordered, array("l", map(chosen.__getitem__, ordered))
+
+
+def _bare_sample(
+    key: str, value: float | None, special: str | None, outcome: document.OutcomeClass, passed: int, held: int
+) -> Sample:
+    """A stored sample without its evidence."""
+    return Sample(
+        series=key,
+        value=rows.joined(value, special),
+        outcome=outcome,
+        passed=bool(passed),
+        set_point_held=bool(held),
+    )
 
 
 def _utc(time: str) -> str:

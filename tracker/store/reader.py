@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import os
 import sqlite3
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -24,13 +24,16 @@ if TYPE_CHECKING:
 LOCK_TIMEOUT = 30.0  # s to wait for another writer
 SAFE = ("trusted_schema = OFF", "cell_size_check = ON")  # for files from elsewhere
 CHUNK = 500  # values in one IN (...)
+STREAMED = 10_000  # rows that a server sends at once
+Row = Sequence[Any]  # of the columns that a statement names
 SqlValue = str | int | float | bytes | datetime | None  # what a column can hold
 
 
 class Reader(Protocol):
     """Rows of a statement, all from one moment."""
 
-    def rows(self, statement: str, **parameters: SqlValue) -> Sequence[Sequence[Any]]: ...
+    def rows(self, statement: str, **parameters: SqlValue) -> Sequence[Row]: ...
+    def each_row(self, statement: str) -> Iterator[Row]: ...  # without keeping them
 
 
 class SessionReader:
@@ -39,10 +42,17 @@ class SessionReader:
     def __init__(self, session: Session) -> None:
         self.session = session
 
-    def rows(self, statement: str, **parameters: SqlValue) -> Sequence[Sequence[Any]]:
+    def rows(self, statement: str, **parameters: SqlValue) -> Sequence[Row]:
         from sqlalchemy import text
 
         return self.session.connection().execute(text(statement), parameters).all()
+
+    def each_row(self, statement: str) -> Iterator[Row]:
+        from sqlalchemy import text
+
+        yield from self.session.connection().execute(
+            text(statement), execution_options={"yield_per": STREAMED}
+        )
 
 
 class FileReader:
@@ -51,9 +61,17 @@ class FileReader:
     def __init__(self, connection: sqlite3.Connection, path: Path) -> None:
         self.connection, self.path = connection, path
 
-    def rows(self, statement: str, **parameters: SqlValue) -> Sequence[Sequence[Any]]:
+    def rows(self, statement: str, **parameters: SqlValue) -> Sequence[Row]:
         try:
             return self.connection.execute(statement, parameters).fetchall()
+        except (sqlite3.Error, UnicodeDecodeError) as error:
+            from spook_tracker.tracker.store.connection import sentence
+
+            raise DatabaseError(sentence(str(self.path), error)) from error
+
+    def each_row(self, statement: str) -> Iterator[Row]:
+        try:
+            yield from self.connection.execute(statement)
         except (sqlite3.Error, UnicodeDecodeError) as error:
             from spook_tracker.tracker.store.connection import sentence
 

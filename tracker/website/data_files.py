@@ -19,6 +19,7 @@ from msgspec import structs
 
 from spook_tracker.tracker.document.json_form import boxed, encode
 from spook_tracker.tracker.document.outside import escaped
+from spook_tracker.tracker.document.run_document import Sample
 from spook_tracker.tracker.website.events import Event
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory, Trend
 
@@ -175,12 +176,18 @@ def steady(test: TestHistory) -> list[Trend]:
 
 def changed(trend: Trend) -> list[int]:
     """The places at which a series begins, reads otherwise than before, or comes back after nights without it."""
-    told = list(zip(map(repr, trend.values), trend.outcomes, trend.held, strict=True))
+    said, nights = trend.said, trend.nights
     return [
         i
-        for i, now in enumerate(told)
-        if not i or now != told[i - 1] or trend.nights[i] != trend.nights[i - 1] + 1
+        for i, now in enumerate(said)
+        if not i
+        or nights[i] != nights[i - 1] + 1
+        or (now is not said[i - 1] and _told(now[0]) != _told(said[i - 1][0]))
     ]
+
+
+def _told(sample: Sample) -> tuple[str, str, bool]:
+    return repr(sample.value), sample.outcome, sample.set_point_held
 
 
 def _changes(trend: Trend, nights: Sequence[Night]) -> Iterable[list[Cell]]:

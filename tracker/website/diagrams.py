@@ -79,7 +79,7 @@ def moving(trends: Iterable[Trend]) -> list[Trend]:
     return [
         t
         for t in trends
-        if len(t.nights) >= FEWEST_NIGHTS and (len(set(map(repr, t.values))) > 1 or len(set(t.outcomes)) > 1)
+        if len(t.nights) >= FEWEST_NIGHTS and len({(repr(s.value), s.outcome) for s in t.distinct}) > 1
     ]
 
 
@@ -199,14 +199,14 @@ def _night_ticks(nights: Sequence[Night], shown: Sequence[int]) -> tuple[tuple[f
 def _axis_of(trend: Trend) -> tuple[Scale, list[float], str]:
     """Scale, the limits worth drawing on it, and what to say about those that are not."""
     limit = trend.definition.limit
-    sizes = [abs(v) for v in trend.values if math.isfinite(v) and v != 0.0]
+    values = [sample.value for sample in trend.distinct]
+    sizes = [abs(v) for v in values if math.isfinite(v) and v != 0.0]
     if not sizes:
         return "linear", [], ""
     if isinstance(limit, tuple):
         band = limit[1] - limit[0]
-        spread = max(v for v in trend.values if math.isfinite(v)) - min(
-            v for v in trend.values if math.isfinite(v)
-        )
+        finite = [v for v in values if math.isfinite(v)]
+        spread = max(finite) - min(finite)
         if band > 1e4 * max(spread, 1e-300) and spread > 0.0:
             return (
                 "linear",
@@ -214,7 +214,7 @@ def _axis_of(trend: Trend) -> tuple[Scale, list[float], str]:
                 f"The limits, {number(limit[0], 7)} and {number(limit[1], 7)}, are off the scale.",
             )
         return "linear", list(limit), ""
-    one_sign = trend.definition.better == "smaller_magnitude" or min(trend.values) > 0.0
+    one_sign = trend.definition.better == "smaller_magnitude" or min(values) > 0.0
     decades = math.log10(max(sizes) / min(sizes))
     theory = trend.definition.set_point or (0.0, 0.0)
     if one_sign and (

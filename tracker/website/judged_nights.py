@@ -21,6 +21,7 @@ from spook_tracker.tracker.judge.judged import commit_of
 from spook_tracker.tracker.judge.known import of_two
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
 from spook_tracker.tracker.judge.rank import Question, question
+from spook_tracker.tracker.judge.repeats import looked_at
 from spook_tracker.tracker.judge.series_history import Told
 from spook_tracker.tracker.judge.work import Samples, is_read_off, with_work
 from spook_tracker.tracker.website.folder import digest
@@ -131,7 +132,9 @@ def all_marks(told: Mapping[str, Told]) -> dict[str, Marks]:
     for key, series in told.items():
         timed = series.definition.kind == "time" and not is_read_off(series.definition)
         for judged in (
-            series.nights if timed else [night for night in series.nights if night.state == "detected"]
+            series.nights
+            if timed
+            else [night for night in looked_at(series.nights) if night.state == "detected"]
         ):
             usual = None
             if timed and judged.usual is not None:

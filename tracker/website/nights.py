@@ -7,10 +7,11 @@ in parallel lists, because ten years of nights are a million of them.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Protocol
+from operator import attrgetter
+from typing import Protocol, TypeVar, overload
 
 from spook_tracker.tracker.document.run_document import (
     Asked,
@@ -19,16 +20,20 @@ from spook_tracker.tracker.document.run_document import (
     Machine,
     MapData,
     Run,
+    Runs,
+    Said,
     Sample,
     SeriesDefinition,
     SeriesHistory,
     TestCard,
     Trajectory,
+    columns,
 )
 from spook_tracker.tracker.document.wording import day, short_hash, version
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.lane import histories, lines
 from spook_tracker.tracker.judge.maps import ToldMap, map_key, told_maps
+from spook_tracker.tracker.judge.repeats import Nights
 from spook_tracker.tracker.judge.series_history import Told, judge_all
 from spook_tracker.tracker.judge.standing import worst
 from spook_tracker.tracker.judge.vocabulary import Class
@@ -69,15 +74,44 @@ def as_night(run: Run | None) -> Night:
     return run
 
 
+Cell = TypeVar("Cell")
+_VALUE = attrgetter("value")
+_OUTCOME = attrgetter("outcome")
+_HELD = attrgetter("set_point_held")
+
+
+class Column(Sequence[Cell]):
+    """One thing that samples say, night by night, read where it is asked for."""
+
+    __slots__ = ("_read", "_said")
+
+    def __init__(self, said: Sequence[Said], read: Callable[[Sample], Cell]) -> None:
+        self._said, self._read = said, read
+
+    def __len__(self) -> int:
+        return len(self._said)
+
+    @overload
+    def __getitem__(self, place: int) -> Cell: ...
+    @overload
+    def __getitem__(self, place: slice) -> list[Cell]: ...
+    def __getitem__(self, place: int | slice) -> Cell | list[Cell]:
+        if isinstance(place, slice):
+            return [self._read(said[0]) for said in self._said[place]]
+        return self._read(self._said[place][0])
+
+    def __iter__(self) -> Iterator[Cell]:
+        read = self._read
+        return (read(said[0]) for said in self._said)
+
+
 @dataclass
 class Trend:
     """One series over the nights, in order, each night judged."""
 
     told: Told
-    nights: list[int] = field(default_factory=list)
-    values: list[float] = field(default_factory=list)
-    outcomes: list[str] = field(default_factory=list)
-    held: list[bool] = field(default_factory=list)  # set point
+    nights: list[int]
+    said: Sequence[Said]
     latest: Sample | None = None  # of the newest night that has one, with its evidence
     earlier: dict[int, Sample] = field(default_factory=dict)  # of a ladder: by index of `Chapter.earlier`
     order: int = 0  # place in its run's document
@@ -86,6 +120,26 @@ class Trend:
     def definition(self) -> SeriesDefinition:
         """The newest."""
         return self.told.definition
+
+    @property
+    def values(self) -> Column[float]:
+        """Night by night."""
+        return Column(self.said, _VALUE)
+
+    @property
+    def outcomes(self) -> Column[str]:
+        """The class of each night's answer."""
+        return Column(self.said, _OUTCOME)
+
+    @property
+    def held(self) -> Column[bool]:
+        """Whether its set point was held."""
+        return Column(self.said, _HELD)
+
+    @property
+    def distinct(self) -> list[Sample]:
+        """What it has ever said, most nights' saying the same once."""
+        return [said[0] for said in {id(said): said for said in self.said}.values()]
 
     @property
     def value(self) -> float:
@@ -99,7 +153,8 @@ class Trend:
 
     def state_at(self, place: int) -> Class:
         """What one night stands for, as the judge says."""
-        return self.told.nights[place].stands
+        nights = self.told.nights
+        return nights.stands(place) if isinstance(nights, Nights) else nights[place].stands
 
 
 @dataclass
@@ -259,19 +314,15 @@ def _chapter(
         for index, run in enumerate(runs)
     ]  # fmt: skip
     trends: dict[str, Trend] = {}
+    places: dict[Runs, list[int]] = {}
     for key, told in judge_all(histories(history, nights), accepted).items():
         if not told.nights:
             continue
-        points = [judged.night for judged in told.nights]
-        samples = [point.sample for point in points]
-        trends[key] = Trend(
-            told,
-            nights=[as_night(point.run).index for point in points],
-            values=[sample.value for sample in samples],
-            outcomes=[sample.outcome for sample in samples],
-            held=[sample.set_point_held for sample in samples],
-            latest=samples[-1],
-        )
+        judged = told.nights
+        points = judged.points if isinstance(judged, Nights) else columns([one.night for one in judged])
+        if points.runs not in places:
+            places[points.runs] = [as_night(run).index for run in points.runs]
+        trends[key] = Trend(told, places[points.runs], points.said, latest=points.said[-1][0])
     _add_evidence(history, nights, trends)
     earlier = _add_earlier_ladders(history, nights, trends)
     cards: dict[str, TestCard] = {}
