@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import partial
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.cli.models import markdown_of
 from spook_tracker.tracker.measure import model_packages, model_standing
+from spook_tracker.tracker.measure.model_agreement import agreement
 from spook_tracker.tracker.measure.model_files import ModelFileError
 from spook_tracker.tracker.measure.model_packages import files_of, loaded, looked_at, stood
 from spook_tracker.tracker.measure.model_standing import Standing
@@ -204,4 +206,20 @@ def test_a_swing_is_compared_with_mujocos(tmp_path: Path) -> None:
     alone = CliRunner().invoke(main, ["models", str(tmp_path), "--agree"])
 
     assert "1 swing as in MuJoCo" in ran.output
+    assert "0 swing otherwise; of 0 the steps say too little; 0 out of time" in ran.output
     assert alone.exit_code == 2
+
+
+def test_a_swing_that_takes_longer_than_there_is_time_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip(
+        "mujoco", reason="the extra mujoco is not installed: pip install 'spook-tracker[mujoco]'"
+    )
+    (tmp_path / "swing.xml").write_text(SWING)
+    monkeypatch.setattr(model_packages, "agreement", partial(agreement, budget=0.0))
+
+    (found,) = (model_packages._compared("spook", path) for path in files_of(str(tmp_path)))
+
+    assert found.word == "runs" and found.out_of_time and not found.agrees
+    assert found.sentence == "out of time: mujoco needs steps of 0.001 s or less"

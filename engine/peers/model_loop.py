@@ -30,7 +30,8 @@ CALM = 1e-3  # of the size a second: nothing faster, nothing turning faster than
 CALM_FOR = 0.5  # s
 LOOK = 0.02  # s between two looks at whether all is calm
 ELSEWHERE_LIMIT = 120.0  # s
-CHUNK = 200  # steps between two looks at the clock and at what failed
+CHUNK = 200  # steps between two looks at the clock and at what failed, at most
+SOON = 0.02  # of a time limit: so long a chunk may take, else the next one has fewer steps
 
 
 def elsewhere(
@@ -104,6 +105,7 @@ class LoadedModel(ABC):
         self.random = np.random.default_rng(run.seed)
         self.given = np.random.default_rng([run.model.seed, 1])
         self.done = 0  # steps
+        self.chunk = CHUNK if time_limit is None else 1  # steps to the next look at the clock
         self.seconds = self.cpu = self.worst = 0.0
         self.failure = ""
 
@@ -184,14 +186,17 @@ class LoadedModel(ABC):
         run = self.run
         stepwise = self.is_pushed or run.timed or self.varies
         while self.done < to and not self.failure:
-            count = min(to - self.done, CHUNK)
+            count = min(to - self.done, self.chunk)
             pushes = self._pushes(count) if self.is_pushed else None
             began, begun = time.perf_counter(), time.process_time()
             if stepwise:
                 self.one_by_one(count, pushes)
             else:
                 self.take(count)
-            self.seconds += time.perf_counter() - began
+            took = time.perf_counter() - began
+            self.seconds += took
+            if self.limit is not None:
+                self.chunk = max(1, count // 2) if took > SOON * self.limit else min(CHUNK, 2 * self.chunk)
             self.cpu += time.process_time() - begun
             self.done += count
             if trouble := self.trouble():

@@ -7,6 +7,7 @@ what is left between them is how they understand the file.
 
 from __future__ import annotations
 
+import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,11 @@ STEPS = {REFERENCE: 1e-3}  # s, to begin with
 STEP = 1e-2  # s, of an engine that is asked with the highest order it has
 FINEST = 1e-5  # s
 RESOLVED = 0.1 * ALIKE  # of the size: what halving a step may still change
+BUDGET = 240.0  # s that both engines may take together
+
+
+class OutOfTime(EngineError):
+    """The steps could not be made short enough in the time there is."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,29 +46,35 @@ class Agreement:
         return max(self.own, self.reference) <= RESOLVED
 
 
-def agreement(model: ModelFile, engine: str) -> Agreement:
-    """The distance after one second. Raises EngineError where one of both cannot be asked."""
-    there, own, _ = _resolved(model, engine, STEP)
-    wanted, reference, size = _resolved(model, REFERENCE, STEPS[REFERENCE])
+def agreement(model: ModelFile, engine: str, budget: float = BUDGET) -> Agreement:
+    """The distance after one second. Raises EngineError where one of both cannot be asked, OutOfTime after `budget` [s]."""
+    end = time.monotonic() + budget
+    wanted, reference, size = _resolved(model, REFERENCE, STEPS[REFERENCE], end)
+    there, own, _ = _resolved(model, engine, STEP, end)
     return Agreement(_apart(there, wanted) / size, own, reference)
 
 
-def _resolved(model: ModelFile, engine: str, step: float) -> tuple[npt.NDArray[np.float64], float, float]:
+def _resolved(
+    model: ModelFile, engine: str, step: float, end: float
+) -> tuple[npt.NDArray[np.float64], float, float]:
     """Places of the watched bodies at the end, what halving the step changed of them, and the size of what moves."""
-    before, size = _ran(model, engine, step)
+    before, size = _ran(model, engine, step, end)
     last = np.inf
     while True:
         step *= 0.5
-        after, _ = _ran(model, engine, step)
+        after, _ = _ran(model, engine, step, end)
         changed = _apart(after, before) / size
         if changed <= RESOLVED or step <= FINEST or changed > last:  # what grows again is rounding, or chaos
             return after, changed, size
         before, last = after, changed
 
 
-def _ran(model: ModelFile, engine: str, step: float) -> tuple[npt.NDArray[np.float64], float]:
+def _ran(model: ModelFile, engine: str, step: float, end: float) -> tuple[npt.NDArray[np.float64], float]:
     asked = ModelRun(model=model, samples=(LASTS,), swing=SWING, seed=1, accurate=True)
-    done = find(engine).simulate(asked, time_step=step, duration=LASTS)
+    left = end - time.monotonic()
+    done = find(engine).simulate(asked, time_step=step, duration=LASTS, time_limit=max(left, 0.0))
+    if done.status == "timed_out":
+        raise OutOfTime(f"out of time: {engine} needs steps of {step:.2g} s or less")
     if not done.completed:
         raise EngineError(f"{engine}: {done.failure}")
     return np.asarray(done["position"])[-1], float(done["size"])

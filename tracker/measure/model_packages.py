@@ -18,7 +18,7 @@ from spook_tracker.engine.find import find
 from spook_tracker.engine.model_file import ModelFile, ModelRun
 from spook_tracker.engine.model_reading import ModelError, Reading, read
 from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.tracker.measure.model_agreement import ALIKE, Agreement, agreement
+from spook_tracker.tracker.measure.model_agreement import ALIKE, Agreement, OutOfTime, agreement
 from spook_tracker.tracker.measure.model_files import SUFFIXES, ModelFileError
 from spook_tracker.tracker.measure.model_standing import Standing, standing
 
@@ -41,6 +41,7 @@ class Looked:
     bodies: int = 0
     files: int = 0
     agreement: Agreement | None = None
+    out_of_time: bool = False  # its swing was not compared for this reason
 
     @property
     def agrees(self) -> bool:
@@ -124,6 +125,8 @@ def _compared(engine: str, path: Path) -> Looked:
         return looked
     try:
         return replace(looked, agreement=agreement(_model(path, read(path)), engine))
+    except OutOfTime as error:
+        return replace(looked, sentence=looked.sentence or str(error), out_of_time=True)
     except EngineError as error:
         return replace(looked, sentence=looked.sentence or str(error))
 
