@@ -13,6 +13,7 @@ from typing import Literal
 
 Format = Literal["MJCF", "URDF", "SDF"]
 DRIVES = ("zero", "hold", "table", "sinusoid", "function")
+SHOWN_AS = ("sphere", "box", "capsule", "facets", "plane")  # what a drawing has; sizes as a DrawnSolid's
 PARTS = (
     "contacts",
     "limits",
@@ -73,7 +74,10 @@ class ModelRun:
     energy (S, 2) J, potential and kinetic, where an engine tells it, violation (S,) of equality constraints and joint
     limits in m or rad, and of the last state overlap () m, load () N carried by contacts with what does not move over the weight of what moves. With
     `until_settled` the run ends early: settled () is the time [s] it did, NaN if it did not, and creep (B,) m/s. With
-    `timed`: load_seconds, step_seconds and worst_step_seconds, real_time_factor, megabytes.
+    `timed`: load_seconds, step_seconds and worst_step_seconds, real_time_factor, megabytes. With `shown`, of the bodies N that
+    are seen body_place (S, N, 3) m and body_turn (S, N, 4), and of their shapes G at the start shape_kind (G,), a place in
+    SHOWN_AS, shape_size (G, W) m, NaN beyond its numbers, shape_body (G,), a place among N, shape_fixed (G,), shape_place
+    (G, 3) m and shape_turn (G, 4); NotSupported where an engine tells no shapes.
     """
 
     model: ModelFile
@@ -89,3 +93,4 @@ class ModelRun:
     without: frozenset[str] = frozenset()  # of PARTS: what is left out to see what it does
     stiffer: float = 1.0  # times faster, contacts, limits and ties that give way: the engine's own softness
     elsewhere: bool = False  # in a process of its own
+    shown: bool = False  # with all that is seen of it

@@ -317,6 +317,15 @@ class Example:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class Seen:
+    """How what is no scene of ours moves: a run with all that is seen of it, as `engine.model_file.ModelRun` has it."""
+
+    run: Callable[[Simulate], Result]
+    step: float  # s between samples
+    gravity: tuple[float, float, float]  # m/s²
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class ScalarTest:
     """A physical question put to an engine. Texts are plain; `theory` has Unicode formulas, a line each."""
 
@@ -331,6 +340,7 @@ class ScalarTest:
     source: str  # "thesis, section 3.6"
     measurements: tuple[Measurement, ...]
     example: Callable[[], Example]
+    seen: Seen | None = None  # in place of an example, of what is no scene
     figures: tuple[Figure, ...] = ()
     ladders: tuple[Ladder, ...] = ()
     stability: tuple[StabilityStudy, ...] = ()

@@ -23,6 +23,8 @@ from spook_tracker.engine.model_reading import read
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.scalar_tests.model_file import books, cost, ladder, motion, rest
 from spook_tracker.scalar_tests.model_file.facts import Asked, turns
+from spook_tracker.tracker.measure.model_motion import model_trajectory
+from spook_tracker.tracker.measure.trajectory import values_of
 
 pytest.importorskip("mujoco", reason="the extra mujoco is not installed: pip install 'spook-tracker[mujoco]'")
 
@@ -299,6 +301,31 @@ def test_gains_of_what_has_no_servos_are_not_asked(tmp_path: Path) -> None:
 
     with pytest.raises(NotSupported, match="no position servos"):
         ladder.stiffest_gain(asked, _simulate())
+
+
+SEEN = """<mujoco><asset><mesh name="wedge" vertex="0 0 0 .2 0 0 0 .2 0 0 0 .2"/></asset><worldbody>
+<geom type="plane" size="1 1 1"/><body name="ball" pos="0 0 2"><freejoint/><geom size=".1"/><geom group="3" size=".5"/>
+<geom type="mesh" mesh="wedge"/></body></worldbody></mujoco>"""
+
+
+@pytest.mark.parametrize("engine", ["mujoco", "spook"])
+def test_a_replay_shows_shapes_where_the_engine_moves_them(tmp_path: Path, engine: str) -> None:
+    """A sphere and a mesh of four corners that fall for half a second; what its viewer hides is left out."""
+    asked = Asked(model=_model(tmp_path, SEEN), duration=0.5)
+
+    found = model_trajectory("seen", motion.seen(asked), find(engine).simulate)
+
+    assert found is not None
+    places = values_of(found.channels[0], found.count).reshape(found.count, found.bodies, 3)
+    time_step, body = asked.model.time_step, found.body_of_solid[1]
+    times = found.step * np.arange(found.count)
+    assert [(one.kind, one.fixed) for one in found.solids] == [
+        ("plane", True),
+        ("sphere", False),
+        ("facets", False),
+    ]
+    assert found.solids[1].size == (0.1,) and len(found.solids[2].size) == 4 * 10
+    assert places[:, body, 2] == pytest.approx(2.0 - 0.5 * 9.81 * times * (times + time_step), abs=1e-4)
 
 
 def test_turns_are_angles_whatever_the_sign_of_the_quaternion() -> None:

@@ -52,11 +52,16 @@ def test_what_changed_for_the_whole_and_what_became_of_it() -> None:
     found = words(
         [
             moved("settled", 1.0, 2.5, unit="s"),
+            moved("a.mean_place", 1.00001, 1.00002),
             Moved(metric="a.rest_x", unit="m", before=0.0, after=0.0, became="value became diverged"),
         ]
     )
 
-    assert found == ["a.rest_x and its like: value became diverged", "settles at 2.5 s, not at 1 s"]
+    assert found == [
+        "a.rest_x and its like: value became diverged",
+        "a ends 1.00002 m from its start in the mean over small pushes, not 1.00001 m",
+        "settles at 2.5 s, not at 1 s",
+    ]
 
 
 def test_the_severity_is_what_the_judge_says_after_the_distance() -> None:

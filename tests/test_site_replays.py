@@ -50,6 +50,19 @@ def test_a_motion_is_offered_once_however_many_nights_had_it():
     assert offered(nights(1.0, 2.0, 2.0, 1.0, 3.0, 3.0)) == ["", "2025-10-04", "2025-10-03"]
 
 
+def test_a_model_begins_over_what_the_version_before_did():
+    """Two nights of version 1, then two of version 2: tonight lies over the newest motion of version 1."""
+    found = []
+    for n, version in enumerate("1122"):
+        asked = document(n)
+        moved, engine = fall(1.0 + n, "friction"), msgspec.structs.replace(asked.engine, version=version)
+        found.append(msgspec.structs.replace(asked, trajectories=(moved,), engine=engine))
+    motions_of = book(DocumentHistory(found)).motions["friction"]
+
+    assert replay(motions_of, over_another_version=True).against == motions_of[2].key
+    assert replay(motions_of).against == ""
+
+
 @pytest.mark.parametrize("files", [0, 1, 2, 3, 6])
 def test_what_the_budget_leaves_out_is_neither_written_nor_offered(monkeypatch, tmp_path, files):
     """Two tests, three nights: tonight's two whatever they weigh, then the newest that fit."""

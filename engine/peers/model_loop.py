@@ -143,6 +143,14 @@ class LoadedModel(ABC):
     def state(self) -> Array:
         """Whatever the next step depends on, for its hash."""
 
+    def shapes(self) -> dict[str, Array]:
+        """What is seen of the model at its start, as ModelRun has it."""
+        raise NotSupported("this engine does not tell what a model looks like")
+
+    def seen(self) -> tuple[Array, Array]:
+        """Places (N, 3) m and orientations (N, 4) of the bodies of those shapes."""
+        raise NotSupported("this engine does not tell what a model looks like")
+
     def at_sample(self) -> dict[str, Any]:
         """What else is read at each sample."""
         return {}
@@ -154,6 +162,7 @@ class LoadedModel(ABC):
     def result(self, duration: float, load_seconds: float) -> Result:
         """Run for `duration` [s], or until all is calm, and read what is asked for."""
         run, total = self.run, round(duration / self.step)
+        shapes = self.shapes() if run.shown else {}
         marks = {min(total, round(at / self.step)) for at in run.samples}
         looks = {total}
         if run.until_settled:
@@ -170,11 +179,14 @@ class LoadedModel(ABC):
                 self.sample(samples)
             if run.until_settled and calm.at(mark, self.poses()[0], self.is_calm()):
                 break
-        return self.told(samples, calm, load_seconds)
+        return self.told(samples, calm, load_seconds, shapes)
 
     def sample(self, samples: dict[str, list[Any]]) -> None:
         places, turns = self.poses()
-        for name, value in {"position": places, "orientation": turns, **self.at_sample()}.items():
+        told = {"position": places, "orientation": turns, **self.at_sample()}
+        if self.run.shown:
+            told["body_place"], told["body_turn"] = self.seen()
+        for name, value in told.items():
             samples.setdefault(name, []).append(np.array(value, dtype=float))
 
     def is_calm(self) -> bool:
@@ -193,15 +205,15 @@ class LoadedModel(ABC):
                 self.one_by_one(count, pushes)
             else:
                 self.take(count)
-            took = time.perf_counter() - began
-            self.seconds += took
+            took = time.process_time() - begun
+            self.seconds += time.perf_counter() - began
             if self.limit is not None:
                 self.chunk = max(1, count // 2) if took > SOON * self.limit else min(CHUNK, 2 * self.chunk)
-            self.cpu += time.process_time() - begun
+            self.cpu += took
             self.done += count
             if trouble := self.trouble():
                 self.failure = f"{trouble} before {self.done * self.step:.4g} s"
-            elif self.limit is not None and self.seconds > self.limit and self.done < to:
+            elif self.limit is not None and self.cpu > self.limit and self.done < to:
                 self.failure = (
                     f"stopped after {self.limit:g} s, at {self.done * self.step:.4g} s of simulated time"
                 )
@@ -230,7 +242,9 @@ class LoadedModel(ABC):
                 now = time.perf_counter()
                 self.worst, last = max(self.worst, now - last), now
 
-    def told(self, samples: dict[str, list[Any]], calm: _Calm, load: float) -> Result:
+    def told(
+        self, samples: dict[str, list[Any]], calm: _Calm, load: float, shapes: dict[str, Array]
+    ) -> Result:
         count = len(self.run.model.watched)
         status: Any = "completed"
         if self.failure:
@@ -238,7 +252,7 @@ class LoadedModel(ABC):
         values: dict[str, Any] = {name: np.array(read) for name, read in samples.items()}
         values["position"] = values["position"].reshape(-1, count, 3)
         values["orientation"] = values["orientation"].reshape(-1, count, 4)
-        values["size"] = np.array(self.size)
+        values |= {"size": np.array(self.size), **shapes}
         if not self.failure:
             values |= self.at_end() | {"fastest": np.array(self.speeds()[0].max())}
         if self.run.until_settled:

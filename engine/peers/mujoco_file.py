@@ -19,6 +19,7 @@ import numpy.typing as npt
 from spook_tracker.engine.errors import EngineError
 from spook_tracker.engine.model_file import Drive, ModelRun, Watched
 from spook_tracker.engine.peers.model_loop import Array, LoadedModel, elsewhere
+from spook_tracker.engine.peers.mujoco_shown import Shown
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result
 
@@ -156,6 +157,13 @@ class _Simulation(LoadedModel):
 
     def poses(self) -> tuple[Array, Array]:
         return self.data.xpos[self.bodies], self.data.xquat[self.bodies]
+
+    def shapes(self) -> dict[str, Array]:
+        self.shown = Shown(self.model, self.data)
+        return self.shown.arrays()
+
+    def seen(self) -> tuple[Array, Array]:
+        return self.data.xpos[self.shown.bodies], self.data.xquat[self.shown.bodies]
 
     def speeds(self) -> tuple[Array, Array]:
         m, d, bodies = self.model, self.data, self.moving

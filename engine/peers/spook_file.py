@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -26,7 +27,8 @@ from spook_tracker.engine.observe import (
 )
 from spook_tracker.engine.peers.model_loop import Array, LoadedModel, elsewhere, resident
 from spook_tracker.engine.peers.mujoco_file import LOADS, alter, bodies_of, driven, load, size_of, start_at
-from spook_tracker.engine.peers.mujoco_scene import Translated, servo_name, translate
+from spook_tracker.engine.peers.mujoco_scene import Placed, Translated, servo_name, translate
+from spook_tracker.engine.peers.mujoco_shown import Shown
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result, SimulationFailed
 from spook_tracker.engine.run import Run, start
@@ -156,8 +158,20 @@ class _Simulation(LoadedModel):
         self.now = self.held.state
 
     def poses(self) -> tuple[Array, Array]:
+        return self.placed(self.watched)
+
+    def shapes(self) -> dict[str, Array]:
+        shown = Shown(self.model, self.data)
+        self.seen_bodies = [self.made.bodies[body] for body in shown.bodies]
+        return shown.arrays()
+
+    def seen(self) -> tuple[Array, Array]:
+        return self.placed(self.seen_bodies)
+
+    def placed(self, bodies: Sequence[Placed]) -> tuple[Array, Array]:
+        """Places and turns of bodies of the file."""
         places, turns = [], []
-        for one in self.watched:
+        for one in bodies:
             place, turn = one.place, one.turn
             if one.name:
                 axes = _matrix(self.now[one.name][3:7])

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 
 from spook_tracker.engine.result import Result
-from spook_tracker.scalar_tests.case import Estimate, Metric, Simulate
+from spook_tracker.scalar_tests.case import Estimate, Metric, Seen, Simulate
 from spook_tracker.scalar_tests.model_file.facts import (
     BEYOND,
     GRID,
@@ -22,6 +23,7 @@ from spook_tracker.scalar_tests.model_file.facts import (
     turns,
 )
 
+DRAWN_SAMPLES = 240  # of a replay
 DRAWN = 16  # runs with pushes of their own, where these grow to the size
 BY_CHANCE = (
     6.0  # standard errors of a difference of two means: beyond them once in some hundred thousand series
@@ -113,6 +115,19 @@ def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
         drawn = ends[:, column] if len(ends) else np.zeros(0)
         found[f"{body.label}.mean_place"] = mean_of(drawn, size, chaotic)
     return found
+
+
+def seen(asked: Asked) -> Seen:
+    """The model over the whole time, as a replay shows it."""
+    steps = max(1, round(asked.duration / asked.model.time_step))
+    every = math.ceil(steps / DRAWN_SAMPLES)
+    step = every * asked.model.time_step
+    times = tuple(step * k for k in range(steps // every + 1))
+    return Seen(run=partial(_shown, asked, times), step=step, gravity=asked.model.gravity)
+
+
+def _shown(asked: Asked, times: tuple[float, ...], simulate: Simulate) -> Result:
+    return simulated(simulate, asked, times[-1], samples=times, shown=True)
 
 
 def mean_of(drawn: Array, size: float, chaotic: bool) -> Estimate:

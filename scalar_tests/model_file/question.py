@@ -89,6 +89,7 @@ def test_of(
         ladders=(ladder.ladder(asked),),
         stability=ladder.studies(asked, driven),
         example=_no_scene,
+        seen=motion.seen(asked),
         as_given=True,
     )
 

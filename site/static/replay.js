@@ -117,7 +117,8 @@ async function startReplay(box) {
       }
     }
     player.tools.prepend(make("label", {}, "against ", other), first, beside);
-    if (state.get("against")) { other.value = state.get("against"); await laid(other.value); }
+    const begun = state.get("against") || box.dataset.against || "";
+    if (begun) { other.value = begun; await laid(begun); }
     if (state.get("at") === "first") {  // a reader from the list of causes wants to see it go wrong
       state.set("at", "");
       if (!first.hidden && first.dataset.seen >= 0) { player.seek(Number(first.dataset.seen)); player.remember(); } else if (!first.hidden) { player.toWorst(); }

@@ -82,10 +82,10 @@ def models_command(
         moving = sum(looked.bodies >= 3 for looked in alike)
         both = sum(looked.word == "runs" for looked in alike)
         apart = [looked.agreement for looked in found if looked.agreement and not looked.agrees]
-        told = sum(one.resolved for one in apart)
+        otherwise = sum(one.resolved for one in apart)
         say(
             f"{len(alike)} swing as in MuJoCo, {moving} of them with three bodies on joints or more; "
-            f"{both} of them also run as the file has them; {told} swing otherwise; of {len(apart) - told} the steps say too "
+            f"{both} of them also run as the file has them; {otherwise} swing otherwise; of {len(apart) - otherwise} the steps say too "
             f"little; {sum(looked.out_of_time for looked in found)} out of time"
         )
 

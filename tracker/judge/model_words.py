@@ -100,20 +100,26 @@ def _in_the_mean(moves: Sequence[Moved]) -> list[str]:
     if not told:
         return []
     body, one = max(told.items(), key=lambda item: abs(item[1].after - item[1].before))
-    return [
-        f"{body} ends {one.after:.3g} m from its start in the mean over small pushes, not {one.before:.3g} m"
-    ]
+    before, after = _told_apart(one)
+    return [f"{body} ends {after} m from its start in the mean over small pushes, not {before} m"]
 
 
 def _whole(moves: Sequence[Moved]) -> list[str]:
     found = []
     for one in moves:
         if one.metric in WHOLE:
-            before, after = (f"{value:.3g}" for value in (one.before, one.after))
-            if before == after:
-                before, after = f"{one.before:.9g}", f"{one.after:.9g}"
+            before, after = _told_apart(one)
             found.append(WHOLE[one.metric].format(before=before, after=after))
     return found
+
+
+def _told_apart(one: Moved) -> tuple[str, str]:
+    """Both values, with as many digits as tell them apart."""
+    for digits in (3, 6, 9, 12):
+        before, after = f"{one.before:.{digits}g}", f"{one.after:.{digits}g}"
+        if before != after:
+            break
+    return before, after
 
 
 def _with_rest(sentences: list[str], count: int) -> list[str]:

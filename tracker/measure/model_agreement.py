@@ -25,7 +25,7 @@ STEPS = {REFERENCE: 1e-3}  # s, to begin with
 STEP = 1e-2  # s, of an engine that is asked with the highest order it has
 FINEST = 1e-5  # s
 RESOLVED = 0.1 * ALIKE  # of the size: what halving a step may still change
-BUDGET = 240.0  # s that both engines may take together
+BUDGET = 240.0  # s of the processor that both engines may take together
 
 
 class OutOfTime(EngineError):
@@ -47,8 +47,9 @@ class Agreement:
 
 
 def agreement(model: ModelFile, engine: str, budget: float = BUDGET) -> Agreement:
-    """The distance after one second. Raises EngineError where one of both cannot be asked, OutOfTime after `budget` [s]."""
-    end = time.monotonic() + budget
+    """The distance after one second. Raises EngineError where one of both cannot be asked, OutOfTime
+    after `budget` [s] of this process."""
+    end = time.process_time() + budget
     wanted, reference, size = _resolved(model, REFERENCE, STEPS[REFERENCE], end)
     there, own, _ = _resolved(model, engine, STEP, end)
     return Agreement(_apart(there, wanted) / size, own, reference)
@@ -71,7 +72,7 @@ def _resolved(
 
 def _ran(model: ModelFile, engine: str, step: float, end: float) -> tuple[npt.NDArray[np.float64], float]:
     asked = ModelRun(model=model, samples=(LASTS,), swing=SWING, seed=1, accurate=True)
-    left = end - time.monotonic()
+    left = end - time.process_time()
     done = find(engine).simulate(asked, time_step=step, duration=LASTS, time_limit=max(left, 0.0))
     if done.status == "timed_out":
         raise OutOfTime(f"out of time: {engine} needs steps of {step:.2g} s or less")

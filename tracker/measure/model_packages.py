@@ -18,7 +18,13 @@ from spook_tracker.engine.find import find
 from spook_tracker.engine.model_file import ModelFile, ModelRun
 from spook_tracker.engine.model_reading import ModelError, Reading, read
 from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.tracker.measure.model_agreement import ALIKE, Agreement, OutOfTime, agreement
+from spook_tracker.tracker.measure.model_agreement import (
+    ALIKE,
+    BUDGET,
+    Agreement,
+    OutOfTime,
+    agreement,
+)
 from spook_tracker.tracker.measure.model_files import SUFFIXES, ModelFileError
 from spook_tracker.tracker.measure.model_standing import Standing, standing
 
@@ -28,6 +34,7 @@ STEPS = 10  # that a model must take to be said to run
 LONGEST = 20.0  # s that those steps may take
 LIMITS = crew.Limits(seconds=60.0, memory=4 << 30)
 LONG = crew.Limits(seconds=300.0, memory=4 << 30)
+AGREE = crew.Limits(seconds=10.0 * BUDGET, memory=4 << 30)  # of a busy machine: a swing has its own budget
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,7 +87,7 @@ def looked_at(path: Path) -> Looked:
 def loaded(paths: Sequence[Path], engine: str, workers: int = 2, agree: bool = False) -> Iterator[Looked]:
     """The same, each model also loaded and stepped by an engine, and its swing compared with MuJoCo's."""
     look = partial(_compared if agree else _stepped, engine)
-    for path, answer in crew.answers(look, list(paths), workers, LONG if agree else LIMITS):
+    for path, answer in crew.answers(look, list(paths), workers, AGREE if agree else LIMITS):
         yield Looked(path, "fails", answer.failure) if isinstance(answer, crew.Lost) else answer
 
 

@@ -22,7 +22,7 @@ import msgspec
 import spook_tracker.tracker.measure.executors as executors
 import spook_tracker.tracker.measure.trajectory as motion
 import spook_tracker.tracker.measure.workers as crew
-from spook_tracker.scalar_tests.case import ScalarTest
+from spook_tracker.scalar_tests.case import ScalarTest, Simulate
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import (
     Asked,
@@ -41,11 +41,13 @@ from spook_tracker.tracker.measure import ladder as ladders
 from spook_tracker.tracker.measure.cards import engine_version, test_card
 from spook_tracker.tracker.measure.fitting import fitted, fitted_figure, unfit
 from spook_tracker.tracker.measure.machine import machine
+from spook_tracker.tracker.measure.model_motion import model_trajectory
 from spook_tracker.tracker.measure.question import (
     Measured,
     NoAnswer,
     Outcome,
     Witness,
+    ask,
     draw,
     judged_sample,
     measure,
@@ -247,6 +249,7 @@ def _tasks(tests: Mapping[str, ScalarTest], request: Request) -> Iterator[Task]:
         wanted += [("measure", (i,)) for i in range(len(test.measurements))]
         if request.figures:
             wanted += [("figure", (i,)) for i in range(len(test.figures))]
+        if request.figures or test.seen is not None:
             wanted += [("trajectory", (0,))]
         if request.stability:
             wanted += [("study", (i,)) for i in range(len(test.stability))]
@@ -279,12 +282,20 @@ def _performed(source: Questions, task: Task) -> Parts:
     if task.kind == "figure":
         return (draw(task.test, test.figures[first], simulate),)
     if task.kind == "trajectory":
-        moved = motion.trajectory(task.test, test, simulate)
+        moved = moves(task.test, test, simulate)
         return () if moved is None else (moved,)
     if task.kind == "study":
         return (study(task.test, test, test.stability[first], simulate),)
     rungs = test.ladders[first]
     return (ladders.error_points(rungs, rungs.configurations[task.index[1]], simulate),)
+
+
+def moves(name: str, test: ScalarTest, simulate: Simulate) -> Trajectory | None:
+    """How what is seen of a test moves."""
+    if (seen := test.seen) is not None:
+        found: Trajectory | None = ask(lambda: model_trajectory(name, seen, simulate)).value
+        return found
+    return motion.trajectory(name, test, simulate)
 
 
 def _perform_all(

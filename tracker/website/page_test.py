@@ -6,6 +6,7 @@ import re
 from collections.abc import Sequence
 
 from spook_tracker.tracker.document.coverage import saved
+from spook_tracker.tracker.document.run_document import SceneDrawing
 from spook_tracker.tracker.document.wording import clean, day, slug
 from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.broken import MOST_CARDS, MOST_CHARTS, broken, shown
@@ -69,8 +70,8 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
     context = {
         "card": test.card,
         "slug": slug(test.name),
-        "replay": replay(book.motions[test.name]),
-        "scenery": scenery(test.card.scene) if test.card.scene else None,
+        "replay": replay(book.motions[test.name], over_another_version=bool(history)),
+        "scenery": scenery(drawn) if (drawn := _drawn(book, test)) else None,
         "state": test.state,
         "broken": [{**vars(every[id(one.trend)]), **one.card} for one in cards],
         "broken_left_out": len(found) - len(cards),
@@ -102,6 +103,14 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
     page = Page(here, "test.html", clean(test.card.title), clean(test.card.question), context, plotly=True)
     page.nightly = (slug(test.name), told) if context["run_times"] else None
     return page
+
+
+def _drawn(book: Book, test: TestHistory) -> SceneDrawing | None:
+    """The scene as it is described; of a model file, which describes none, as its replay begins."""
+    motions = book.motions[test.name]
+    if test.card.scene is not None or not motions:
+        return test.card.scene
+    return SceneDrawing(solids=motions[0].recorded.solids, gravity=motions[0].recorded.gravity)
 
 
 def ladder_views(test: TestHistory, book: Book, prefix: str = "") -> list[View]:
