@@ -7,7 +7,7 @@ WORKERS ?= auto  # of the tests in Python: as many as there are cores
 BIN    := $(VENV)/bin
 export PIP_BUILD_CONSTRAINT ?= $(CURDIR)/.ci/build-constraints.txt
 
-.PHONY: help lint tools tidy tidy-deep engines engine-releases recorded wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-smooth bench-replay pictures looks heaps campaign campaign-wide mutants mutants-tonight past mutation tolerances detectors pairs aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-threads sanitize-python FORCE
+.PHONY: help lint tools tidy tidy-deep engines engine-releases recorded wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-smooth bench-replay pictures looks heaps campaign campaign-wide mechanisms mutants mutants-tonight past mutation tolerances detectors pairs aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-threads sanitize-python FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -31,6 +31,7 @@ help:
 	@echo "make heaps     piles of 1000 and 10 000 bodies as scalar tests, and their error against run time"
 	@echo "make campaign  2000 random heaps, others every week: does their energy ever rise?"
 	@echo "make campaign-wide  the same with every shape and ground, of 1e-6 to 1e9 kg"
+	@echo "make mechanisms  4500 random lifts, ladders, trusses and linkages: is one that moves ever refused?"
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
 	@echo "make mutants-tonight  four of them, others every night"
 	@echo "make past      a wrong commit planted in this history and found, and ten old commits asked: many builds"
@@ -124,6 +125,9 @@ campaign: develop
 
 campaign-wide: develop
 	$(BIN)/python bench/campaign.py --this-week --workers 2 --wide
+
+mechanisms: develop
+	$(BIN)/python bench/mechanisms.py
 
 mutants: develop
 	$(BIN)/python bench/mutants.py --record bench/mutants.json

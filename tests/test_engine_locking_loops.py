@@ -14,6 +14,7 @@ from scipy.integrate import solve_ivp
 from spook_tracker.engine import (
     PLAIN,
     WORLD,
+    ConstraintForce,
     Distance,
     Final,
     Hinge,
@@ -29,6 +30,7 @@ from spook_tracker.engine import (
     Trace,
     simulate,
 )
+from spook_tracker.scalar_tests import scissor_lift
 from spook_tracker.scalar_tests.door import scene as door
 from spook_tracker.scalar_tests.multibody import bricard
 from spook_tracker.scalar_tests.multibody.library import turned
@@ -258,6 +260,17 @@ def test_a_structure_at_rest_is_not_called_locked() -> None:
 
     assert simulate(hung, time_step=1 / 60, duration=5.0).status == "completed"
     assert simulate(rope, time_step=1 / 240, duration=2.0).status == "completed"
+
+
+@pytest.mark.parametrize(("stages", "degrees"), [(1, 0.6), (1, 0.001), (3, 0.3), (10, 0.1), (20, 0.05)])
+def test_a_lift_that_lies_nearly_flat_is_held(stages: int, degrees: float) -> None:
+    """Its rows resist at first order by the sine of that angle; what they resist grows as it moves."""
+    angle = math.radians(degrees)
+    observe = {"pull": Final(quantity=ConstraintForce("actuator"))}
+    run = simulate(scissor_lift.scene(stages, angle), time_step=1 / 60, steps=20, observe=observe)
+
+    exact = scissor_lift.holding_force(stages, angle, scissor_lift.LOAD, scissor_lift.ARM)
+    assert float(run["pull"]) == pytest.approx(exact, rel=1e-6)
 
 
 def beside(scene: Scene, other: str) -> Scene:

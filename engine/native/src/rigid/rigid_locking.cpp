@@ -145,7 +145,7 @@ void RigidSystem::take_probe(Loop& loop, double part) {
         for (int i = 0; i < probe.size(k); ++i) probe.diagonal(k)[i] = -loop.weakness[probe.offset(k) + i];
 }
 
-/// The mean square of every member's arms to its joints [m²].
+/// The mean square of every member's arms to its joints [m²]; that of the others where all of its joints are at its centre.
 void RigidSystem::find_extents(Loop& loop) {
     loop.square.assign(loop.members.size(), 0.0);
     std::vector<int> ends(loop.members.size(), 0);
@@ -163,7 +163,7 @@ void RigidSystem::find_extents(Loop& loop) {
     }
     const double mean = sum > 0.0 ? sum / count : 1.0;
     for (std::size_t k = 0; k < loop.square.size(); ++k)
-        loop.square[k] = loop.square[k] > 0.0 ? loop.square[k] / ends[k] : mean;
+        loop.square[k] = loop.square[k] > POINT * POINT * mean ? loop.square[k] / ends[k] : mean;
 }
 
 /// After a solve, before its velocities are taken.
@@ -257,7 +257,68 @@ void RigidSystem::watch(Loop& loop, RigidState::Watched& seen) {
     seen.wait = little ? std::clamp(2 * seen.wait, SOON, LATE) : SOON;
     seen.next = live_.step + seen.wait;
     const bool took = std::abs(seen.work) > most && seen.motion > AT_REST * load;
-    if (took || (seen.load > 0.0 && seen.held > HELD * seen.load)) note_locked(loop);
+    const bool holds = seen.load > 0.0 && seen.held > HELD * seen.load;
+    if (!took && !holds && !stands(loop, seen, held, load)) return;
+    if (!bends(loop)) return note_locked(loop);
+    seen.work = seen.held = seen.load = 0.0;
+}
+
+/// Near its equilibrium little pulls a mechanism: whether what such rows hold back, 2 J in a step, would be seen by now, and
+/// nothing of it is. What rows that are all needed hold is a small part of it, and of that part a small part again.
+bool RigidSystem::stands(Loop& loop, const RigidState::Watched& seen, double held, double load) {
+    const double steps = static_cast<double>(live_.step);
+    const double told = std::max(REPEATED * REPEATED * load, STANDS * STANDS * seen.motion / (steps * steps));
+    if (!(held > told)) return false;
+    for (std::size_t row = 0; row < loop.repeated.size(); ++row)
+        loop.repeated[row] *= row < loop.weakness.size() ? loop.weakness[row] : 0.0;
+    loop.probe.solve(loop.repeated.data());
+    const double* y = loop.repeated.data() + loop.weakness.size();
+    double again = 0.0;
+    for (std::size_t k = 0; k < loop.members.size(); ++k) {
+        const int i = constrained_[loop.members[k]];
+        const Vec3 impulse{y[0], y[1], y[2]};
+        again += dot(impulse, impulse) / constants_[i].mass;
+        y += 3;
+        if (constants_[i].particle) continue;
+        const Vec3 twist = loop.square[k] * Vec3{y[0], y[1], y[2]};
+        again += dot(twist, turned_by(constants_[i], live_.bodies[i], twist));
+        y += 3;
+    }
+    return again > told;
+}
+
+/// Whether rows that hardly resist a motion would soon, so that they are needed and repeat nothing: those of a lift that lies
+/// nearly flat, or of a toggle. In a mechanism that is put together slightly off they never do. Along the motion d that is
+/// held, |d| = 1, what the combination s of rows resists grows by sᵀ Ġ d, to second order of the way.
+bool RigidSystem::bends(const Loop& loop) const {
+    std::vector<BodyState> along(live_.bodies.begin(), live_.bodies.end());
+    for (BodyState& body : along) body.velocity = body.angular_velocity = {};
+    const double* y = loop.repeated.data() + loop.weakness.size();
+    double square = 0.0, extent = 0.0;
+    for (std::size_t k = 0; k < loop.members.size(); ++k) {
+        const int i = constrained_[loop.members[k]];
+        along[i].velocity = {y[0], y[1], y[2]};
+        square += dot(along[i].velocity, along[i].velocity);
+        extent += loop.square[k] / static_cast<double>(loop.members.size());
+        y += 3;
+        if (constants_[i].particle) continue;
+        along[i].angular_velocity = {y[0], y[1], y[2]};
+        square += loop.square[k] * dot(along[i].angular_velocity, along[i].angular_velocity);
+        y += 3;
+    }
+    double grows = 0.0, size = 0.0, bias[6];
+    std::size_t row = 0;
+    for (const int k : loop.blocks) {
+        joints_.bias(k, along, bias);
+        for (int i = 0; i < joints_.blocks()[k].size; ++i, ++row) {
+            grows += loop.repeated[row] * bias[i];
+            size += loop.weakness[row] * loop.repeated[row] * loop.repeated[row];
+        }
+    }
+    const double count = static_cast<double>(loop.blocks.size());
+    size /= NEARLY / (count * count);
+    if (!(square > method_.floor * size)) return false;  // so flat that rounding decides
+    return std::sqrt(extent) * std::abs(grows) > BENT / (count * count) * square * std::sqrt(size);
 }
 
 /// 2 J of what motors and springs alone would set in motion.

@@ -169,6 +169,8 @@ private:
     double driven(const Loop& loop);
     bool find_repeated(Loop& loop);
     bool stops(const RigidState::Watched& seen, double motion) const noexcept;
+    bool stands(Loop& loop, const RigidState::Watched& seen, double held, double load);
+    bool bends(const Loop& loop) const;
     void note_locked(const Loop& loop);
     void note_projected();
     std::vector<double> shares(const Loop& loop) const;
