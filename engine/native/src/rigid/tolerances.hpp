@@ -98,12 +98,13 @@ inline constexpr std::int64_t SOON = 8,
 inline constexpr double LITTLE = 1e-2;    // of what is too much: then the next look has twice the time
 inline constexpr double TAKEN = 0.25;     // of the largest energy of motion, by rows that should take none
 inline constexpr double AT_REST =
-    1e-6;                             // of what the loads of a step would set in motion: such motion is none
-inline constexpr double HELD = 0.1;   // of what the loads would set in motion
+    1e-6;                            // of what the loads of a step would set in motion: such motion is none
+inline constexpr double HELD = 0.1;  // of what the loads would set in motion
 inline constexpr double REPEATED = 1e-4;  // of what the loads would set in motion
 inline constexpr double STANDS = 3.0;     // times the speed that a loop has had
-inline constexpr double POINT = 1e-6;  // of the mean arm: shorter ones are rounding
-inline constexpr double BENT = 0.2;    // over n² of a loop's joints: 1.8 and more in lifts, .02 where an axis is off by 1e-2
+inline constexpr double POINT = 1e-6;     // of the mean arm: shorter ones are rounding
+inline constexpr double BENT =
+    0.2;  // over n² of a loop's joints: 1.8 and more in lifts, .02 where an axis is off by 1e-2
 inline constexpr double TOLD = 1e-3;  // of the largest share: a joint that is named
 }  // namespace tolerances::rigid_locking
 
