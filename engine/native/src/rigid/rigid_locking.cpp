@@ -224,7 +224,8 @@ void RigidSystem::watch(Loop& loop, RigidState::Watched& seen) {
     ++live_.looks;
     if (!find_repeated(loop)) return;
 
-    double work = 0.0, held = 0.0, load = driven(loop);
+    double work = 0.0, load = driven(loop);
+    const double held = loop.held_back(constants_, live_.bodies, constrained_);
     const int row_blocks = static_cast<int>(joints_.blocks().size());
     const double* y =
         loop.repeated.data() + loop.weakness.size();  // minus the change of the probe's velocities
@@ -235,14 +236,12 @@ void RigidSystem::watch(Loop& loop, RigidState::Watched& seen) {
         const BodyState& s = live_.bodies[i];
         const Vec3 v{x[0], x[1], x[2]}, impulse{-y[0], -y[1], -y[2]}, given = kick(i);
         work += 0.5 * dot(impulse, v + s.velocity);
-        held += dot(impulse, impulse) / body.mass;
         load += body.mass * dot(given, given);
         y += 3;
         if (body.particle) continue;
         const Vec3 w{x[3], x[4], x[5]}, twist = -loop.square[k] * Vec3{y[0], y[1], y[2]},
                                         given_twist = h_ * body.torque;
         work += 0.5 * dot(twist, w + s.angular_velocity);
-        held += dot(twist, turned_by(body, s, twist));
         load += dot(given_twist, turned_by(body, s, given_twist));
         y += 3;
     }
@@ -258,67 +257,79 @@ void RigidSystem::watch(Loop& loop, RigidState::Watched& seen) {
     seen.next = live_.step + seen.wait;
     const bool took = std::abs(seen.work) > most && seen.motion > AT_REST * load;
     const bool holds = seen.load > 0.0 && seen.held > HELD * seen.load;
-    if (!took && !holds && !stands(loop, seen, held, load)) return;
-    if (!bends(loop)) return note_locked(loop);
+    // Near its equilibrium little pulls a mechanism: what is held back of that would be seen by now, and nothing of it is.
+    const double steps = static_cast<double>(live_.step);
+    const double told = std::max(REPEATED * REPEATED * load, STANDS * STANDS * seen.motion / (steps * steps));
+    if (!took && !holds) {
+        if (!(held > told)) return;
+        loop.repeat();
+        if (!(loop.held_back(constants_, live_.bodies, constrained_) > told)) return;
+    }
+    if (!loop.bends(joints_, constants_, {live_.bodies.begin(), live_.bodies.end()}, constrained_,
+                    method_.floor))
+        return note_locked(loop);
     seen.work = seen.held = seen.load = 0.0;
 }
 
-/// Near its equilibrium little pulls a mechanism: whether what such rows hold back, 2 J in a step, would be seen by now, and
-/// nothing of it is. What rows that are all needed hold is a small part of it, and of that part a small part again.
-bool RigidSystem::stands(Loop& loop, const RigidState::Watched& seen, double held, double load) {
-    const double steps = static_cast<double>(live_.step);
-    const double told = std::max(REPEATED * REPEATED * load, STANDS * STANDS * seen.motion / (steps * steps));
-    if (!(held > told)) return false;
-    for (std::size_t row = 0; row < loop.repeated.size(); ++row)
-        loop.repeated[row] *= row < loop.weakness.size() ? loop.weakness[row] : 0.0;
-    loop.probe.solve(loop.repeated.data());
-    const double* y = loop.repeated.data() + loop.weakness.size();
-    double again = 0.0;
-    for (std::size_t k = 0; k < loop.members.size(); ++k) {
-        const int i = constrained_[loop.members[k]];
+/// Of what hardly resists, the part that hardly resists: what rows that are all needed hold is a small part of it each time.
+void RigidSystem::Loop::repeat() {
+    for (std::size_t row = 0; row < repeated.size(); ++row)
+        repeated[row] *= row < weakness.size() ? weakness[row] : 0.0;
+    probe.solve(repeated.data());
+}
+
+/// 2 J of the velocities that it holds back in a step.
+double RigidSystem::Loop::held_back(const LargeArray<BodyConstants>& constants,
+                                    std::span<const BodyState> bodies,
+                                    const std::vector<int>& constrained) const {
+    const double* y = repeated.data() + weakness.size();
+    double held = 0.0;
+    for (std::size_t k = 0; k < members.size(); ++k) {
+        const int i = constrained[members[k]];
         const Vec3 impulse{y[0], y[1], y[2]};
-        again += dot(impulse, impulse) / constants_[i].mass;
+        held += dot(impulse, impulse) / constants[i].mass;
         y += 3;
-        if (constants_[i].particle) continue;
-        const Vec3 twist = loop.square[k] * Vec3{y[0], y[1], y[2]};
-        again += dot(twist, turned_by(constants_[i], live_.bodies[i], twist));
+        if (constants[i].particle) continue;
+        const Vec3 twist = square[k] * Vec3{y[0], y[1], y[2]};
+        held += dot(twist, turned_by(constants[i], bodies[i], twist));
         y += 3;
     }
-    return again > told;
+    return held;
 }
 
 /// Whether rows that hardly resist a motion would soon, so that they are needed and repeat nothing: those of a lift that lies
 /// nearly flat, or of a toggle. In a mechanism that is put together slightly off they never do. Along the motion d that is
 /// held, |d| = 1, what the combination s of rows resists grows by sᵀ Ġ d, to second order of the way.
-bool RigidSystem::bends(const Loop& loop) const {
-    std::vector<BodyState> along(live_.bodies.begin(), live_.bodies.end());
+bool RigidSystem::Loop::bends(const JointSet& joints, const LargeArray<BodyConstants>& constants,
+                              std::vector<BodyState> along, const std::vector<int>& constrained,
+                              double floor) const {
     for (BodyState& body : along) body.velocity = body.angular_velocity = {};
-    const double* y = loop.repeated.data() + loop.weakness.size();
-    double square = 0.0, extent = 0.0;
-    for (std::size_t k = 0; k < loop.members.size(); ++k) {
-        const int i = constrained_[loop.members[k]];
-        along[i].velocity = {y[0], y[1], y[2]};
-        square += dot(along[i].velocity, along[i].velocity);
-        extent += loop.square[k] / static_cast<double>(loop.members.size());
+    const double* y = repeated.data() + weakness.size();
+    double motion = 0.0, extent = 0.0;
+    for (std::size_t k = 0; k < members.size(); ++k) {
+        BodyState& body = along[constrained[members[k]]];
+        body.velocity = {y[0], y[1], y[2]};
+        motion += dot(body.velocity, body.velocity);
+        extent += square[k] / static_cast<double>(members.size());
         y += 3;
-        if (constants_[i].particle) continue;
-        along[i].angular_velocity = {y[0], y[1], y[2]};
-        square += loop.square[k] * dot(along[i].angular_velocity, along[i].angular_velocity);
+        if (constants[constrained[members[k]]].particle) continue;
+        body.angular_velocity = {y[0], y[1], y[2]};
+        motion += square[k] * dot(body.angular_velocity, body.angular_velocity);
         y += 3;
     }
     double grows = 0.0, size = 0.0, bias[6];
     std::size_t row = 0;
-    for (const int k : loop.blocks) {
-        joints_.bias(k, along, bias);
-        for (int i = 0; i < joints_.blocks()[k].size; ++i, ++row) {
-            grows += loop.repeated[row] * bias[i];
-            size += loop.weakness[row] * loop.repeated[row] * loop.repeated[row];
+    for (const int k : blocks) {
+        joints.bias(k, along, bias);
+        for (int i = 0; i < joints.blocks()[k].size; ++i, ++row) {
+            grows += repeated[row] * bias[i];
+            size += weakness[row] * repeated[row] * repeated[row];
         }
     }
-    const double count = static_cast<double>(loop.blocks.size());
+    const double count = static_cast<double>(blocks.size());
     size /= NEARLY / (count * count);
-    if (!(square > method_.floor * size)) return false;  // so flat that rounding decides
-    return std::sqrt(extent) * std::abs(grows) > BENT / (count * count) * square * std::sqrt(size);
+    if (!(motion > floor * size)) return false;  // so flat that rounding decides
+    return std::sqrt(extent) * std::abs(grows) > BENT / (count * count) * motion * std::sqrt(size);
 }
 
 /// 2 J of what motors and springs alone would set in motion.

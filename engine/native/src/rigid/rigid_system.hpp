@@ -169,8 +169,6 @@ private:
     double driven(const Loop& loop);
     bool find_repeated(Loop& loop);
     bool stops(const RigidState::Watched& seen, double motion) const noexcept;
-    bool stands(Loop& loop, const RigidState::Watched& seen, double held, double load);
-    bool bends(const Loop& loop) const;
     void note_locked(const Loop& loop);
     void note_projected();
     std::vector<double> shares(const Loop& loop) const;
@@ -386,6 +384,12 @@ private:
         BlockLdlt probe;                                 // matrix_ of these with rigid rows
         bool may_lock = false;                           // whether its redundant rows are watched
         std::vector<double> weakness, repeated, square;  // per row; per unknown; per member, m²
+
+        void repeat();
+        double held_back(const LargeArray<BodyConstants>& constants, std::span<const BodyState> bodies,
+                         const std::vector<int>& constrained) const;
+        bool bends(const JointSet& joints, const LargeArray<BodyConstants>& constants,
+                   std::vector<BodyState> along, const std::vector<int>& constrained, double floor) const;
     };
     std::vector<Loop> loops_;
     std::vector<Vec6> push_;  // per constrained body: of drives
