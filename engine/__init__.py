@@ -97,7 +97,7 @@ from spook_tracker.engine.observe import (
     Violation,
 )
 from spook_tracker.engine.program import Program, StageChoice
-from spook_tracker.engine.result import Broken, Result, SimulationFailed
+from spook_tracker.engine.result import Books, Broken, Result, SimulationFailed
 from spook_tracker.engine.run import Run, start
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import (
@@ -125,6 +125,7 @@ __all__ = [
     "AngularVelocity",
     "Ball",
     "Body",
+    "Books",
     "Box",
     "Broken",
     "BuildInfo",

@@ -39,6 +39,20 @@ class Broken:
         return f"{self.joint!r} broke in step {self.step} ({self.time:.4g} s) under {load}"
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Books:
+    """Where a run's energy came from and went: T + V of its end is that of its start + energy_in − dissipated + unexplained.
+
+    `engine/books.py` says what counts as which.
+    """
+
+    energy_in: float  # J, by loads, motors, and bodies and surfaces that are led
+    dissipated: float  # J, by contacts, limits, friction, viscosity, fluids and motors that brake
+    unexplained: float  # J, by neither: what the method errs by; less than 0 is lost
+    stopped_impacts: int  # that ended without a rebound
+    largest_turn: float  # rad, of any body in a step
+
+
 SHORT = 2.0  # s: a run that took longer is not run again just because a cell ends with it
 
 
@@ -61,7 +75,8 @@ class Result:
     orientation, velocity, angular velocity.
     An "unsettled" run did all its steps, but in some of them the solver left more than
     `Method.unsettled_residual`: values are kept, `failure` says where, `residual` how much; a later step rests
-    on a wrong one. So did one by a composition that made more than a twentieth of the largest kinetic energy out of nothing.
+    on a wrong one. So did one that made more than a twentieth of the largest kinetic energy out of nothing, by a composition or
+    by corrections; with its books kept, by whatever method.
     `counters` are exact integers, equal on every machine: steps, rows_assembled, block_operations, ...
     `state_hash` is a hash of the bits of the final state.
     `broken` lists the joints and wires that broke, in that order.
@@ -84,6 +99,7 @@ class Result:
     cpu_seconds: float = 0.0  # processor time of the native loop; 0 where it cannot be told
     residual: float = 0.0  # largest row residual [m/s] a solve stopped at
     broken: tuple[Broken, ...] = ()
+    books: Books | None = None  # where `simulate` was asked to keep them
     origin: Origin | None = None  # of what `simulate` gave
 
     def __getitem__(self, name: str) -> Any:
@@ -107,7 +123,7 @@ class Result:
     def __repr__(self) -> str:
         seen = ", ".join(f"{name} {value.shape}" for name, value in self.observables.items())
         rows = [self.failure or self.status, f"{self.steps} steps of {self.time_step:.4g} s"]
-        rows += [str(joint) for joint in self.broken]
+        rows += [str(joint) for joint in self.broken] + ([str(self.books)] if self.books else [])
         return f"<Result: {'; '.join([*rows, seen or 'nothing observed'])}>"
 
     def _repr_html_(self) -> str:

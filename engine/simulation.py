@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from spook_tracker.engine import check
+from spook_tracker.engine.books import kept, traces
 from spook_tracker.engine.compiler import NOTHING, compile
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.method import PLAIN, Method
@@ -73,16 +74,20 @@ def simulate(
     observe: Mapping[str, Observable] = NOTHING,
     time_limit: float | None = None,
     time_stages: bool = False,
+    books: bool = False,
 ) -> Result:
     """Run a scene for `duration` [s] or a number of `steps`, exactly one of them, wholly in native code.
 
     A duration that is no whole number of time steps [s] is rounded to the nearest. `time_limit` is wall time
-    [s], compiling included. Raises SceneError or MethodError with one sentence; a run that diverges is a Result that says so.
+    [s], compiling included. With `books` every step is traced for `Result.books`: what energy came in, was dissipated, or is
+    explained by neither; a run that makes much of it out of nothing is "unsettled". Raises SceneError or MethodError with one sentence; a run that diverges is a Result that says so.
     """
     if isinstance(scene, ModelRun):
         return _of_model(scene, time_step, duration, method, time_limit)
     limit = check.wall_time(time_limit)
     begun = time.monotonic()
+    if books:
+        observe = {**observe, **traces(scene)}
     try:
         with until(begun + limit) if limit else nullcontext():
             prepared = prepare(
@@ -91,6 +96,8 @@ def simulate(
     except TimeoutError:
         return _not_compiled(scene, time_step, observe, limit, time.monotonic() - begun)
     result = prepared.program.run(prepared.steps, time_limit, time_stages, since=begun)
+    if books:
+        result = kept(scene, method, result)
     return replace(result, origin=Origin(scene=scene, method=method, simulate=simulate))
 
 
