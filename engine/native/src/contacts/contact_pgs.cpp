@@ -262,8 +262,8 @@ ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
     }
     if (report.finite && passes_other_ends(system, system.rows.size(), options_.time_step))
         return {{.ends_passed = true}};
-    const bool unfinished = report.finite && !report.converged && (state_.by_rows || quality_.body >= 0) &&
-                            !system.rows.empty() && system.rows.size() + points_.size() <= few_rows;
+    const bool unfinished = report.finite && !report.converged && !system.rows.empty() &&
+                            system.rows.size() + points_.size() <= few_rows;
     state_.by_rows = state_.by_rows || unfinished;
     if (unfinished) return {{}, true};
     state_.counters.unsettled += !report.converged;

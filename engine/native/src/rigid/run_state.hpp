@@ -34,7 +34,6 @@ struct RigidState {
     std::int64_t moved = 0;  // steps of h after which positions are known
     Unsettled unsettled;
     int whirling = -1;     // a body that tension has made turn by a radian a step
-    bool by_rows = false;  // PGS over joints alone has failed: few are solved directly
     Sleep sleep;
     std::uint64_t stopped = 0;  // stops of joints whose rebound ended at their other end
     // Velocities at mid-step:

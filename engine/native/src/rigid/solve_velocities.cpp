@@ -154,15 +154,13 @@ bool RigidSystem::solve_joints() {
     return report.finite && settle_joints();
 }
 
-/// Joints that iterations have left further off than the method allows are solved directly where few are connected, and from
-/// then on wherever iterations do not settle: what many of these leave adds up.
+/// Joints that iterations do not settle are solved directly where few are connected: what they leave in each step adds up.
 bool RigidSystem::settle_joints() {
     const Islands* islands = nullptr;
     std::vector<std::size_t>& rows = scratch_.rows;
     while (true) {
         const RowsResidual worst = rows_residual(mixed_, {}, method_.friction);
-        live_.by_rows = live_.by_rows || worst.residual > pgs_tolerance();
-        if (!live_.by_rows || !(worst.residual > method_.residual_tolerance)) return true;
+        if (!(worst.residual > method_.residual_tolerance)) return true;
         const auto island = [&](const RowBlock& block) {
             return islands->of_body[std::max(block.first, block.second)];
         };
