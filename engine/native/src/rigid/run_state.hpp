@@ -33,7 +33,7 @@ struct RigidState {
     std::int64_t step = 0;   // steps of h begun
     std::int64_t moved = 0;  // steps of h after which positions are known
     Unsettled unsettled;
-    int whirling = -1;     // a body that tension has made turn by a radian a step
+    int whirling = -1;  // a body that tension has made turn by a radian a step
     Sleep sleep;
     std::uint64_t stopped = 0;  // stops of joints whose rebound ended at their other end
     // Velocities at mid-step:
