@@ -77,12 +77,32 @@ def browser(chrome: str, driver: str, *, trace: str = "") -> Iterator[Any]:
     started = {"preexec_fn": _with_its_parent} if leashed else {}
     opened = webdriver.Chrome(options=options, service=Service(driver, popen_kw=started))
     try:
-        opened.execute_cdp_cmd("Network.enable", {})
-        nothing = {"offline": True, "latency": 0, "downloadThroughput": 0, "uploadThroughput": 0}
-        opened.execute_cdp_cmd("Network.emulateNetworkConditions", nothing)
+        _cut_off(opened)
         yield opened
     finally:
         opened.quit()
+
+
+def _cut_off(driver: Any) -> None:
+    """From every network."""
+    driver.execute_cdp_cmd("Network.enable", {})
+    nothing = {"offline": True, "latency": 0, "downloadThroughput": 0, "uploadThroughput": 0}
+    driver.execute_cdp_cmd("Network.emulateNetworkConditions", nothing)
+
+
+def new_tab(driver: Any) -> None:
+    """One tab, as in a browser that was just started: nothing kept, nothing logged, no size or theme set."""
+    old = driver.window_handles
+    driver.switch_to.new_window("tab")
+    new = driver.current_window_handle
+    for handle in old:
+        driver.switch_to.window(handle)
+        driver.close()
+    driver.switch_to.window(new)
+    everything = {"origin": "file://", "storageTypes": "all"}
+    driver.execute_cdp_cmd("Storage.clearDataForOrigin", everything)
+    driver.get_log("browser")  # what was read is gone
+    _cut_off(driver)
 
 
 def look(driver: Any, *, width: int = 1280, height: int = 900, dark: bool = False) -> None:

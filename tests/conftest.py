@@ -16,7 +16,7 @@ from sqlalchemy.orm import Session
 from spook_tracker.tracker.cli.console import PIPE_WIDTH
 from spook_tracker.tracker.store.database import open_database
 from tests import postgresql
-from tests.browser import MISSING, browser, programs
+from tests.browser import MISSING, browser, new_tab, programs
 from tests.skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401 (hooks)
 
 # A shell starts what runs behind it deaf to the keyboard; what tests start is to hear it.
@@ -113,15 +113,22 @@ def session(migrated_url: str) -> Iterator[Session]:
     engine.dispose()
 
 
-@pytest.fixture(scope="module")
-def driver() -> Iterator[Any]:
-    """A browser of this file's own."""
+@pytest.fixture(scope="session")
+def chromium() -> Iterator[Any]:
+    """The browser of this session: to start one takes longer than most of what is asked of it."""
     found = programs()
     if found is None:
         pytest.skip(MISSING)
     with browser(*found) as opened:
         opened.set_script_timeout(90)
         yield opened
+
+
+@pytest.fixture(scope="module")
+def driver(chromium: Any) -> Any:
+    """The browser in a tab of this file's own, which knows nothing of other files'."""
+    new_tab(chromium)
+    return chromium
 
 
 @pytest.fixture

@@ -24,7 +24,7 @@ from spook_tracker.tracker.store import models
 from spook_tracker.tracker.store.database import open_database
 from spook_tracker.tracker.store.record import record
 from spook_tracker.tracker.store.views import ABOUT
-from tests.browser import MISSING, browser, look, programs, wait_for
+from tests.browser import look, wait_for
 from tests.run_documents import run
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -146,35 +146,31 @@ def test_the_site_builds_without_a_warning(site: Path) -> None:
         assert not re.search(r'(src|href)="https?://[^"]*\.(js|css)', page.read_text(encoding="utf-8")), page
 
 
-def test_the_documentation_is_searched_from_a_folder(site: Path) -> None:
+def test_the_documentation_is_searched_from_a_folder(site: Path, driver: Any) -> None:
     """Words in any order find the section, also in pages that are made from the code; the passage marks them."""
-    if programs() is None:
-        pytest.skip(MISSING)
-
-    with browser(*programs()) as driver:
-        look(driver)
-        driver.get((site / "how-to" / "ci.html").as_uri())
-        driver.find_element("css selector", "[data-bs-target='#mkdocs_search_modal']").click()
-        wait_for(driver, "document.activeElement.id === 'mkdocs-search-query'")
-        wait_for(driver, "typeof SECTIONS !== 'undefined'")
-        box = driver.find_element("id", "mkdocs-search-query")
-        box.send_keys("first_bad commit BISECT")
-        nothing = driver.find_element("css selector", "#mkdocs-search-results p").text
-        box.clear()
-        box.send_keys("commit bisect BAD")
-        results = driver.find_elements("css selector", "#mkdocs-search-results a")
-        links = [link.get_attribute("href") for link in results]
-        marks = {
-            mark.text.lower() for mark in driver.find_elements("css selector", "#mkdocs-search-results mark")
-        }
-        broken = [entry["message"] for entry in driver.get_log("browser") if entry["level"] == "SEVERE"]
-        driver.get(links[0])
-        there = driver.execute_script(
-            "return !!document.getElementById(decodeURIComponent(location.hash.slice(1)))"
-        )
-        look(driver, width=600)
-        driver.get((site / "detectors.html").as_uri())
-        wide = driver.execute_script("return document.documentElement.scrollWidth")
+    look(driver)
+    driver.get((site / "how-to" / "ci.html").as_uri())
+    driver.find_element("css selector", "[data-bs-target='#mkdocs_search_modal']").click()
+    wait_for(driver, "document.activeElement.id === 'mkdocs-search-query'")
+    wait_for(driver, "typeof SECTIONS !== 'undefined'")
+    box = driver.find_element("id", "mkdocs-search-query")
+    box.send_keys("first_bad commit BISECT")
+    nothing = driver.find_element("css selector", "#mkdocs-search-results p").text
+    box.clear()
+    box.send_keys("commit bisect BAD")
+    results = driver.find_elements("css selector", "#mkdocs-search-results a")
+    links = [link.get_attribute("href") for link in results]
+    marks = {
+        mark.text.lower() for mark in driver.find_elements("css selector", "#mkdocs-search-results mark")
+    }
+    broken = [entry["message"] for entry in driver.get_log("browser") if entry["level"] == "SEVERE"]
+    driver.get(links[0])
+    there = driver.execute_script(
+        "return !!document.getElementById(decodeURIComponent(location.hash.slice(1)))"
+    )
+    look(driver, width=600)
+    driver.get((site / "detectors.html").as_uri())
+    wide = driver.execute_script("return document.documentElement.scrollWidth")
 
     assert nothing == "0 sections"
     assert {"how-to/own-commits.html", "reference/commands.html"} <= {

@@ -5,9 +5,9 @@ from __future__ import annotations
 import html
 import re
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -31,7 +31,7 @@ from spook_tracker.engine import (
 )
 from spook_tracker.engine.shapes import Box, Plane
 from spook_tracker.tracker.document.errors import TrackerError, UnknownName
-from tests.browser import MISSING, arrive, browser, programs, wait_for
+from tests.browser import arrive, wait_for
 from tests.site_scripts import handed_over
 
 BOX = RigidBody(
@@ -50,55 +50,47 @@ def fallen() -> Result:
     return simulate(SCENE, time_step=1 / 120, duration=2.0, observe=observe)
 
 
-@pytest.fixture(scope="module")
-def chrome() -> Iterator[object]:
-    if programs() is None:
-        pytest.skip(MISSING)
-    with browser(*programs()) as driver:
-        yield driver
-
-
 def test_a_run_is_replayed_in_a_browser_without_any_other_file(
-    fallen: Result, chrome: object, tmp_path: Path
+    fallen: Result, driver: Any, tmp_path: Path
 ) -> None:
     """Offline, from one file: the box ends where the engine's own trace has it, to the digits that are stored."""
     shown = fallen.show()
     shown.save(tmp_path / "run.html")
 
-    arrive(chrome, (tmp_path / "run.html").as_uri())
-    wait_for(chrome, "!!document.querySelector('figure.replay').player")
+    arrive(driver, (tmp_path / "run.html").as_uri())
+    wait_for(driver, "!!document.querySelector('figure.replay').player")
     movie = "document.querySelector('figure.replay').player.movie"
-    ends = chrome.execute_script(f"return Array.from({movie}.position.slice(-3))")
-    severe = [entry for entry in chrome.get_log("browser") if entry["level"] == "SEVERE"]
+    ends = driver.execute_script(f"return Array.from({movie}.position.slice(-3))")
+    severe = [entry for entry in driver.get_log("browser") if entry["level"] == "SEVERE"]
 
     assert ends == pytest.approx(fallen["place"][-1], abs=2.0 / 65534)
-    assert chrome.execute_script(f"return {movie}.step * ({movie}.count - 1)") == pytest.approx(2.0)
-    assert chrome.execute_script("return document.querySelectorAll('canvas').length") >= 1
+    assert driver.execute_script(f"return {movie}.step * ({movie}.count - 1)") == pytest.approx(2.0)
+    assert driver.execute_script("return document.querySelectorAll('canvas').length") >= 1
     assert severe == []
     assert not re.search(r'(?:src|href)="', shown.html), "nothing is loaded from elsewhere"
     assert len(shown.html) < 400_000
 
 
 def test_what_a_cell_ends_with_stands_in_a_frame_of_its_own(
-    fallen: Result, chrome: object, tmp_path: Path
+    fallen: Result, driver: Any, tmp_path: Path
 ) -> None:
     """A scene at its start, and a run; a notebook's page holds both, and its own style is left alone."""
     page = f"<!doctype html><p id=own>ours</p>{SCENE._repr_html_()}{fallen._repr_html_()}"
     (tmp_path / "page.html").write_text(page, encoding="utf-8")
 
-    chrome.get((tmp_path / "page.html").as_uri())
-    frames = chrome.find_elements("css selector", "iframe")
+    driver.get((tmp_path / "page.html").as_uri())
+    frames = driver.find_elements("css selector", "iframe")
     for frame in frames:
-        chrome.switch_to.frame(frame)
-        chrome.execute_script("document.querySelector('figure.replay').scrollIntoView()")
-        wait_for(chrome, "!!document.querySelector('figure.replay').player")
-        bodies = chrome.execute_script("return document.querySelector('figure.replay').player.movie.bodies")
-        chrome.switch_to.default_content()
+        driver.switch_to.frame(frame)
+        driver.execute_script("document.querySelector('figure.replay').scrollIntoView()")
+        wait_for(driver, "!!document.querySelector('figure.replay').player")
+        bodies = driver.execute_script("return document.querySelector('figure.replay').player.movie.bodies")
+        driver.switch_to.default_content()
         assert bodies == 2
 
     assert len(frames) == 2
-    assert chrome.execute_script("return getComputedStyle(document.getElementById('own')).fontFamily") != (
-        chrome.execute_script("return getComputedStyle(document.documentElement).getPropertyValue('--sans')")
+    assert driver.execute_script("return getComputedStyle(document.getElementById('own')).fontFamily") != (
+        driver.execute_script("return getComputedStyle(document.documentElement).getPropertyValue('--sans')")
     )
 
 
