@@ -4,7 +4,7 @@
 
 Synthetic runs (`tests/synthetic_history.py`) stand for the nights, 0.3 MB of JSON each, most of it figures. Times are of
 the processor; beside them stands what reading the same files as plain JSON takes, which nothing can be quicker than.
-Ends with 1 where a thousand nights take more than ten seconds.
+Ends with 1 where a thousand nights take more than ten seconds, on another machine as much more as Python takes there.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import msgspec
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
+from bench.floors import here
 from spook_tracker.tracker.store.transfer import write_document
 from tests.synthetic_history import decade
 
@@ -48,8 +49,9 @@ def main() -> int:
         took = used.ru_utime + used.ru_stime
     print(said.stdout.decode().strip())
     print(f"{took:.1f} s of processor time, start included; {plain:.1f} s is what reading plain JSON takes")
-    if took > MOST * nights:
-        print(f"more than {MOST * nights:.0f} s of the processor", file=sys.stderr)
+    most = here(MOST * nights, "interpreter")
+    if took > most:
+        print(f"more than {most:.1f} s of the processor", file=sys.stderr)
         return 1
     return 0
 

@@ -9,7 +9,7 @@ beside the same ones by the rows of space, interleaved, and rods on hinges besid
 (`rigid_loops.cpp`), which must end in the same state.
 
 Limits, with exit code 1: at its longest a chain costs no more per body than GROWTH times its cheapest length, and
-MOST ns. The second is a time of this machine and loose elsewhere. The first holds steps and what a run keeps of them to
+MOST ns, on another machine as much more as arithmetic takes there (`bench/floors.py`). The first holds steps and what a run keeps of them to
 take them back: 0.8 kB a link are read once they have left the caches, and copied once in sixteen steps. A ring, whose
 factor leaves the caches as well, grows by RING at most, what a hinge of a door and a box of a stack costs by GROWTH.
 Numbers of a plane are FASTER times as fast as rows of space, and no slower than HAND times the loop by hand: what it
@@ -23,6 +23,7 @@ import argparse
 import ctypes
 import itertools
 import math
+import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -31,6 +32,9 @@ from pathlib import Path
 
 from bench_particles import build_loops
 
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+from bench.floors import here
 from spook_tracker.engine import WORLD, Box, Hinge, Lock, Method, Plane, Program, RigidBody, Scene, compile
 from spook_tracker.scalar_tests.multibody import four_bars
 
@@ -218,9 +222,10 @@ def main() -> None:
         "chain of locked boxes", "body", chain, tuple(10**k for k in range(1, 6) if 10**k <= largest)
     )
     missed = grown(times, GROWTH)
-    late = times[-1] > MOST
+    most = here(MOST, "arithmetic")
+    late = times[-1] > most
     missed = missed or late
-    print(f"  the longest: {times[-1]:.0f} ns (limit {MOST:g}){'  MISSED' if late else ''}", flush=True)
+    print(f"  the longest: {times[-1]:.0f} ns (limit {most:.0f}){'  MISSED' if late else ''}", flush=True)
     rings = tuple(10**k for k in range(1, 5) if 10**k <= largest)
     missed = grown(report("ring of locked boxes", "body", ring, rings), RING) or missed
     missed = grown(report("door", "hinge", door, (1, 2, 10, 50, 200)), GROWTH) or missed

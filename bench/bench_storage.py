@@ -4,7 +4,7 @@ that people wait for: two versions side by side, one series over all nights, all
     python bench/bench_storage.py [--samples 1000000] [--db URL]
 
 The default is a SQLite file in a temporary folder. Ends with 1 where `tracker compare` among these samples, or `tracker
-trend` of a thousand noisy nights with a change point, takes more than 0.3 s of the processor, start-up included.
+trend` of a thousand noisy nights with a change point, takes more than 0.3 s of the processor, start-up included; on another machine as much more as Python takes there.
 """
 
 from __future__ import annotations
@@ -18,11 +18,15 @@ import tempfile
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 
 import msgspec
 from sqlalchemy import text
 from sqlalchemy.orm import Session
 
+sys.path.insert(0, str(Path(__file__).parent.parent))
+
+from bench.floors import here
 from spook_tracker.tracker.document.run_document import (
     EngineVersion,
     Machine,
@@ -179,7 +183,7 @@ def main() -> int:
             for number in range(1000):
                 record(session, noisy(number, time_of, chance))
         engine.dispose()
-        over = []
+        over, most = [], here(MOST, "interpreter")
         for words in (
             ("compare", "--engine", "spook", "previous", "latest"),
             ("trend", "test7", "metric7"),
@@ -187,9 +191,12 @@ def main() -> int:
         ):
             said = " ".join(words)
             taken = [command(f"tracker {said}, with its start", *words, "--db", url) for _ in range(2)]
-            over += [f"tracker {said}: {min(taken):.2f} s" for _ in (1,) if min(taken) > MOST]
+            over += [f"tracker {said}: {min(taken):.2f} s" for _ in (1,) if min(taken) > most]
     if over:
-        print(f"more than {MOST} s of the processor: {'; '.join(over)}", file=sys.stderr)
+        print(
+            f"more than {here(MOST, 'interpreter'):.2f} s of the processor: {'; '.join(over)}",
+            file=sys.stderr,
+        )
     return 1 if over else 0
 
 
