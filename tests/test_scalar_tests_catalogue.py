@@ -15,6 +15,7 @@ import pytest
 from spook_tracker.engine import PLAIN, Method, explain, protocol
 from spook_tracker.scalar_tests.case import Configuration, Metric, ScalarTest
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.tracker.document.run_document import keeps_limit
 from spook_tracker.tracker.measure.others import asked_of
 
 PRINTED = {  # thesis, section 4.2: limit and unit of the seven continuous tests
@@ -71,6 +72,17 @@ def test_set_points_lie_inside_their_limits(name: str, test: ScalarTest) -> None
 def test_no_limit_accepts_what_is_not_a_number(name: str, test: ScalarTest) -> None:
     for metric in metrics(test):
         assert not any(metric.passes(value) for value in (math.nan, math.inf, -math.inf)), metric.name
+
+
+@every_test
+def test_a_limit_is_kept_or_not_alike_where_it_is_measured_and_where_it_is_read(
+    name: str, test: ScalarTest
+) -> None:
+    for metric in metrics(test):
+        ends = metric.limit if isinstance(metric.limit, tuple) else (metric.limit or 0.0,)
+        for end in (*ends, math.nan, math.inf):
+            for value in (end, -end, *(math.nextafter(s * end, way) for s in (1, -1) for way in (-9e9, 9e9))):
+                assert keeps_limit(value, metric.limit, metric.better) == metric.passes(value), metric.name
 
 
 @every_test
@@ -201,6 +213,21 @@ def test_printed_limits_are_for_every_engine() -> None:
 
     assert len(gates) >= 7
     assert all(metric.limit_kind == "physical" for metric in gates)
+
+
+def test_a_command_that_measures_imports_no_engine_itself() -> None:
+    """What measures does, in a process of its own: to import it takes a quarter of the command."""
+    program = (
+        "import sys; from spook_tracker.tracker.cli.main import main; main(['run', 'no_such_test', '--no-record'], "
+        "standalone_mode=False)"
+    )
+    seen = "print(*({'numpy', 'spook_tracker.engine', 'spook_tracker.scalar_tests'} & set(sys.modules)))"
+    told = f"import atexit, sys; atexit.register(lambda: {seen}); {program}"
+
+    shown = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=False)
+
+    assert "there is no test named 'no_such_test'" in shown.stderr
+    assert shown.stdout.split() == []
 
 
 def test_to_ask_one_test_imports_no_other() -> None:

@@ -132,7 +132,7 @@ HANGS = {
 def test_what_hangs_while_it_is_imported_is_ended_at_the_time_limit(
     act: str, where: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("spook_tracker.tracker.measure.workers.START_LIMIT", 1.0)
+    monkeypatch.setattr("spook_tracker.tracker.measure.apart.START_LIMIT", 1.0)
 
     done = gate(("run", "--time-limit", "2"), **WHERE[where](HANGS[act]))
 

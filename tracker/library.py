@@ -27,7 +27,8 @@ from spook_tracker.tracker.website.options import DEFAULTS, SiteOptions
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.measure.limits import Limits
-    from spook_tracker.tracker.measure.run import Progress, Questions, Request, Trigger
+    from spook_tracker.tracker.measure.questions import Questions
+    from spook_tracker.tracker.measure.request import Progress, Request, Trigger
     from spook_tracker.tracker.measure.timing import Repeats
     from spook_tracker.tracker.store.database import Session
     from spook_tracker.tracker.store.versions import RunInfo
@@ -117,7 +118,8 @@ def _asked(tests: Iterable[str], asked: RunOptions) -> tuple[Questions, Request]
     import difflib
     from dataclasses import fields
 
-    from spook_tracker.tracker.measure.run import Questions, Request
+    from spook_tracker.tracker.measure.questions import Questions
+    from spook_tracker.tracker.measure.request import Request
 
     for name in asked:
         if name not in RunOptions.__annotations__:
@@ -403,7 +405,7 @@ def nightly(
     document and with the findings as soon as they are there. `asked` as for `run`. An interrupted night is recorded
     as far as it came (Interrupted says which run), neither judged nor published.
     """
-    from spook_tracker.tracker.measure.run import Interrupted
+    from spook_tracker.tracker.measure.request import Interrupted
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.record import record as store
     from spook_tracker.tracker.store.retention import drop_old_figures

@@ -44,7 +44,7 @@ from spook_tracker.tracker.cli.storage import db, export, import_files, schema
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.run_document import RunDocument
     from spook_tracker.tracker.judge.tonight import Finding
-    from spook_tracker.tracker.measure.run import Request
+    from spook_tracker.tracker.measure.request import Request
     from spook_tracker.tracker.website.publish import Report
 
 FIRST_STEPS = """\
@@ -127,7 +127,7 @@ def run_command(
     """Run scalar tests (all, or those named) on one or more engines, print the pass tables and record the runs."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.measure.questions import EngineUnavailable
-    from spook_tracker.tracker.measure.run import Request
+    from spook_tracker.tracker.measure.request import Request
 
     refuse_unwritable(json_file, junit_file)
     request = Request(
@@ -211,7 +211,7 @@ def nightly(
     from spook_tracker.tracker.document.errors import TrackerError
     from spook_tracker.tracker.library import nightly as night
     from spook_tracker.tracker.measure.questions import EngineUnavailable
-    from spook_tracker.tracker.measure.run import Request
+    from spook_tracker.tracker.measure.request import Request
     from spook_tracker.tracker.website.folder import refuse_unusable
     from spook_tracker.tracker.website.page_mutants import read_mutants
 
@@ -418,7 +418,8 @@ def _measure(
     """Run what is asked for and record it, the database being opened first: no night is measured in vain."""
     from spook_tracker.tracker.cli.console import watching
     from spook_tracker.tracker.measure.apart import run
-    from spook_tracker.tracker.measure.run import Interrupted, Questions
+    from spook_tracker.tracker.measure.questions import Questions
+    from spook_tracker.tracker.measure.request import Interrupted
 
     engine = engine.strip()
     source = Questions(

@@ -92,6 +92,9 @@ MODELS = "model files named on the command line"
 
 def _model(context: click.Context, option: click.Parameter, files: tuple[str, ...]) -> None:
     """A model file is a catalogue of one test; `_catalogue`, which is read after this, adds it."""
+    context.meta[MODELS] = files
+    if not files:
+        return
     from spook_tracker.tracker.measure.model_files import is_model
 
     for file in files:
@@ -99,7 +102,6 @@ def _model(context: click.Context, option: click.Parameter, files: tuple[str, ..
             raise click.BadParameter(f"{file!r}: a comma parts catalogues; give the file another name")
         if not is_model(file):
             raise click.BadParameter(f"{file!r} is no model file: it ends in .xml, .mjcf, .urdf or .sdf")
-    context.meta[MODELS] = files
 
 
 def _catalogue(context: click.Context, option: click.Parameter, names: str) -> str:

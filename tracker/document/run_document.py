@@ -7,6 +7,7 @@ imported with nothing else.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, NamedTuple, Protocol, overload
@@ -111,6 +112,19 @@ class SeriesDefinition(Struct, frozen=True, kw_only=True):
     limit_kind: LimitKind = "method"
     set_point_kind: LimitKind = "method"
     sensitivity: Sensitivity | None = None  # of a value without a reference: what a difference of it means
+
+
+def keeps_limit(value: float, limit: float | tuple[float, float] | None, better: str) -> bool:
+    """Whether a value keeps a series' limit, as `scalar_tests.case.Metric.passes` says where it is measured."""
+    if not math.isfinite(value):
+        return False
+    if limit is None:
+        return True
+    if isinstance(limit, tuple):
+        return limit[0] <= value <= limit[1]
+    if better == "larger":
+        return value >= limit
+    return value <= limit if better == "smaller" else abs(value) <= limit
 
 
 class Again(Struct, frozen=True, kw_only=True):

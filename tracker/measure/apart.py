@@ -1,6 +1,6 @@
 """Measuring in a process of its own: what engines, catalogues and executors do to that process they do to no verdict.
 
-They are imported there and nowhere else. What comes back are lines of JSON: how far it is, and at the end one run
+They are imported there and nowhere else, our own as well. What comes back are lines of JSON: how far it is, and at the end one run
 document. A process that ends without having told one has measured nothing, whatever it ended with; the caller says
 so, judges what was told and nothing else, and ends whatever the process has left behind.
 """
@@ -24,16 +24,12 @@ from typing import IO, TextIO
 import msgspec
 
 import spook_tracker.tracker.measure.left_behind as left_behind
-import spook_tracker.tracker.measure.workers as crew
-from spook_tracker.scalar_tests.case import Metric
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.json_form import decode, encode
-from spook_tracker.tracker.document.run_document import RunDocument, Sample, SeriesDefinition
-from spook_tracker.tracker.measure import again
-from spook_tracker.tracker.measure import run as here
-from spook_tracker.tracker.measure.fitting import written
+from spook_tracker.tracker.document.run_document import RunDocument, keeps_limit
+from spook_tracker.tracker.measure.bounds import START_LIMIT
 from spook_tracker.tracker.measure.questions import EngineUnavailable, Questions, RunError
-from spook_tracker.tracker.measure.run import Interrupted, Progress, Request, Watch
+from spook_tracker.tracker.measure.request import Interrupted, Progress, Request, Watch
 
 LONGEST = 1 << 26  # bytes of a line: twice the largest document that can be stored
 PATIENCE = 10.0  # s in which an interrupted process tells what was finished
@@ -75,6 +71,8 @@ Order = tuple[str, Questions, Request, tuple[bytes | list[str], ...]]
 def run(source: Questions, request: Request, watch: Watch = lambda progress: None) -> RunDocument:
     """As tracker.measure.run.run. RunError also if the process that measures ends before it has told its run."""
     if not request.apart:
+        from spook_tracker.tracker.measure import run as here
+
         return answering(here.run(source, request, watch))
     return answering(_asked("run", source, request, (), watch))
 
@@ -84,6 +82,8 @@ def timed_again(
 ) -> RunDocument:
     """As tracker.measure.again.timed_again; RunError as for `run`."""
     if not request.apart:
+        from spook_tracker.tracker.measure import again
+
         return again.timed_again(source, request, document, names, watch)
     found = _asked("timed_again", source, request, (encode(document), sorted(set(names))), watch)
     if [s.series for s in found.samples] != [s.series for s in document.samples]:
@@ -98,7 +98,9 @@ def answering(run: RunDocument) -> RunDocument:
         raise RunError(f"nothing was measured: the catalogue has {asked}; name another with --catalogue")
     definitions = {definition.key: definition for definition in run.series}
     for sample in run.samples:
-        if sample.passed != _passes(definitions[sample.series], sample):
+        definition = definitions[sample.series]
+        kept = keeps_limit(sample.value, definition.limit, definition.better)
+        if sample.passed != (sample.outcome == "value" and kept):
             told = "good" if sample.passed else "bad"
             raise RunError(
                 f"{sample.series} is {sample.value:g} and was called {told} against its limit by the process that "
@@ -107,20 +109,12 @@ def answering(run: RunDocument) -> RunDocument:
     return run
 
 
-def _passes(definition: SeriesDefinition, sample: Sample) -> bool:
-    metric = Metric(
-        name=definition.metric, description="", unit="", role=definition.role, better=definition.better,
-        limit=definition.limit, limit_source="this",
-    )  # fmt: skip
-    return sample.outcome == "value" and metric.passes(sample.value)
-
-
 def _asked(
     what: str, source: Questions, request: Request, more: tuple[bytes | list[str], ...], watch: Watch
 ) -> RunDocument:
     """Have another process do it."""
     interrupted = False
-    patience = crew.START_LIMIT + request.time_limit  # s: as a worker has to its first answer
+    patience = START_LIMIT + request.time_limit  # s: as a worker has to its first answer
     with _started((what, source, request, more)) as process, _Ending(process, patience) as importing:
         assert process.stdout is not None
         lines = _Lines(process.stdout.fileno())
@@ -251,6 +245,9 @@ def serve() -> None:
     os.dup2(2, 1)  # whatever an engine prints is no news
     signal.signal(signal.SIGINT, signal.default_int_handler)  # the parent may have been started deaf to it
     what, source, request, more = pickle.loads(base64.b64decode(order.readline()))
+    from spook_tracker.tracker.measure import again
+    from spook_tracker.tracker.measure import run as here
+    from spook_tracker.tracker.measure.fitting import written
 
     def tell(news: News) -> None:
         if isinstance(news, Done):

@@ -19,10 +19,10 @@ from spook_tracker.engine.find import look_beside, thrown
 from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.scalar_tests.catalogue import Catalogue
 from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.tracker.measure.bounds import STANDARD as STANDARD
 from spook_tracker.tracker.measure.model_files import catalogue as catalogue_of_models
 from spook_tracker.tracker.measure.model_files import is_model
 
-STANDARD = "spook_tracker.scalar_tests.catalogue:CATALOGUE"
 GROUP = "spook_tracker.catalogues"
 
 

@@ -23,13 +23,13 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 from spook_tracker.engine.find import look_beside
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import Machine
+from spook_tracker.tracker.measure.bounds import PROCESS as PROCESS
 from spook_tracker.tracker.measure.machine import machine
 from spook_tracker.tracker.measure.workers import Lost
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.measure.questions import Engine
 
-PROCESS = "process"
 DASK = "dask://"
 Piece = TypeVar("Piece")
 Answer = TypeVar("Answer")

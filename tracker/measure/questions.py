@@ -1,4 +1,7 @@
-"""Where the questions and the engine of a run are found: by name, so that every process can find them itself."""
+"""Where the questions and the engine of a run are found: by name, so that every process can find them itself.
+
+A command names them and has them asked elsewhere (tracker.measure.apart): engines are imported where they are found.
+"""
 
 from __future__ import annotations
 
@@ -8,18 +11,15 @@ from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
-import spook_tracker.tracker.measure.catalogues as catalogues
-import spook_tracker.tracker.measure.limits as limits
-import spook_tracker.tracker.measure.others as others
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.find import EngineMissing, find, look_beside
-from spook_tracker.scalar_tests.case import ScalarTest, Simulate
 from spook_tracker.tracker.document.errors import TrackerError
-from spook_tracker.tracker.measure.question import NoAnswer
+from spook_tracker.tracker.measure.bounds import STANDARD
 
 if TYPE_CHECKING:
+    import spook_tracker.tracker.measure.limits as limits
+    from spook_tracker.engine.build_info import BuildInfo
     from spook_tracker.engine.result import Result
     from spook_tracker.engine.scene import Scene
+    from spook_tracker.scalar_tests.case import ScalarTest, Simulate
 
 PEER_TIME_LIMIT = 10.0  # s per simulation of an engine that is only shown
 
@@ -58,7 +58,7 @@ class EngineUnavailable(RunError):
 class Questions:
     """Where the questions and the engine are found, by name."""
 
-    catalogue: str = catalogues.STANDARD  # as `catalogues.find` knows it
+    catalogue: str = STANDARD  # as `catalogues.find` knows it
     engine: str = "spook"  # as `engine.find` knows it
     limit: float | None = None  # s for one simulation; None leaves it to the test
     patience: float | None = None  # s after which a piece of work begins no further simulation
@@ -72,6 +72,11 @@ class Questions:
 
     @cached_property
     def _tests(self) -> Mapping[str, ScalarTest]:
+        import spook_tracker.tracker.measure.catalogues as catalogues
+        import spook_tracker.tracker.measure.limits as limits
+        import spook_tracker.tracker.measure.others as others
+        from spook_tracker.engine.find import look_beside
+
         look_beside(self.folder)
         found = catalogues.find(self.catalogue)
         engine = self.module()
@@ -88,6 +93,8 @@ class Questions:
 
     def module(self) -> Engine:
         """The engine: simulate, build_info, and its configurations if it is not ours."""
+        from spook_tracker.engine.find import EngineMissing, find, look_beside
+
         look_beside(self.folder)
         try:
             found: Engine = find(self.engine)
@@ -116,6 +123,8 @@ class _Limited:
         self.simulate, self.limit, self.patience, self.spent = simulate, limit, patience, 0.0
 
     def __call__(self, scene: Scene, **options: Any) -> Result:
+        from spook_tracker.tracker.measure.question import NoAnswer
+
         if self.patience is not None and self.spent >= self.patience:
             raise NoAnswer("timed_out", f"not tried: the {self.patience:g} s for this question are over")
         if self.limit is not None:

@@ -59,31 +59,15 @@ from spook_tracker.tracker.measure.questions import PEER_TIME_LIMIT as PEER_TIME
 from spook_tracker.tracker.measure.questions import Questions as Questions
 from spook_tracker.tracker.measure.questions import RunError as RunError
 from spook_tracker.tracker.measure.renames import with_aliases
+from spook_tracker.tracker.measure.request import Interrupted as Interrupted
+from spook_tracker.tracker.measure.request import Progress as Progress
+from spook_tracker.tracker.measure.request import Request as Request
+from spook_tracker.tracker.measure.request import Trigger as Trigger
+from spook_tracker.tracker.measure.request import Watch as Watch
 from spook_tracker.tracker.measure.run_times import Timed, run_times
-from spook_tracker.tracker.measure.timing import Repeats
 
-Trigger = Literal["manual", "nightly", "import", "test"]
 Part = Measured | FigureData | MapData | Trajectory
 Parts = tuple[Part | ladders.ErrorPoints, ...]  # of a piece of work
-
-
-@dataclass(frozen=True, kw_only=True)
-class Request:
-    """What to run. No tests named means all of them."""
-
-    tests: tuple[str, ...] = ()
-    figures: bool = False
-    sweep: bool = False
-    stability: bool = False
-    trigger: Trigger = "manual"
-    workers: int = 2  # processes, each watched; 0: in this one, where nothing can be ended
-    time_limit: float = crew.Limits.seconds  # s for one piece of work
-    memory_limit: int = crew.Limits.memory  # bytes for one piece of work
-    repeats: int | Repeats = 5  # of each timing
-    apart: bool = (
-        True  # in a process of its own (tracker.measure.apart): a gate that what is measured cannot open
-    )
-    executor: str = executors.PROCESS  # where values are measured, as `executors.answers` knows it
 
 
 Kind = Literal["measure", "figure", "trajectory", "study", "ladder"]
@@ -99,20 +83,6 @@ class Task:
     index: tuple[int, ...]
 
 
-@dataclass(frozen=True)
-class Progress:
-    """What a watcher is told after each piece of work."""
-
-    done: int
-    total: int
-    test: str
-    finished: bool  # every piece of this test is done
-    failed: tuple[str, ...] = ()  # series of this piece outside their limits
-
-
-Watch = Callable[[Progress], None]
-
-
 def select(catalogue: Mapping[str, ScalarTest], names: Iterable[str]) -> dict[str, ScalarTest]:
     """The tests asked for, in catalogue order; an unknown name is answered with its nearest neighbours."""
     wanted = list(names)
@@ -122,17 +92,6 @@ def select(catalogue: Mapping[str, ScalarTest], names: Iterable[str]) -> dict[st
             hint = f"did you mean {' or '.join(near)}?" if near else "`tracker list` shows them all"
             raise RunError(f"there is no test named {name!r}; {hint}")
     return {name: catalogue[name] for name in catalogue if not wanted or name in wanted}
-
-
-class Interrupted(KeyboardInterrupt):
-    """The run was interrupted. `document` holds the tests that were finished by then, as a partial run."""
-
-    def __init__(self, document: RunDocument, asked: int) -> None:
-        done = f"{len(document.tests)} of {asked} tests were finished"
-        super().__init__(f"interrupted; {done} and are recorded as partial run {document.id}")
-        self.document = document
-        self.asked = asked  # number of tests
-        self.recorded = False  # until a caller does
 
 
 def run(source: Questions, request: Request, watch: Watch = lambda progress: None) -> RunDocument:

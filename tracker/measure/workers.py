@@ -25,9 +25,8 @@ from pathlib import Path
 from typing import Generic, Literal, Protocol, TypeVar
 
 import spook_tracker.tracker.measure.left_behind as left_behind
-from spook_tracker.tracker.measure.bounds import MEMORY, TIME_LIMIT
+from spook_tracker.tracker.measure.bounds import MEMORY, START_LIMIT, TIME_LIMIT
 
-START_LIMIT = 120.0  # s in which a new process has read its program, on a machine however busy
 WORTH = 1.0  # s of work after which further processes are worth what they take to start
 DIED = "the engine's process died while answering"
 NOWHERE = -1  # in a piece of work that has no places, or at none of them
