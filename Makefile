@@ -54,8 +54,10 @@ help:
 nightly: install
 	$(BIN)/tracker nightly --db $(DB) --out $(OUT) --mutants bench/mutants.json --recorded bench/recorded
 
-# Each worker has a core of its own: linear algebra with threads beside them only waits for them.
+# Each worker has a core of its own: linear algebra with threads beside them only waits for them. Tests as pytest rewrites
+# them are kept, or each worker of each run does it again: half of what they are collected in.
 test: export OPENBLAS_NUM_THREADS = 1
+test: export PYTHONDONTWRITEBYTECODE =
 test: develop native-tests
 	@! command -v clang++-19 >/dev/null || $(MAKE) --no-print-directory wasm
 	@$(BIN)/python -m compileall -q engine tracker scalar_tests migrations tests  # once, not in each of its processes

@@ -32,10 +32,10 @@ class Guard:
 
 
 GUARDS = (
-    Guard("what is measured is imported apart", APART, 'return answering(_asked("run", source, request, (), watch))', "return answering(here.run(source, request, watch))", "test_tracker_gates"),
+    Guard("what is measured is imported apart", APART, 'return answering(_asked("run", source, request, (), watch))', "from spook_tracker.tracker.measure import run as here; return answering(here.run(source, request, watch))", "test_tracker_gates"),
     Guard("an end is no answer", APART, "elif news is None:\n                    how", "elif False:\n                    how", "test_tracker_gates whatever_ends"),
     Guard("an import has a time limit", APART, "patience = START_LIMIT + request.time_limit", "patience = 1e9", "test_tracker_gates hangs"),
-    Guard("what is called good is held to its limit", APART, "if sample.passed != _passes(", "if False and sample.passed != _passes(", "test_tracker_gates limit_that_is_changed"),
+    Guard("what is called good is held to its limit", APART, "if sample.passed != (", "if False and sample.passed != (", "test_tracker_gates limit_that_is_changed"),
     Guard("a catalogue that asks nothing is no green", APART, "if not run.samples:", "if False:", "test_tracker_gates asks_nothing"),
     Guard("what supports nothing is no green", "tracker/cli/main.py", 'if any(sample.outcome != "not_supported" for sample in document.samples):', "if True:", "test_tracker_gates supports_nothing"),
     Guard("what is no longer supported is lost", "tracker/judge/exact_values.py", "return state.level is not None and (state.red", "return False and (state.red", "test_tracker_support_lost"),
