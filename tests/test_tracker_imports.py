@@ -239,6 +239,25 @@ def test_rows_of_one_commit_are_told_apart_by_a_parameter(tmp_path: Path) -> Non
     assert set(found.of(0)) == {"heap(solver=direct) run_time", "heap(solver=iterative) run_time"}
 
 
+def test_records_that_differ_in_their_values_alone_are_repeats(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text("commit,x_s,ops_per_s\n" + "".join(f"a,{x},{x}\n" for x in (3, 1, 8)))
+    found = Imported(tmp_path, tmp_path / "x.csv").of(0)
+
+    assert (found["x x_s"]["value"], found["x x_s"]["timing"]["seconds"]) == (1.0, [3.0, 1.0, 8.0])
+    assert found["x ops_per_s"]["value"] == 3.0
+
+
+def test_a_cell_that_says_it_failed_is_an_outcome_and_an_empty_one_nothing(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text("commit,test,x_s\na,t,N/A\na,u,1\na,v,\n")
+    found = Imported(tmp_path, tmp_path / "x.csv").of(0)
+
+    assert {name: sample["outcome"] for name, sample in found.items()} == {
+        "t x_s": "crashed",
+        "u x_s": "value",
+    }
+    assert found["t x_s"]["failure"] == "the file says N/A"
+
+
 def test_only_runs_of_a_branch(tmp_path: Path) -> None:
     files = sorted((TOOLS / "pytest-benchmark").glob("*.json"))
     found = Imported(tmp_path, "--branch", "main", *files)
@@ -260,10 +279,11 @@ def test_only_runs_of_a_branch(tmp_path: Path) -> None:
         ("a.csv", "commit,test,value,unit\na,t,fast,s\n", [], "value is 'fast' and no number"),
         (
             "a.csv",
-            "commit,x_s,day\na,1,2026-01-01\na,2,2026-01-01\n",
-            ["day=started"],
-            "a second value of a/x_s",
+            "commit,x_s,n\na,1,10\na,2,20\n",
+            [],
+            "a second value of a/x_s in one run, with another n; say --column n=parameter",
         ),
+        ("a.csv", 'commit,x_s\na,"1,234"\n', [], "x_s is '1,234' and no number; correct it"),
         ("a.csv", "commit,x\na,1\n", ["x"], "gives no column a meaning"),
         ("a.csv", "commit,x\na,1\n", ["x=s,sideways"], "after the unit comes larger, smaller or explains"),
         ("a.csv", "commit,x_s,at\na,1,1e300\n", ["at=started"], "is no moment that a calendar has"),

@@ -271,6 +271,12 @@ def test_a_folder_of_a_folder_for_each_machine_comes_in_as_it_is(above: str, tmp
         ("a.jsonl", "", "no run is in"),
         ("data.js", 'window.BENCHMARK_DATA = {"repoUrl": "", "entries": {"x": []}}', "no run is in"),
         ("a.json", '{"mean": {"point_estimate": 1.5}}', "of no tool that is known here"),
+        ("a.txt", "goos: linux\nBenchmarkFoo-8 \t 1000 \t 1042 ns/op\n", "what `go test -bench` prints"),
+        (
+            "a.json",
+            '[{"jmhVersion": "1.37", "benchmark": "a.B", "mode": "thrpt"}]',
+            "is JMH's, which tells no commit",
+        ),
     ],
 )
 def test_a_file_without_a_run_is_one_sentence(name: str, content: str, words: str, tmp_path: Path) -> None:
@@ -280,6 +286,16 @@ def test_a_file_without_a_run_is_one_sentence(name: str, content: str, words: st
 
     assert (done.exit_code, done.output.count("\n")) == (2, 1)
     assert words in done.output
+
+
+def test_names_of_any_length_are_kept_apart_and_fit_a_series() -> None:
+    long = ["x" * 400 + end for end in "yz"]
+    (run,) = read(action([{"name": name, "unit": "ns", "value": 1.0} for name in (*long, "")]))
+
+    names = [d.test for d in run.series]
+    assert len(set(names)) == 3 and "unnamed" in names
+    assert max(len(d.key) for d in run.series) <= 200
+    assert [d.description for d in run.series][:2] == long
 
 
 def test_engine_and_machine_can_be_named(tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
     from spook_tracker.tracker.store.database import Session
     from spook_tracker.tracker.store.versions import RunInfo
 
+GO = re.compile(rb"^Benchmark\S+\s+\d+\s+\S+ ns/op", re.MULTILINE)
+
 
 @dataclass(frozen=True, slots=True)
 class Read:
@@ -34,6 +37,7 @@ class Read:
     runs: tuple[tuple[RunDocument, Listed], ...]  # with what their tool says of its benchmarks
     unknown: tuple[str, ...]  # columns of numbers in no known unit
     absent: tuple[str, ...]  # columns that were given a meaning and are in no file
+    empty: int  # runs without any value, which are left out
 
 
 def read(
@@ -63,13 +67,18 @@ def read(
             continue
         seen.add(file)
     found = of_tables(tables, told, beside(next(iter(tables), Path()), engine, machine, branch))
-    return Read(
-        frozenset(seen), (*runs, *((run, Listed()) for run in found.runs)), found.unknown, found.absent
-    )
+    runs += [(run, Listed()) for run in found.runs]
+    whole_runs = tuple(one for one in runs if one[0].samples)
+    return Read(frozenset(seen), whole_runs, found.unknown, found.absent, len(runs) - len(whole_runs))
 
 
 def _refuse_strange(file: Path, content: bytes) -> None:
-    """DocumentError for a JSON object of no form that is known; what is no JSON is told where it is read."""
+    """DocumentError for a JSON object of no form that is known, and for Go's text; what else is no JSON is told where it is read."""
+    if GO.search(content):
+        raise DocumentError(
+            f"{file} is what `go test -bench` prints, which tells no commit; bring it as github-action-benchmark's "
+            "data.js, or its values as CSV with a column for the commit"
+        )
     with suppress(msgspec.DecodeError, UnicodeDecodeError, RecursionError):
         msgspec.json.decode(content, type=dict[str, msgspec.Raw])
         raise DocumentError(

@@ -106,6 +106,8 @@ def import_files(
         more = f" and {len(files) - 1} more" if len(files) > 1 else ""
         raise DocumentError(f"no run{of_branch} is in {files[0]}{more}")
     click.echo(f"{stored} runs recorded, {present} were there already")
+    if found.empty:
+        click.echo(f"left out, as there is no value in them: {found.empty} of the files' runs")
     if found.unknown:
         names = ", ".join(found.unknown)
         click.echo(

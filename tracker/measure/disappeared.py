@@ -55,7 +55,9 @@ def with_missing(
             known = like or {}
             names = {_name(d) for d in run.series}
             missed = {
-                key: (d, GONE) for key, d in known.items() if key not in here and _stays(d, names, listed)
+                key: (d, _why(d, run))
+                for key, d in known.items()
+                if key not in here and _stays(d, names, listed)
             }
             if run is of_lane[-1][0]:
                 missed |= {d.key: (d, NEVER) for d in _never_measured(run, listed, missed)}
@@ -79,6 +81,16 @@ def _is_left_of(here: Set[str], last: Sequence[Mapping[str, SeriesDefinition]]) 
     """Whether a run has some of what the last ones had, all of them the same, and nothing else."""
     alike = len(last) == LAST and all(_are_alike(last[-1].keys(), other.keys()) for other in last)
     return alike and bool(here) and here < last[-1].keys()
+
+
+def _why(definition: SeriesDefinition, run: RunDocument) -> str:
+    """Why it is missing: another unit is another series, and else its siblings go on without it."""
+    of_it = [
+        d for d in run.series if (d.test, d.configuration) == (definition.test, definition.configuration)
+    ]
+    if len(of_it) != 1 or of_it[0].unit == definition.unit:
+        return GONE
+    return f"it is measured in {of_it[0].unit} now, which is followed as {of_it[0].key}"
 
 
 def _stays(definition: SeriesDefinition, names: Set[str], listed: Listed) -> bool:

@@ -21,6 +21,7 @@ import msgspec
 
 from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.document.json_form import Number
+from spook_tracker.tracker.document.middle import median
 from spook_tracker.tracker.document.run_document import RunDocument, SeriesDefinition
 from spook_tracker.tracker.measure.short_form import ShortResult, ShortRun, document_of
 from spook_tracker.tracker.measure.units import Unit, unit_of
@@ -34,6 +35,7 @@ DIRECTIONS: dict[str, Literal["smaller", "larger"]] = {
     "customSmallerIsBetter": "smaller",
 }
 MOST_REPEATS = 101  # kept of one benchmark in one run; pytest-benchmark times tens of thousands
+LONGEST_NAME = 200  # characters, of run documents
 MIXED = "not said: may mix processors"
 
 
@@ -64,7 +66,7 @@ def of_other_tools(content: bytes, origin: str, beside: Beside = NOTHING) -> tup
         return None
     try:
         told = _branch_of(said)
-        return documents_of(((run, told) for run in read(said, beside) if run.results), beside, origin)
+        return documents_of(((run, told) for run in read(said, beside)), beside, origin)
     except DocumentError:
         raise
     except (
@@ -131,10 +133,36 @@ class Failure(TypedDict, total=False):
 
 
 def _named(run: ShortRun, beside: Beside) -> ShortRun:
-    given: dict[str, str] = {"engine": beside.engine} if beside.engine else {}
-    if beside.machine:
-        given |= {"machine": beside.machine, "processor": beside.machine}
-    return msgspec.structs.replace(run, results=_told_once(run.results), **given)
+    machine = _fitting(beside.machine or run.machine, LONGEST_NAME)
+    return msgspec.structs.replace(
+        run,
+        engine=_fitting(beside.engine or run.engine, LONGEST_NAME),
+        version=_fitting(run.version, LONGEST_NAME),
+        machine=machine,
+        processor=machine if beside.machine else run.processor,
+        results=tuple(_fitted(one) for one in _told_once(run.results)),
+    )
+
+
+def _fitted(one: ShortResult) -> ShortResult:
+    """With names that a series may have together; the whole name is its description where it was cut."""
+    long = len(one.test) + len(one.configuration) + len(one.metric) + 2 > LONGEST_NAME
+    if not long and one.test and one.configuration and one.metric:
+        return one
+    return msgspec.structs.replace(
+        one,
+        test=_fitting(one.test, LONGEST_NAME // 2 if long else LONGEST_NAME),
+        metric=_fitting(one.metric, LONGEST_NAME // 5 if long else LONGEST_NAME),
+        configuration=_fitting(one.configuration, LONGEST_NAME // 4 if long else LONGEST_NAME),
+        description=one.test if long else one.description,
+    )
+
+
+def _fitting(name: str, longest: int) -> str:
+    """Parametrised benchmarks have names of a thousand characters: what is cut off is told apart by a hash of all."""
+    if len(name) <= longest:
+        return name or "unnamed"
+    return f"{name[: longest - 10]}… {hashlib.sha256(name.encode()).hexdigest()[:8]}"
 
 
 def _pytest(said: Mapping[str, Any], _: Beside) -> Iterator[ShortRun]:
@@ -307,13 +335,22 @@ def _told_once(results: Sequence[ShortResult]) -> tuple[ShortResult, ...]:
         name, number = one.test, 1
         while (before := found.get((one.test, one.configuration, one.metric))) is not None:
             if one.seconds and before.seconds:
-                seconds = before.seconds + one.seconds
-                one = msgspec.structs.replace(one, value=Number(min(seconds)), seconds=seconds)
+                one = repeated([before, one])
                 break
             number += 1
             one = msgspec.structs.replace(one, test=f"{name} ({number})")
         found[one.test, one.configuration, one.metric] = one
     return tuple(found.values())
+
+
+def repeated(those: Sequence[ShortResult]) -> ShortResult:
+    """One result of several: of times the least counts, of other values their median, and of failures none beside those."""
+    told = [one for one in those if one.value is not None] or [those[0]]
+    if seconds := sum((one.seconds for one in told), ()):
+        return msgspec.structs.replace(told[0], value=Number(min(seconds)), seconds=seconds)
+    if told[0].value is None:
+        return told[0]
+    return msgspec.structs.replace(told[0], value=Number(median([float(one.value or 0.0) for one in told])))
 
 
 def _bench(one: Mapping[str, Any], better: Literal["smaller", "larger"] | None) -> ShortResult:
@@ -365,7 +402,8 @@ def _thinned(seconds: Sequence[float]) -> tuple[float, ...]:
 def _failed(value: Json) -> Failure:
     if value is None:
         return {"outcome": "crashed", "failure": "it failed: the file gives no value"}
-    return {"outcome": "not_finite", "failure": f"the file says {value}"}
+    said = f"{value:.6g}" if isinstance(value, float) else str(value)
+    return {"outcome": "not_finite", "failure": f"the file says {said}"}
 
 
 def _lane(processor: Json, cores: Json) -> tuple[str, int]:

@@ -21,29 +21,45 @@ from dataclasses import dataclass, field
 from datetime import UTC, datetime
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 from msgspec.structs import replace
 
 from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.document.run_document import RunDocument
-from spook_tracker.tracker.measure.other_tools import NOTHING, Beside, documents_of, sampled
+from spook_tracker.tracker.measure.other_tools import NOTHING, Beside, documents_of, repeated, sampled
 from spook_tracker.tracker.measure.short_form import ShortResult, ShortRun
 from spook_tracker.tracker.measure.units import Unit, unit_of
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.json_form import Json
 
+Remarks: TypeAlias = frozenset[tuple[str, str]]  # columns without a meaning, and what they hold
 RUN = ("commit", "version", "started", "branch", "engine", "machine")
 NAMES = ("test", "metric", "value", "unit", "configuration", "parameter")
 LEFT_OUT = "-"
+FAILED = (
+    "n/a",
+    "na",
+    "none",
+    "null",
+    "-",
+    "--",
+    "fail",
+    "failed",
+    "error",
+    "timeout",
+    "crash",
+    "crashed",
+    "oom",
+)
 USUAL = {
     **{name: name for name in (*RUN, *NAMES) if name != "parameter"},
     **dict.fromkeys(("sha", "commit_hash", "commit_id", "git_hash", "revision"), "commit"),
     **dict.fromkeys(("timestamp", "date", "datetime", "commit_time"), "started"),
     **dict.fromkeys(("benchmark", "name"), "test"),
 }
-NAMED_UNIT = re.compile(r"(?:^|[_.])(?:(\w+?)_per_(second|sec)|(s|secs?|seconds|ms|us|ns|bytes|[kmg]i?b))$")
+NAMED_UNIT = re.compile(r"(?:^|[_.])(?:(\w+?)_per_(seconds?|secs?|s|ms|us|ns|min)|(s|secs?|seconds|ms|us|ns|bytes|[kmg]i?b))$")
 FORMS = (".jsonl", ".ndjson", ".csv", ".tsv")
 MILLISECONDS = 1e11  # a moment above it is no number of seconds since 1970: those would be in the year 5138
 
@@ -105,16 +121,16 @@ def of_tables(
         records = sorted(_records(file, content), key=lambda one: _started(one[1], told))
         for place, record in records:
             columns |= record.keys()
-            about, results = _read(file, place, record, told, unknown)
+            about, results, remarks = _read(file, place, record, told, unknown)
             key = tuple(about.get(name, "") for name in RUN if name != "started")
             same = runs.setdefault(key, [])
             run = next((one for one in same if one.takes(about, results)), None)
             if run is None:
                 same.append(run := _Growing(about))
-            run.add(results, f"{file}:{place}")
+            run.add(results, remarks, f"{file}:{place}")
     short = [one.whole() for same in runs.values() for one in same]
     origin = str(next(iter(files), ""))
-    documents = documents_of(((run, branch) for run, branch in short if run.results), beside, origin)
+    documents = documents_of(short, beside, origin)
     absent = (pattern for pattern, _ in told if not any(fnmatchcase(name, pattern) for name in columns))
     return Tables(documents, tuple(unknown), tuple(absent))
 
@@ -125,6 +141,8 @@ class _Growing:
 
     about: dict[str, str]
     results: dict[tuple[str, str, str], ShortResult] = field(default_factory=dict)
+    repeats: dict[tuple[str, str, str], list[ShortResult]] = field(default_factory=dict)
+    remarks: dict[tuple[str, str, str], Remarks] = field(default_factory=dict)
 
     def takes(self, about: Mapping[str, str], results: Sequence[ShortResult]) -> bool:
         """Whether more values belong to it: those of one moment do, and of one commit those it does not have."""
@@ -132,14 +150,19 @@ class _Growing:
             _key(one) in self.results for one in results
         )
 
-    def add(self, results: Sequence[ShortResult], place: str) -> None:
+    def add(self, results: Sequence[ShortResult], remarks: Remarks, place: str) -> None:
+        """Records that differ in nothing but their values are repeats: of times the least counts, else their median."""
         for one in results:
-            if _key(one) in self.results:
+            key = _key(one)
+            if self.remarks.setdefault(key, remarks) != remarks:
+                apart = sorted({name for name, _ in self.remarks[key] ^ remarks})
                 raise DocumentError(
-                    f"{place}: a second value of {one.test}/{one.metric} in one run; say which column tells them "
-                    "apart (--column NAME=parameter)"
+                    f"{place}: a second value of {one.test}/{one.metric} in one run, with another {', '.join(apart)}; "
+                    f"say --column {apart[0]}=parameter if that tells two benchmarks apart, and --column {apart[0]}=- "
+                    "if they are repeats of one"
                 )
-            self.results[_key(one)] = one
+            self.repeats.setdefault(key, []).append(one)
+            self.results[key] = repeated(self.repeats[key])
 
     def whole(self) -> tuple[ShortRun, str]:
         commit = self.about.get("commit", "")
@@ -212,12 +235,13 @@ def _read(
     record: Mapping[str, Json],
     told: Sequence[tuple[str, Meaning]],
     unknown: dict[str, None],
-) -> tuple[dict[str, str], list[ShortResult]]:
-    """What a record says about its run, and its values."""
+) -> tuple[dict[str, str], list[ShortResult], Remarks]:
+    """What a record says about its run, its values, and what else."""
     about: dict[str, str] = {}
     named: dict[str, str] = {}
     parameters: list[str] = []
     values: list[tuple[str, Json, Meaning]] = []
+    remarks: list[tuple[str, str]] = []
     for name, value in record.items():
         meaning = _meant(name, told)
         if meaning.role == "value":
@@ -230,9 +254,16 @@ def _read(
             about[meaning.role] = str(value)
         elif meaning.role in NAMES:
             named[meaning.role] = str(value)
-        elif meaning.role != LEFT_OUT and _is_value(value):
+        elif meaning.role != LEFT_OUT and (_is_value(value) or meaning.unit.name != "1"):
             values.append((name, value, meaning))
+        if not meaning.role and (meaning.unit.name == "1" or not _is_value(value)) and not meaning.explains:
+            remarks.append((name, str(value)))
     if not about.get("commit") and not about.get("version"):
+        if "jmhVersion" in record:
+            raise DocumentError(
+                f"{file} is JMH's, which tells no commit; bring it as github-action-benchmark's data.js, or its values "
+                "as JSON lines or CSV with a column for the commit"
+            )
         raise DocumentError(
             f"{file}:{place}: no column tells the commit or the version; say which does (--column NAME=commit)"
         )
@@ -252,9 +283,15 @@ def _read(
         try:
             if isinstance(value, list | dict):
                 raise TypeError("no number")
-            one = sampled(test, value, meaning.unit)
+            failed = isinstance(value, str) and value.strip().lower() in FAILED
+            one = sampled(test, None if failed else value, meaning.unit)
+            if failed:
+                one = replace(one, failure=f"the file says {value}")
         except (TypeError, ValueError):
-            raise DocumentError(f"{file}:{place}: {name} is {value!r:.60} and no number") from None
+            raise DocumentError(
+                f"{file}:{place}: {name} is {value!r:.60} and no number; correct it, or leave the column out with "
+                f"--column {name}=-"
+            ) from None
         results.append(
             replace(
                 one,
@@ -263,7 +300,7 @@ def _read(
                 explaining=meaning.explains,
             )
         )
-    return about, results
+    return about, results, frozenset(remarks)
 
 
 def _meant(name: str, told: Sequence[tuple[str, Meaning]]) -> Meaning:
@@ -274,8 +311,8 @@ def _meant(name: str, told: Sequence[tuple[str, Meaning]]) -> Meaning:
         return Meaning(usual)
     if (said := NAMED_UNIT.search(name.lower())) is None:
         return Meaning()
-    counted, _, unit = said.groups()
-    return Meaning("", unit_of(f"{counted}/s" if counted else unit))
+    counted, below, unit = said.groups()
+    return Meaning("", unit_of(f"{counted}/{below}" if counted else unit))
 
 
 def _is_value(value: Json) -> bool:
