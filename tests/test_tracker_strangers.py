@@ -188,6 +188,46 @@ def asv(night: int, results: Mapping[str, list[Any]]) -> str:
     )  # fmt: skip
 
 
+def test_what_is_measured_in_another_unit_now_is_missing_by_that_name(tmp_path: Path) -> None:
+    history = data({name: [1000.0] * 5 for name in "rkm"}, lambda night: "ops/s")
+    before, last = history.rsplit('{"name": "r", "unit": "ops/s"', 1)
+    told = imported(tmp_path, before + '{"name": "r", "unit": "ms"' + last)
+
+    assert "it is measured in s now, which is followed as r/default/run_time" in told("judge", "latest")[1]
+
+
+def test_a_run_without_any_value_is_left_out_and_said(tmp_path: Path) -> None:
+    (tmp_path / "x.js").write_text(data({"f": [1000.0, None, 1000.0]}))
+    _, said = Strangers(tmp_path)("import", tmp_path / "x.js")
+
+    assert said.startswith("2 runs recorded") and "no value in them: 1 of" in said
+
+
+def test_memory_that_grows_is_not_slower(tmp_path: Path) -> None:
+    told = imported(tmp_path, data({"f": [1000.0 * (1 + (n >= 25)) for n in range(30)]}, lambda _: "KB"))
+
+    assert "f/default/value: worse; " in told("judge", "latest")[1]
+
+
+def test_a_comparison_blames_no_commit_that_both_versions_have(tmp_path: Path) -> None:
+    """Red since night 20; nights 40 and 50 both have that, and a noisy 50 is worse than 40."""
+    values = [1000.0 * x * (1.3 if n >= 20 else 1.0) for n, x in enumerate(noise(3)[:51])]
+    values[50] *= 1.5
+    told = imported(tmp_path, data({"f": values}))
+    version = {n: f"{n:04d}" + "a" * 6 for n in (10, 40, 50)}
+
+    assert "first bad commit 0020" in told("compare", version[10], version[50])[1]
+    assert "first bad commit" not in told("compare", version[40], version[50])[1]
+
+
+def test_two_nights_of_a_young_history_are_compared_by_the_noise_that_is_known_today(tmp_path: Path) -> None:
+    values = [1000.0 * x * (1.3 if n >= 3 else 1.0) for n, x in enumerate(noise(4)[:9])]
+    told = imported(tmp_path, data({"f": values}))
+    code, said = told("compare", "0001" + "a" * 6, "0007" + "a" * 6)
+
+    assert told("judge", "latest")[0] == code == 1, said
+
+
 def test_a_benchmark_of_asv_is_its_version_its_parameters_and_its_unit(tmp_path: Path) -> None:
     """Twelve nights, then another version four times as slow, a parameter put in front, and one that fails."""
     before = {"a.time_x": [[0.1], [], "v1"], "b.time_x": [[0.01, 0.1], [["'some'", "'many'"]], "v"]}

@@ -180,6 +180,10 @@ function judgeClass(before, after, decades, ulps) {
   return before.outcome !== after.outcome ? verdict("changed", became) : null;
 }
 
+function calledWorse(kind, unit) {
+  return kind === "time" && unit !== "s" && !unit.endsWith("/s") ? "worse" : CALLED[kind] || "worse";
+}
+
 function judgeSize(definition, old, now, decades, ulps) {
   const was = badness(definition, old), is = badness(definition, now);
   if (was === null || is === null) { return verdict("changed", distance(decades, ulps, "changed"), { decades, ulps }); }
@@ -193,14 +197,14 @@ function judgeSize(definition, old, now, decades, ulps) {
   const words = distance(decades, ulps, growth > 0 ? "worse" : "better"), half = halfWidth(definition);
   const deep = half === null ? -Infinity : half * (Math.min(was, is) === 0 ? EXACT_ZERO : DEEP_INSIDE) * (1 + 1e-9);
   if (Math.max(was, is) <= deep) { return verdict("changed", `${words}, far inside the limit`, { decades, ulps }); }
-  if (growth > 0) { return verdict("regressed", words, { name: CALLED[definition.kind] || "worse", decades, ulps }); }
+  if (growth > 0) { return verdict("regressed", words, { name: calledWorse(definition.kind, definition.unit), decades, ulps }); }
   return verdict("improved", words, { decades, ulps });
 }
 
 // --- run times: against what was usual ---
 const FROM_NONE = 1e9; // times as much stands for something in place of a value of 0
 
-function judgeTime([level, threshold], value, larger) {
+function judgeTime([level, threshold], value, larger, unit) {
   let change = !Number.isFinite(value) ? (Number.isFinite(level) ? Infinity : 0) : !Number.isFinite(level) ? -Infinity :
     level === 0 ? (value === 0 ? 0 : (larger ? -value : value) > 0 ? Infinity : -Infinity) : (larger === (level > 0) ? -1 : 1) * (value / level - 1);
   const percent = change >= 0.5 * FROM_NONE ? "from 0" : !Number.isFinite(change) ? (change > 0 ? "+inf %" : "-inf %") : `${change < 0 || Object.is(change, -0) ? "-" : "+"}${fixed(Math.abs(100 * change), 1)} %`;
@@ -208,7 +212,7 @@ function judgeTime([level, threshold], value, larger) {
   if (change > threshold) {
     if (!Number.isFinite(value)) { return verdict("regressed", `no finite value any more, ${general(level)} before`, { name: "not finite" }); }
     const ratio = level ? Math.abs(value / level) : 0;
-    return verdict("regressed", words, { name: "slower", decades: ratio > 2 / FROM_NONE && ratio < 0.5 * FROM_NONE ? Math.log10(ratio) : null });
+    return verdict("regressed", words, { name: calledWorse("time", unit), decades: ratio > 2 / FROM_NONE && ratio < 0.5 * FROM_NONE ? Math.log10(ratio) : null });
   }
   if (-change > threshold) { return verdict("improved", words); }
   return verdict("same", `${words}, inside the noise (±${fixed(100 * threshold, 0)} %)`);
@@ -219,7 +223,7 @@ function judgeReadOff(definition, before, after, how) {
   if (!how.sameMachine) { told = verdict("not_comparable", "run times of another machine"); } else {
     told = judge(definition, before, after, { sameDefinition: how.sameDefinition, sameEnvironment: true, sameCommit: false });
     if (["regressed", "improved", "changed"].includes(told.word) && before.outcome === after.outcome) {
-      told = before.usual ? judgeTime(before.usual, after.value, definition.better === "larger") :
+      told = before.usual ? judgeTime(before.usual, after.value, definition.better === "larger", definition.unit) :
         verdict(Math.abs(told.decades || 0) > DOUBLED ? "changed" : "same", `${told.sentence}, of one timing session`, { decades: told.decades });
     }
   }
@@ -268,7 +272,10 @@ function judgeSeries(key, old, now, before, after, accepted) {
     const level = accepted.find((a) => a.keys.has(key) && (!a.until || after.day <= a.until) && (gone ? a.removed || a.expected : !a.removed && within(a)));
     if (level) { Object.assign(change, { word: level.expected ? "expected" : "accepted", red: false, stands: "accepted", accepted: level.said }); }
   }
-  if (change.red && now && now.blame) { change.blame = now.blame; }
+  if (change.red && now && now.blame) {
+    const of = /, of (\S+)$/.exec(now.blame); // what became worse before the earlier night did not between the two
+    if (!of || !before.day || of[1] >= before.day) { change.blame = now.blame; }
+  }
   return change;
 }
 

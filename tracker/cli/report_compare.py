@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
@@ -38,6 +39,8 @@ def value(number: Number | None, unit: str = "") -> str:
     """A value for a table; enough digits to see a change."""
     if number is None:
         return "-"
+    if math.isnan(number):
+        return "no value"
     return f"{number:.9g} {unit if unit != '1' else ''}".rstrip()
 
 

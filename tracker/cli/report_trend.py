@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 
@@ -149,7 +150,7 @@ def trend_lines(told: Told, last: int = 10) -> list[str]:
             j.night.run.engine.version,
             commit_of(j.night.run) + (" changed" if j.night.run.engine.dirty else ""),
             *([mark_of(j.night.run)] if several else []),
-            number(j.night.value, 12) + unit,
+            number(j.night.value, 12) + unit if math.isfinite(j.night.value) else "no value",
             STATES[j.state] or spaced(j.verdict.word),
             j.verdict.sentence,
         )

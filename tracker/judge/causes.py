@@ -19,8 +19,8 @@ from spook_tracker.tracker.judge.judged import Judged, blame
 from spook_tracker.tracker.judge.repeats import Nights
 from spook_tracker.tracker.judge.series_history import Told
 from spook_tracker.tracker.judge.standing import expected
-from spook_tracker.tracker.judge.tonight import Finding
-from spook_tracker.tracker.judge.verdict import badness, limit_ratio
+from spook_tracker.tracker.judge.tonight import Finding, least_of_none
+from spook_tracker.tracker.judge.verdict import limit_ratio, worse_times
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class
 
 Standing = Literal["detected", "accepted", "recovered"]
@@ -53,14 +53,7 @@ class Hit:
         """
         if self.definition is None:
             return math.nan
-        if not math.isfinite(self.value):
-            return math.inf
-        if self.stands == "fail" and not math.isnan(ratio := limit_ratio(self.definition, self.value)):
-            return ratio
-        own, old = badness(self.definition, self.value), badness(self.definition, self.before)
-        if own is None or old is None or not math.isfinite(old) or 0.0 in (own, old):
-            return math.nan
-        return old / own if own < 0.0 else own / old
+        return worse_times(self.definition, self.stands == "fail", self.before, self.value)
 
     @property
     def of_limit(self) -> bool:
@@ -198,8 +191,10 @@ def _hits_in(told: Told, nights: Sequence[Judged], over: Judged | None) -> list[
 def _hit(key: str, definition: SeriesDefinition, judged: Judged, standing: Standing = "detected") -> Hit:
     bad = judged.worse_at or judged.first_bad or judged.night
     good = judged.before_worse or judged.last_good
+    before, value = judged.worsening
     if standing == "accepted":
         good = judged.against
+        before = judged.levels[0] if judged.levels else good.value if good else math.nan
     return Hit(
         series=key,
         test=definition.test,
@@ -207,8 +202,8 @@ def _hit(key: str, definition: SeriesDefinition, judged: Judged, standing: Stand
         name=name_of(judged),
         sentence=judged.verdict.sentence,
         stands=judged.stands,
-        before=judged.levels[0] if judged.levels else good.value if good else math.nan,
-        value=judged.levels[1] if judged.levels else bad.value,
+        before=before,
+        value=value,
         good=good.run if good else None,
         bad=bad.run,
         standing=standing,
@@ -232,9 +227,14 @@ def _cause(hits: list[Hit], order: Mapping[str, int]) -> Cause:
 
 def _rank(hit: Hit) -> tuple[int, int, bool, float, str]:
     """Of one class what has a limit before what is only followed, a lost rung says less; then by margin alone."""
-    margin = 0.0 if math.isnan(hit.margin) else hit.margin
     decides = hit.definition is not None and expected(hit.definition)
-    return STANDINGS.index(hit.standing), CLASS_RANK[hit.stands], not decides, -margin, hit.series
+    return (
+        STANDINGS.index(hit.standing),
+        CLASS_RANK[hit.stands],
+        not decides,
+        -least_of_none(hit.margin),
+        hit.series,
+    )
 
 
 def _order(told: Mapping[str, Told]) -> dict[str, int]:

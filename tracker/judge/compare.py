@@ -290,7 +290,7 @@ def _time_scalar(
     verdict = judge(new[0], old[1], new[1], same_definition=old[0].test_version == new[0].test_version)
     if verdict.word in ("regressed", "improved", "changed") and old[1].outcome == new[1].outcome:
         if usual is not None:
-            return judge_time(usual, new[1].value, new[0].better == "larger")
+            return judge_time(usual, new[1].value, new[0].better == "larger", new[0].unit)
         gross = abs(verdict.decades or 0.0) > DOUBLED
         words = f"{verdict.sentence}, of one timing session"
         return Verdict(word="changed" if gross else "same", sentence=words, decades=verdict.decades)

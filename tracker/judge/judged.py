@@ -62,6 +62,14 @@ class Judged(msgspec.Struct, frozen=True, kw_only=True):
             return Number(self.levels[0]), Number(self.levels[1])
         return None if self.against is None else self.against.sample.value, self.night.sample.value
 
+    @property
+    def worsening(self) -> tuple[float, float]:
+        """The value before it last became worse, NaN where there was none, and the one then; of run times the levels."""
+        if self.levels is not None:
+            return self.levels
+        bad, good = self.worse_at or self.first_bad or self.night, self.before_worse or self.last_good
+        return good.value if good else math.nan, bad.value
+
 
 def commit_of(run: Run) -> str:
     """How a reader finds the version: twelve digits of its commit, or its version."""

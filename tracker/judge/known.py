@@ -6,8 +6,10 @@ import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from spook_tracker.tracker.document.run_document import Point
 from spook_tracker.tracker.judge.judged import Judged, commit_of
-from spook_tracker.tracker.judge.series_history import Told
+from spook_tracker.tracker.judge.level import FEW_NIGHTS_FLOOR
+from spook_tracker.tracker.judge.series_history import Told, on_one_clock
 from spook_tracker.tracker.judge.slower import Usual
 
 
@@ -24,7 +26,8 @@ class Known:
 def known(told: Mapping[str, Told], before: Sequence[str], after: Sequence[str]) -> Known:
     """What judged histories know about two sides, by the ids of their runs, the newest first.
 
-    Times are compared with the earlier run's own: of the history they have the noise alone. A red series is blamed on the commit where it last became worse up to the later run.
+    Times are compared with the earlier run's own: of the history they have the noise alone. A red series is blamed on the
+    commit where it last became worse, where that lies after the earlier run and not after the later one.
     """
     return known_of(told, newest_in(told, before), newest_in(told, after))
 
@@ -57,17 +60,52 @@ def known_of(told: Mapping[str, Told], before: Mapping[str, Judged], after: Mapp
     suspected = []
     for key, series in told.items():
         old, new = before.get(key), after.get(key)
-        if new is not None and new.red and new.worse_at is not None:
+        if (
+            new is not None
+            and new.red
+            and new.worse_at is not None
+            and _lies_after(series, new.worse_at, old)
+        ):
             good = new.before_worse
             first_bad[key] = (commit_of(good.run) if good else "", commit_of(new.worse_at.run))
         if series.definition.kind != "time" or old is None or old.usual is None:
             continue
-        usual[key] = of_two(_time(old), old.usual)
+        usual[key] = of_two(_time(old), noise_of(series, old) or old.usual)
         if new is not None:
             values[key] = (_time(old), _time(new))
             if new.state == "suspected":
                 suspected.append(key)
     return Known(usual=usual, values=values, suspected=tuple(suspected), first_bad=first_bad)
+
+
+def _lies_after(series: Told, night: Point, before: Judged | None) -> bool:
+    """Whether a night comes later in the history than the earlier run; yes where that did not measure it."""
+    if before is None:
+        return True
+    for judged in series.nights:
+        if judged.night is before.night:
+            return True
+        if judged.night is night:
+            return False
+    return True
+
+
+def noise_of(series: Told, judged: Judged) -> Usual | None:
+    """What is usual after a night; where it was too young to tell noise, the noise that later nights of its lane tell."""
+    if judged.usual is None or judged.usual[1] < FEW_NIGHTS_FLOOR:
+        return judged.usual
+    level, least = judged.usual
+    lane, passed = on_one_clock(judged.night), False
+    for later in series.nights:
+        passed = passed or later is judged
+        if (
+            passed
+            and later.usual is not None
+            and later.usual[1] < least
+            and on_one_clock(later.night) == lane
+        ):
+            return level, later.usual[1]
+    return judged.usual
 
 
 def of_two(value: float, usual: Usual) -> Usual:

@@ -204,7 +204,7 @@ def _judge_times(
         verdicts = [
             noisy if told is noisy.verdict else noisy._replace(verdict=told)
             for noisy, night in zip(verdicts, lane, strict=True)
-            for told in (by_outcome(noisy.verdict, night.sample),)
+            for told in (by_outcome(noisy.verdict, night.sample, definition.unit),)
         ]
         if is_read_off(definition):
             verdicts = list(map(_only_followed, verdicts))

@@ -7,7 +7,7 @@ import math
 from msgspec.structs import replace
 
 from spook_tracker.tracker.document.run_document import Sample
-from spook_tracker.tracker.judge.verdict import Verdict
+from spook_tracker.tracker.judge.verdict import Verdict, called_worse
 
 FROM_NONE = 1e9  # times as much stands for something in place of a value of 0
 LEAST = 0.01  # relative: no change of a time below is told, whatever the evidence
@@ -33,12 +33,12 @@ def only_followed(verdict: Verdict) -> Verdict:
     return replace(verdict, word="changed", name="", sentence=words)
 
 
-def judge_time(usual: Usual, value: float, larger_is_better: bool = False) -> Verdict:
+def judge_time(usual: Usual, value: float, larger_is_better: bool = False, unit: str = "s") -> Verdict:
     """One value against what was usual: red if it stands clear of the noise."""
     level, threshold = usual
     change = worse_by(level, value, larger_is_better)
     if change > threshold:
-        return slower(change, level, value, "slower")
+        return slower(change, level, value, called_worse("time", unit))
     if -change > threshold:
         return Verdict(word="improved", sentence=change_in_words(change))
     return Verdict(
@@ -71,8 +71,10 @@ def slower(change: float, level: float, value: float, name: str) -> Verdict:
     return Verdict(word="regressed", sentence=change_in_words(change), name=name, decades=decades)
 
 
-def by_outcome(verdict: Verdict, sample: Sample) -> Verdict:
-    """The same, where a night without a number is called what became of it."""
+def by_outcome(verdict: Verdict, sample: Sample, unit: str) -> Verdict:
+    """The same, where what is worse is no time, and a night without a number is called what became of it."""
+    if verdict.name == "slower":
+        return replace(verdict, name=called_worse("time", unit))
     if verdict.name != "not finite" or sample.outcome == "value":
         return verdict
     if sample.outcome == "missing":

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -18,7 +19,8 @@ from spook_tracker.tracker.judge.lane import Records, histories, line_of, machin
 from spook_tracker.tracker.judge.maps import ToldMap, stands_of, told_maps
 from spook_tracker.tracker.judge.repeats import looked_at
 from spook_tracker.tracker.judge.series_history import Told, is_noisy, judge_all
-from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict
+from spook_tracker.tracker.judge.standing import expected
+from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict, worse_times
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, WORSE_THAN_EXPECTED, Class, State
 
 MOST_NAMED = 8  # tests in one sentence
@@ -69,6 +71,13 @@ class Finding:
     def stands(self) -> Class:
         """What it stands for tonight."""
         return self.judged.stands if self.judged is not None else stands_of(self.verdict)
+
+    @property
+    def margin(self) -> float:
+        """How many times worse it became, as of causes; NaN where nothing says so."""
+        if self.judged is None or self.definition is None:
+            return math.nan
+        return worse_times(self.definition, self.stands == "fail", *self.judged.worsening)
 
     @property
     def _range(self) -> tuple[Run | None, Run | None]:
@@ -231,11 +240,25 @@ def to_be_timed_again(findings: Sequence[Finding]) -> list[str]:
     )
 
 
-def worst_first(findings: Sequence[Finding]) -> list[Finding]:
-    """Red before the rest, FAIL before WATCH, news before what was red already."""
+def least_of_none(margin: float) -> float:
+    """For an order: what nothing measures comes last."""
+    return 0.0 if math.isnan(margin) else margin
 
-    def rank(finding: Finding) -> tuple[bool, int, bool, str]:
-        return not finding.red, CLASS_RANK[finding.stands], not finding.news, finding.series
+
+def worst_first(findings: Sequence[Finding]) -> list[Finding]:
+    """Red before the rest, FAIL before WATCH, news before what was red already, then what has a limit, then the largest."""
+
+    def rank(finding: Finding) -> tuple[bool, int, bool, bool, float, str]:
+        decides = finding.definition is not None and expected(finding.definition)
+        size = -least_of_none(finding.margin) if finding.red else 0.0
+        return (
+            not finding.red,
+            CLASS_RANK[finding.stands],
+            not finding.news,
+            not decides,
+            size,
+            finding.series,
+        )
 
     return sorted(findings, key=rank)
 

@@ -193,7 +193,13 @@ def _by_size(
     if max(badness_before, badness_after) <= _deep_inside(definition, min(badness_before, badness_after)):
         return Verdict(word="changed", sentence=words + ", far inside the limit", decades=decades, ulps=ulps)
     if growth > 0.0:
-        return Verdict(word="regressed", sentence=words, name=_called(definition), decades=decades, ulps=ulps)
+        return Verdict(
+            word="regressed",
+            sentence=words,
+            name=called_worse(definition.kind, definition.unit),
+            decades=decades,
+            ulps=ulps,
+        )
     return Verdict(word="improved", sentence=words, decades=decades, ulps=ulps)
 
 
@@ -222,8 +228,11 @@ def _times(ratio: float) -> str:
     return f"{ratio:.2g} times" if 1e-3 <= ratio < 1e6 else f"{ratio:.0e} times"
 
 
-def _called(definition: SeriesDefinition) -> str:
-    return CALLED_WORSE.get(definition.kind, "worse")
+def called_worse(kind: str, unit: str) -> str:
+    """What a growth of badness is called: only what is timed, or a rate of work, is slower."""
+    if kind == "time" and unit != "s" and not unit.endswith("/s"):
+        return "worse"
+    return CALLED_WORSE.get(kind, "worse")
 
 
 def badness(definition: SeriesDefinition, value: float) -> float | None:
@@ -258,6 +267,21 @@ def limit_ratio(definition: SeriesDefinition, value: float) -> float:
         return math.nan
     larger_is_worse = (definition.better == "smaller") == (bound > 0.0)
     return value / bound if larger_is_worse else bound / value
+
+
+def worse_times(definition: SeriesDefinition, fails: bool, before: float, value: float) -> float:
+    """How many times its limit a value that fails is, or the value before where no limit says how bad it is.
+
+    Infinite where there is no value; NaN where neither says how bad it is.
+    """
+    if not math.isfinite(value):
+        return math.inf
+    if fails and not math.isnan(ratio := limit_ratio(definition, value)):
+        return ratio
+    own, old = badness(definition, value), badness(definition, before)
+    if own is None or old is None or not math.isfinite(old) or 0.0 in (own, old):
+        return math.nan
+    return old / own if own < 0.0 else own / old
 
 
 def _deep_inside(definition: SeriesDefinition, smaller: float) -> float:

@@ -59,7 +59,9 @@ USUAL = {
     **dict.fromkeys(("timestamp", "date", "datetime", "commit_time"), "started"),
     **dict.fromkeys(("benchmark", "name"), "test"),
 }
-NAMED_UNIT = re.compile(r"(?:^|[_.])(?:(\w+?)_per_(seconds?|secs?|s|ms|us|ns|min)|(s|secs?|seconds|ms|us|ns|bytes|[kmg]i?b))$")
+NAMED_UNIT = re.compile(
+    r"(?:^|[_.])(?:(\w+?)_per_(seconds?|secs?|s|ms|us|ns|min)|(s|secs?|seconds|ms|us|ns|bytes|[kmg]i?b))$"
+)
 FORMS = (".jsonl", ".ndjson", ".csv", ".tsv")
 MILLISECONDS = 1e11  # a moment above it is no number of seconds since 1970: those would be in the year 5138
 

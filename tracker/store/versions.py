@@ -147,7 +147,9 @@ def _unknown(runs: Sequence[RunInfo], name: str) -> UnknownName:
     if name == "previous":
         return UnknownName("there is only one run, and so no previous one; record another with: tracker run")
     if name == "last-green":
-        return UnknownName("no run has passed all its gates yet; name a version instead")
+        return UnknownName(
+            "no run has passed all its gates yet, and runs without gates, as imported ones, have none to pass; name a version instead"
+        )
     engines = list(dict.fromkeys(run.engine.name for run in runs))
     asked, at, _ = name.rpartition("@")
     if at and name.endswith(("@latest", "@previous")) and asked not in engines:

@@ -17,8 +17,8 @@ from spook_tracker.tracker.document.json_form import Writable, boxed
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
 from spook_tracker.tracker.document.wording import clean, conditions, limit, named, slug
 from spook_tracker.tracker.judge.accepted import Accepted
-from spook_tracker.tracker.judge.judged import commit_of
-from spook_tracker.tracker.judge.known import of_two
+from spook_tracker.tracker.judge.judged import commit_of, night_of
+from spook_tracker.tracker.judge.known import noise_of, of_two
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
 from spook_tracker.tracker.judge.rank import Question, question
 from spook_tracker.tracker.judge.repeats import looked_at
@@ -137,13 +137,15 @@ def all_marks(told: Mapping[str, Told]) -> dict[str, Marks]:
             else [night for night in looked_at(series.nights) if night.state == "detected"]
         ):
             usual = None
-            if timed and judged.usual is not None:
-                usual = of_two(judged.night.value, judged.usual)
-            blamed = judged.red and judged.worse_at is not None
+            if timed and (known := noise_of(series, judged)) is not None:
+                usual = of_two(judged.night.value, known)
             suspected = timed and judged.state == "suspected"
-            if usual is None and not blamed and not suspected:
+            blame = ""
+            if judged.red and judged.worse_at is not None:
+                run = judged.worse_at.run
+                blame = f"first bad commit {commit_of(run)}, of {night_of(run)}"
+            if usual is None and not blame and not suspected:
                 continue
-            blame = f"first bad commit {commit_of(judged.worse_at.run)}" if blamed and judged.worse_at else ""
             found.setdefault(judged.night.run.id, {})[key] = (usual, suspected, blame)
     return found
 
