@@ -31,6 +31,7 @@ from spook_tracker.tracker.judge.segments import Segment, boundary, spread_of
 from spook_tracker.tracker.judge.shifts import (
     BASE,
     FEWEST_BASE,
+    MANY,
     RARE,
     REACHED,
     SPANS,
@@ -198,7 +199,7 @@ class _Walk(DriftingLevel):
         few = len(self.now.places) + len(self.off) < FEWEST_BASE + FEWEST_SPAN
         if few or level <= 0.0 or (mean := self._last_above(level)) < LEAST:
             return None  # most nights: nothing to count
-        nights = [*self.now.places[-BASE - LONGEST_SPAN :], *self.off]
+        nights = [*self.now.places[-BASE - max(MANY) :], *self.off]
         age = self.ages[nights[-1]] - self.ages[self.start]
         found = shift(self._costs(nights), mean < self._level()[1], age, self._earlier())
         return (found.span, found) if found is not None and found.change > self._moves_by(found) else None

@@ -28,6 +28,7 @@ if TYPE_CHECKING:  # NumPy takes a fifth of a second to import, and most histori
     Values: TypeAlias = npt.NDArray[np.float64]
 
 SPANS = (4, 6)  # last nights looked at together
+MANY = (12, 24)  # the same of two clusters, where four nights in a row of the slower one are chance
 BASE = 100  # nights of the level before they are compared with
 FEWEST_BASE = 16  # fewer give no probability as small as this:
 RARE = 5e-5  # of an alarm in one series on one night: of a thousand series, a night in twenty has a false one
@@ -93,7 +94,31 @@ def shift(
         for tried in (every, _apart_from_clusters(old, new, spent(age), before)):
             if tried is not None and (found is None or _tells_more(tried, found)):
                 found = tried
+    if found is None and not clusters_only:
+        return next(filter(None, (_of_the_slower(values, span, before) for span in MANY)), None)
     return found
+
+
+def _of_the_slower(values: Sequence[float], span: int, before: Sequence[float]) -> Shift | None:
+    """The last nights where more of them are of the slower of two clusters than nights drawn at random would be.
+
+    By the hypergeometric distribution. A level between the clusters, nearer to the slower one, counts as that: sums
+    of so spread values would need many more nights to tell it.
+    """
+    import numpy as np
+
+    base, last = np.array(values[-BASE - span : -span]), np.array(values[-span:])
+    if len(base) < FEWEST_BASE or min(last) <= min(base) or (split := clusters(base)) is None:
+        return None
+    middle, change = 0.5 * sum(split), float(last.mean() / base.mean()) - 1.0
+    slow, of_last = int((base > middle).sum()), int((last > middle).sum())
+    every = len(base) + span
+    ways = range(of_last, min(span, slow + of_last) + 1)
+    chosen = sum(math.comb(slow + of_last, k) * math.comb(every - slow - of_last, span - k) for k in ways)
+    probability = chosen / math.comb(every, span)
+    if change <= LEAST or probability >= RAREST or remembered(base, before):
+        return None
+    return Shift(span, change, probability)
 
 
 def _tells_more(one: Shift, other: Shift) -> bool:
