@@ -9,6 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 
+import numpy as np
 import pytest
 
 from spook_tracker.tracker.document.run_document import MapData, Point
@@ -170,3 +171,14 @@ def test_recovered_is_the_first_night_after_red_that_says_anything() -> None:
     assert list(with_recoveries(states)) == [
         "green", "suspected", "detected", "unjudged", "recovered", "green", "detected", "recovered", "accepted",
     ]  # fmt: skip
+
+
+def test_more_nights_of_the_slower_cluster_in_a_row_than_chance_draws_are_a_level() -> None:
+    """One night in five is 10 % slower: six of them in a row are drawn too often to be told, twelve once in 10⁷."""
+    rng = np.random.default_rng(1)
+    nights = 1.0 + 0.1 * (rng.permutation(60) < 12) + 0.005 * rng.standard_normal(60)
+    slow = 1.1 + 0.005 * rng.standard_normal(24)
+    said = judge_noisy([*nights, *slow])
+
+    assert {night.state for night in said[60:66]} <= {"green", "suspected"}
+    assert (said[72].state, said[-1].worse_at, said[-1].verdict.name) == ("detected", 60, "slower")

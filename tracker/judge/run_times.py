@@ -195,13 +195,19 @@ class _Walk(DriftingLevel):
 
     def _together(self) -> tuple[int, Shift | None] | None:
         """Several nights that together lie above the segment's others."""
-        level = self._level()[0]
-        few = len(self.now.places) + len(self.off) < FEWEST_BASE + FEWEST_SPAN
-        if few or level <= 0.0 or (mean := self._last_above(level)) < LEAST:
+        level, noise, threshold = self._level()
+        if len(self.now.places) + len(self.off) < FEWEST_BASE + FEWEST_SPAN or level <= 0.0:
+            return None
+        mean = self._last_above(level)
+        if mean < LEAST and threshold > max(
+            FLOOR, SIGMAS * noise
+        ):  # of two clusters: the last thirty may be of one
+            mean = self._last_above(median([self.values[i] for i in self.now.places[-BASE:]]))
+        if mean < LEAST:
             return None  # most nights: nothing to count
         nights = [*self.now.places[-BASE - max(MANY) :], *self.off]
         age = self.ages[nights[-1]] - self.ages[self.start]
-        found = shift(self._costs(nights), mean < self._level()[1], age, self._earlier())
+        found = shift(self._costs(nights), mean < noise, age, self._earlier())
         return (found.span, found) if found is not None and found.change > self._moves_by(found) else None
 
     def _above_both(self) -> tuple[int, Shift | None] | None:
