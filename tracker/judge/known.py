@@ -83,9 +83,9 @@ def _lies_after(series: Told, night: Point, before: Judged | None) -> bool:
     if before is None:
         return True
     for judged in series.nights:
-        if judged.night is before.night:
+        if judged.night.run.id == before.night.run.id:
             return True
-        if judged.night is night:
+        if judged.night.run.id == night.run.id:
             return False
     return True
 
