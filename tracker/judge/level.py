@@ -28,6 +28,7 @@ from spook_tracker.tracker.judge.shifts import (
     BASE,
     CLIP,
     FEWEST_BASE,
+    MANY,
     REACHED,
     clusters,
     remembered,
@@ -243,8 +244,8 @@ class PresentLevel:
         import numpy as np
 
         low, high = base[:split], base[split:]
-        if high.mean() > low.mean() and clusters(base) is not None:
-            return  # more nights of the slower of two: of so few no older level is told, but a change (shifts.shift)
+        if len(high) <= max(MANY) and high.mean() > low.mean() and clusters(base) is not None:
+            return  # whether chance draws so many of the slower one is asked night by night
         memory = remembered(np.concatenate([low - low.mean(), high - high.mean()]))
         if memory and inner_split(costs, (1.0 - memory) / (1.0 + memory)) is None:
             return

@@ -37,6 +37,7 @@ from spook_tracker.tracker.judge.shifts import (
     SPANS,
     Shift,
     drawn_anew,
+    more_of_the_slower,
     shift,
 )
 from spook_tracker.tracker.judge.slower import CONFIRM, LEAST, Usual, change_in_words, slower, worse_by
@@ -198,16 +199,17 @@ class _Walk(DriftingLevel):
         level, noise, threshold = self._level()
         if len(self.now.places) + len(self.off) < FEWEST_BASE + FEWEST_SPAN or level <= 0.0:
             return None
-        mean = self._last_above(level)
-        if mean < LEAST and threshold > max(
-            FLOOR, SIGMAS * noise
-        ):  # of two clusters: the last thirty may be of one
-            mean = self._last_above(median([self.values[i] for i in self.now.places[-BASE:]]))
-        if mean < LEAST:
+        mean, strays = self._last_above(level), threshold > max(FLOOR, SIGMAS * noise)
+        if mean < LEAST and not strays:
             return None  # most nights: nothing to count
-        nights = [*self.now.places[-BASE - max(MANY) :], *self.off]
-        age = self.ages[nights[-1]] - self.ages[self.start]
-        found = shift(self._costs(nights), mean < noise, age, self._earlier())
+        costs = self._costs([*self.now.places[-BASE - max(MANY) :], *self.off])
+        found = None
+        if mean >= LEAST:
+            last = self.off[-1] if self.off else self.now.places[-1]
+            age = self.ages[last] - self.ages[self.start]
+            found = shift(costs, mean < noise, age, self._earlier())
+        if found is None and strays:
+            found = more_of_the_slower(costs, self._earlier())
         return (found.span, found) if found is not None and found.change > self._moves_by(found) else None
 
     def _above_both(self) -> tuple[int, Shift | None] | None:

@@ -94,31 +94,39 @@ def shift(
         for tried in (every, _apart_from_clusters(old, new, spent(age), before)):
             if tried is not None and (found is None or _tells_more(tried, found)):
                 found = tried
-    if found is None and not clusters_only:
-        return next(filter(None, (_of_the_slower(values, span, before) for span in MANY)), None)
     return found
 
 
-def _of_the_slower(values: Sequence[float], span: int, before: Sequence[float]) -> Shift | None:
-    """The last nights where more of them are of the slower of two clusters than nights drawn at random would be.
+def more_of_the_slower(values: Sequence[float], before: Sequence[float] = ()) -> Shift | None:
+    """The last twelve or 24 nights, if more of them are of the slower of two clusters than chance draws; see `shift`.
 
     By the hypergeometric distribution. A level between the clusters, nearer to the slower one, counts as that: sums
     of so spread values would need many more nights to tell it.
     """
+    for span in MANY:
+        base, last = values[-BASE - span : -span], values[-span:]
+        if len(base) < FEWEST_BASE:
+            return None
+        change = sum(last) * len(base) / (span * sum(base)) - 1.0
+        if change > LEAST and (probability := _drawn_by_chance(base, last, before)) < RAREST:
+            return Shift(span, change, probability)
+    return None
+
+
+def _drawn_by_chance(base: Sequence[float], last: Sequence[float], before: Sequence[float]) -> float:
+    """How probably nights drawn at random have as many of the slower cluster among the last; 1 if nothing tells it."""
     import numpy as np
 
-    base, last = np.array(values[-BASE - span : -span]), np.array(values[-span:])
-    if len(base) < FEWEST_BASE or min(last) <= min(base) or (split := clusters(base)) is None:
-        return None
-    middle, change = 0.5 * sum(split), float(last.mean() / base.mean()) - 1.0
-    slow, of_last = int((base > middle).sum()), int((last > middle).sum())
-    every = len(base) + span
-    ways = range(of_last, min(span, slow + of_last) + 1)
-    chosen = sum(math.comb(slow + of_last, k) * math.comb(every - slow - of_last, span - k) for k in ways)
-    probability = chosen / math.comb(every, span)
-    if change <= LEAST or probability >= RAREST or remembered(base, before):
-        return None
-    return Shift(span, change, probability)
+    nights = np.array(base)
+    if (split := clusters(nights)) is None:
+        return 1.0
+    middle = 0.5 * sum(split)
+    of_last = sum(night > middle for night in last)
+    slow, every = of_last + int((nights > middle).sum()), len(base) + len(last)
+    ways = range(of_last, min(len(last), slow) + 1)
+    chosen = sum(math.comb(slow, k) * math.comb(every - slow, len(last) - k) for k in ways)
+    probability = chosen / math.comb(every, len(last))
+    return probability if probability >= RAREST or not remembered(nights, before) else 1.0
 
 
 def _tells_more(one: Shift, other: Shift) -> bool:
