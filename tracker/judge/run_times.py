@@ -202,11 +202,10 @@ class _Walk(DriftingLevel):
         mean, strays = self._last_above(level), threshold > max(FLOOR, SIGMAS * noise)
         if mean < LEAST and not strays:
             return None  # most nights: nothing to count
-        costs = self._costs([*self.now.places[-BASE - max(MANY) :], *self.off])
-        found = None
+        nights = [*self.now.places[-BASE - max(MANY) :], *self.off]
+        costs, found = self._costs(nights), None
         if mean >= LEAST:
-            last = self.off[-1] if self.off else self.now.places[-1]
-            age = self.ages[last] - self.ages[self.start]
+            age = self.ages[nights[-1]] - self.ages[self.start]
             found = shift(costs, mean < noise, age, self._earlier())
         if found is None and strays:
             found = more_of_the_slower(costs, self._earlier())
