@@ -85,7 +85,6 @@ MUTANTS = (
     mutant("blame-is-never-looked-at-again", "run_times", "SETTLED = 30", "SETTLED = 0"),
     mutant("all-nights-are-of-one-age", "run_times", "age = self.ages[nights[-1]] - self.ages[self.start]", "age = 0"),
     mutant("slow-nights-are-not-counted", "run_times", "if found is None and strays:", "if False:"),
-    mutant("slow-nights-are-an-older-level", "level", "if len(high) <= max(MANY) and", "if False and"),
     mutant("a-fast-night-is-never-far", "run_times", "faster = way_back(change) if", "faster = -change if"),
     mutant("a-rate-falls-by-itself", "level", "return way_back(-change) if self.larger_is_better", "return change if self.larger_is_better"),
     mutant("first-nights-are-of-the-level", "level", "inner_split(costs, 1.0) or earlier_level(base)", "inner_split(costs, 1.0)"),

@@ -203,6 +203,19 @@ def test_a_run_without_any_value_is_left_out_and_said(tmp_path: Path) -> None:
     assert said.startswith("2 runs recorded") and "no value in them: 1 of" in said
 
 
+def test_a_slow_night_as_there_are_now_and_then_is_called_flaky(tmp_path: Path) -> None:
+    slow = np.random.default_rng(3).random(60) < 0.3
+    slow[-1] = True
+    told = imported(
+        tmp_path,
+        data({"f": [1000.0 * x * (1.3 if s else 1.0) for x, s in zip(noise(5), slow, strict=False)]}),
+    )
+    code, said = told("judge", "latest")
+
+    assert (code, "; 1 flaky\n! f/default/run_time: flaky; " in said) == (0, True)
+    assert json.loads(told("judge", "latest", "--json")[1])[0]["name"] == "flaky"
+
+
 def test_memory_that_grows_is_not_slower(tmp_path: Path) -> None:
     told = imported(tmp_path, data({"f": [1000.0 * (1 + (n >= 25)) for n in range(30)]}, lambda _: "KB"))
 
@@ -317,6 +330,14 @@ def test_versions_are_compared_machine_by_machine(machines: Strangers) -> None:
     assert (junit.count("<testcase"), junit.count("<failure")) == (3, 1)
     ids = re.findall(r'"run":"(\w+)"', json.dumps(document).replace(" ", ""))
     assert json.loads(machines("compare", *ids, "--format", "json")[1])["counts"] == {"same": 1}
+
+
+def test_the_first_page_says_on_which_machine_it_is_slower(machines: Strangers, tmp_path: Path) -> None:
+    assert machines("publish", "--out", tmp_path)[0] == 0
+    still_red = (tmp_path / "index.html").read_text().partition('id="old"')[2].partition("</section>")[0]
+
+    assert "1 worse in" in re.sub("<[^>]+>", "", still_red)
+    assert "on <bdi>m0 (m0)</bdi>" in still_red
 
 
 def test_what_one_version_alone_measured_is_named(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from spook_tracker.tracker.judge.causes import causes_tonight
 from spook_tracker.tracker.judge.choice import worst_change
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Frontier, Side
 from spook_tracker.tracker.judge.explaining import TIMES
-from spook_tracker.tracker.judge.judged import Judged
+from spook_tracker.tracker.judge.judged import BY_TIME, Judged
 from spook_tracker.tracker.judge.tonight import Finding, not_compared
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import OVERALL, QUIET, WORDS, besides, spaced
@@ -264,15 +264,22 @@ def finding_lines(findings: Sequence[Finding], site: str = "") -> list[str]:
     red = [finding for finding in findings if finding.red]
     causes = causes_tonight(findings)
     shared = [f"  {clean(cause.sentence)}" for cause in causes] if len(causes) < len(red) else []
-    return [
+    lines = [
         summary(findings),
         *shared,
         *(click.style(_finding_line(finding, site), fg="red") for finding in red),
         *(click.style(_finding_line(f, site), fg="green") for f in findings if f.recovered),
         *(click.style(_finding_line(f, site), fg="yellow") for f in findings if f.suspected),
-        *(click.style(_finding_line(f, site), fg="yellow") for f in findings if f.worse_than_expected),
+        *(
+            click.style(_finding_line(f, site), fg="yellow")
+            for f in findings
+            if f.flaky or f.worse_than_expected
+        ),
         *(f"note: {clean(note)}" for note in not_compared(_verdicts(findings))),
     ]
+    if not any(BY_TIME in line for line in lines):
+        return lines
+    return [*(line.replace(f"; {BY_TIME}", "") for line in lines), f"note: runs are {BY_TIME}"]
 
 
 def old_answer_lines(old: OldAnswers) -> list[str]:
@@ -316,6 +323,8 @@ def summary(findings: Sequence[Finding]) -> str:
     """One sentence: how many are red, how many of them since tonight, which is the worst, how many recovered."""
     red = [finding for finding in findings if finding.red]
     also = besides([finding.state for finding in findings])
+    if strays := sum(finding.flaky for finding in findings):
+        also += f"; {strays} flaky"
     words = Counter(_held(finding) for finding in findings if not finding.red)
     if red:
         new = sum(finding.news for finding in red)
@@ -375,7 +384,7 @@ def findings_json(findings: Sequence[Finding], then: Sequence[OldAnswers] = ()) 
             "series": finding.series,
             "test": finding.test,
             "word": finding.verdict.word,
-            "name": finding.name if finding.red or finding.worse_than_expected else "",
+            "name": finding.name if finding.red or finding.flaky or finding.worse_than_expected else "",
             "red": finding.red,
             "news": finding.red and finding.news,
             "state": finding.state,

@@ -28,7 +28,6 @@ from spook_tracker.tracker.judge.shifts import (
     BASE,
     CLIP,
     FEWEST_BASE,
-    MANY,
     REACHED,
     clusters,
     remembered,
@@ -146,6 +145,12 @@ class PresentLevel:
             clear = max(clear, REACH * (1.0 + UNSEEN / len(reached)) * outer)
         return max(clear, tolerated)
 
+    def _strays(self) -> float:
+        """The relative change that nights of the segment go beyond now and then, and others do not; infinite if none do."""
+        _, noise, threshold = self._level()
+        clear = max(FLOOR, SIGMAS * noise)
+        return clear if threshold > clear else math.inf
+
     def _reached(self) -> list[float]:
         """Deviations of nights that hold: the segment's own, filled up by those before it while it is young."""
         missing = WINDOW - len(self.reached)
@@ -244,8 +249,6 @@ class PresentLevel:
         import numpy as np
 
         low, high = base[:split], base[split:]
-        if len(high) <= max(MANY) and high.mean() > low.mean() and clusters(base) is not None:
-            return  # whether chance draws so many of the slower one is asked night by night
         memory = remembered(np.concatenate([low - low.mean(), high - high.mean()]))
         if memory and inner_split(costs, (1.0 - memory) / (1.0 + memory)) is None:
             return

@@ -40,7 +40,7 @@ from spook_tracker.tracker.judge.shifts import (
     more_of_the_slower,
     shift,
 )
-from spook_tracker.tracker.judge.slower import CONFIRM, LEAST, Usual, change_in_words, slower, worse_by
+from spook_tracker.tracker.judge.slower import CONFIRM, LEAST, Usual, change_in_words, flaky, slower, worse_by
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import with_recoveries
 
@@ -196,10 +196,10 @@ class _Walk(DriftingLevel):
 
     def _together(self) -> tuple[int, Shift | None] | None:
         """Several nights that together lie above the segment's others."""
-        level, noise, threshold = self._level()
+        level, noise, _ = self._level()
         if len(self.now.places) + len(self.off) < FEWEST_BASE + FEWEST_SPAN or level <= 0.0:
             return None
-        mean, strays = self._last_above(level), threshold > max(FLOOR, SIGMAS * noise)
+        mean, strays = self._last_above(level), self._strays() < math.inf
         if mean < LEAST and not strays:
             return None  # most nights: nothing to count
         nights = [*self.now.places[-BASE - max(MANY) :], *self.off]
@@ -299,8 +299,7 @@ class _Walk(DriftingLevel):
             return self._red_night(news=False)
         value = self.values[place]
         words = f"{change_in_words(self._worse_by(held, value))}, of two levels that nights are drawn from"
-        verdict = Verdict(word="same", sentence=words)
-        return Noisy(verdict=verdict, state="green", against=self.now.places[0], levels=(held, value))
+        return Noisy(verdict=flaky(words), state="green", against=self.now.places[0], levels=(held, value))
 
     # A new segment.
 
@@ -422,11 +421,11 @@ class _Walk(DriftingLevel):
             verdict = slower(change, level, self.values[place], "")
             return Noisy(verdict=verdict, state="suspected", against=good, levels=(level, self.values[place]))
         words = change_in_words(change)
-        verdict = (
-            Verdict(word="improved", sentence=words)
-            if fast
-            else Verdict(word="same", sentence=f"{words}, inside the noise")
-        )
+        verdict = Verdict(word="same", sentence=f"{words}, inside the noise")
+        if fast:
+            verdict = Verdict(word="improved", sentence=words)
+        elif change > self._strays():
+            verdict = flaky(f"{words}, and nights of this level go as far now and then")
         return Noisy(verdict=verdict, state="green", against=good, levels=(level, self.values[place]))
 
     def _red_night(self, news: bool, words: str = "") -> Noisy:
@@ -471,8 +470,7 @@ class _Walk(DriftingLevel):
         assert self.reference is not None
         held = self.reference.level
         words = f"{change_in_words(self._worse_by(held, level))}, at a level that was left again before"
-        verdict = Verdict(word="same", sentence=words)
-        return Noisy(verdict=verdict, state="green", against=self.reference.last, levels=(held, level))
+        return Noisy(verdict=flaky(words), state="green", against=self.reference.last, levels=(held, level))
 
     def _accept(self, place: int) -> Noisy:
         """The present level is the one that others are held to from now on."""

@@ -11,6 +11,7 @@ from spook_tracker.tracker.judge.verdict import Verdict, called_worse
 
 FROM_NONE = 1e9  # times as much stands for something in place of a value of 0
 LEAST = 0.01  # relative: no change of a time below is told, whatever the evidence
+FLAKY = "flaky"
 CONFIRM = "to be confirmed by another night"
 Usual = tuple[float, float]  # level, and the relative change that stands clear of its noise
 
@@ -69,6 +70,11 @@ def slower(change: float, level: float, value: float, name: str) -> Verdict:
     ratio = abs(value / level) if level else 0.0
     decades = math.log10(ratio) if 2.0 / FROM_NONE < ratio < 0.5 * FROM_NONE else None
     return Verdict(word="regressed", sentence=change_in_words(change), name=name, decades=decades)
+
+
+def flaky(words: str) -> Verdict:
+    """Of a night slower than usual at a level that comes and goes: it is none that lasts."""
+    return Verdict(word="same", name=FLAKY, sentence=words)
 
 
 def by_outcome(verdict: Verdict, sample: Sample, unit: str) -> Verdict:

@@ -19,6 +19,7 @@ from spook_tracker.tracker.judge.lane import Records, histories, line_of, machin
 from spook_tracker.tracker.judge.maps import ToldMap, stands_of, told_maps
 from spook_tracker.tracker.judge.repeats import looked_at
 from spook_tracker.tracker.judge.series_history import Told, is_noisy, judge_all
+from spook_tracker.tracker.judge.slower import FLAKY
 from spook_tracker.tracker.judge.standing import expected
 from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict, worse_times
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, WORSE_THAN_EXPECTED, Class, State
@@ -61,6 +62,11 @@ class Finding:
     def suspected(self) -> bool:
         """A slow night that no second one has confirmed."""
         return self.state == "suspected"
+
+    @property
+    def flaky(self) -> bool:
+        """Slower tonight as nights of its level are now and then."""
+        return self.verdict.name == FLAKY
 
     @property
     def worse_than_expected(self) -> bool:

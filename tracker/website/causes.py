@@ -22,6 +22,7 @@ from spook_tracker.tracker.document.wording import (
 )
 from spook_tracker.tracker.judge.causes import Cause, Hit, causes
 from spook_tracker.tracker.judge.judged import blame
+from spook_tracker.tracker.judge.lane import machine_of
 from spook_tracker.tracker.judge.maps import map_key
 from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.motions import SEEN, apart
@@ -81,6 +82,7 @@ class ToldCause:
     worst: HitRow
     replay: str  # where its first wrong moment can be seen; empty where no motion was recorded
     compare: str
+    machines: list[str]  # that measured what is shown; none where all nights are of one
     ended: list[Night]  # runs where it came back or was accepted, first and last
     hits: Sequence[Hit]
 
@@ -162,9 +164,16 @@ def told(cause: Cause, book: Book) -> ToldCause:
         worst=hit_row(shown[0], book),
         replay=_replay(by_test, known, good, book),
         compare=f"compare.html#after={night.id}&before={good.id}" if good is not None else "",
+        machines=_machines(shown, book),
         ended=[ends[0][1], ends[-1][1]] if ends else [],
         hits=cause.hits,
     )
+
+
+def _machines(hits: Sequence[Hit], book: Book) -> list[str]:
+    if len({night.machine.fingerprint for night in book.nights}) < 2:
+        return []
+    return sorted({clean(machine_of(hit.bad)) for hit in hits if hit.bad is not None})
 
 
 def anchor(cause: Cause) -> str:
@@ -177,10 +186,11 @@ def damage_of(hits: Sequence[Hit]) -> list[tuple[str, int]]:
     maps = sum(hit.definition is None for hit in hits) - gone
     lost = sum(hit.stands == "fail" and not math.isfinite(hit.value) for hit in hits) - gone
     broken = sum(hit.stands == "fail" for hit in hits) - lost - gone
+    limits = any(hit.definition is not None and hit.definition.limit is not None for hit in hits)
     counts = [
         ("limit broken" if broken == 1 else "limits broken", broken),
         ("value lost" if lost == 1 else "values lost", lost),
-        ("worse, limits kept", len(hits) - broken - lost - maps - gone),
+        ("worse, limits kept" if limits else "worse", len(hits) - broken - lost - maps - gone),
         ("stability map lost" if gone == 1 else "stability maps lost", gone),
         ("stability map worse" if maps == 1 else "stability maps worse", maps),
     ]
