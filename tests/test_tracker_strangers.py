@@ -241,6 +241,24 @@ def test_two_nights_of_a_young_history_are_compared_by_the_noise_that_is_known_t
     assert told("judge", "latest")[0] == code == 1, said
 
 
+def test_a_benchmark_with_repeats_is_red_once(tmp_path: Path) -> None:
+    rows = ["commit,date,heap_ms"]
+    rows += [
+        f"{n:04d}{'e' * 36},2025-01-{n + 1:02d},{x * (2.0 if n >= 28 else 1.0)}"
+        for n in range(30)
+        for x in (1.0, 1.01, 1.02)
+    ]
+    (tmp_path / "x.csv").write_text("\n".join(rows))
+    told = Strangers(tmp_path)
+    assert told("import", tmp_path / "x.csv")[0] == 0
+    code, said = told("compare", "0010eeee", "0029eeee", "--format", "json", "--against-history")
+
+    assert (code, [change["series"] for change in json.loads(said)["changes"] if change["red"]]) == (
+        1,
+        ["x/default/heap_ms"],
+    )
+
+
 def test_a_benchmark_of_asv_is_its_version_its_parameters_and_its_unit(tmp_path: Path) -> None:
     """Twelve nights, then another version four times as slow, a parameter put in front, and one that fails."""
     before = {"a.time_x": [[0.1], [], "v1"], "b.time_x": [[0.01, 0.1], [["'some'", "'many'"]], "v"]}
@@ -338,6 +356,19 @@ def test_the_first_page_says_on_which_machine_it_is_slower(machines: Strangers, 
 
     assert "1 worse in" in re.sub("<[^>]+>", "", still_red)
     assert "on <bdi>m0 (m0)</bdi>" in still_red
+
+
+def test_a_comparison_for_ci_tells_what_it_left_out(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_text(
+        csv(2, 1.0).replace("0029" + "e" * 36 + ",2025-01-30T01:00:00Z,m1", "x,2025-01-30T01:00:00Z,m1")
+    )
+    told = Strangers(tmp_path)
+    assert told("import", tmp_path / "x.csv")[0] == 0
+
+    assert (
+        "not compared, 1 machine that measured"
+        in told("compare", "0028eeee", "0029eeee", "--format", "junit")[1]
+    )
 
 
 def test_what_one_version_alone_measured_is_named(tmp_path: Path) -> None:

@@ -79,11 +79,11 @@ def junit_of_night(findings: Sequence[Finding], then: Sequence[OldAnswers] = ())
 
 
 def junit_of_comparison(document: CompareDocument) -> str:
-    """Every series of a comparison; red ones fail, incomparable ones are skipped."""
+    """Every series of a comparison; red ones fail, incomparable ones are skipped, and what was left out is said at the end."""
     cases = defaultdict(list)
     for change in document.changes:
         cases[change.test].append(_of_change(change))
-    return _document(dict(sorted(cases.items())))
+    return _document(dict(sorted(cases.items())), document.notes)
 
 
 def _of_change(change: Change, asked: str = "") -> Case:
@@ -94,7 +94,7 @@ def _of_change(change: Change, asked: str = "") -> Case:
     )
 
 
-def _document(cases: Mapping[str, Sequence[Case]]) -> str:
+def _document(cases: Mapping[str, Sequence[Case]], notes: Sequence[str] = ()) -> str:
     suites = Element("testsuites")
     for test, found in cases.items():
         suite = SubElement(suites, "testsuite", name=legal(test), tests=str(len(found)))
@@ -108,6 +108,9 @@ def _document(cases: Mapping[str, Sequence[Case]]) -> str:
                 SubElement(case, "skipped", message=legal(one.skipped))
             elif one.said:
                 SubElement(case, "system-out").text = legal(one.said)
+    if notes:
+        suite = SubElement(suites, "testsuite", name="notes", tests="0", failures="0", errors="0")
+        SubElement(suite, "system-out").text = legal("\n".join(notes))
     return _text(suites)
 
 

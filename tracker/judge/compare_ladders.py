@@ -106,9 +106,9 @@ def _ladders(before: Samples, after: Samples) -> dict[tuple[str, str, str], list
 
 
 def _single(before: Samples, after: Samples) -> Iterator[list[Rung]]:
-    """Series outside ladders that carry repeats of their own."""
+    """Series outside ladders that carry repeats of their own; one that is a time itself is judged as that."""
     for key, (definition, new) in after.items():
-        if definition.kind == "ladder" or new.timing is None or key not in before:
+        if definition.kind in ("ladder", "time") or new.timing is None or key not in before:
             continue
         earlier, old = before[key]
         if earlier.test_version == definition.test_version:
