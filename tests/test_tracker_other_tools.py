@@ -189,6 +189,14 @@ def action(benches: list[dict[str, Any]], tool: str = "cargo") -> dict[str, Any]
     return ACTION | {"entries": {"Engine": [entry]}}
 
 
+def test_local_changes_of_pytest_benchmark_make_another_run_and_no_version() -> None:
+    clean, dirty = (
+        read(PYTEST | {"commit_info": PYTEST["commit_info"] | {"dirty": dirty}})[0] for dirty in (False, True)
+    )
+    assert (clean.engine.dirty, dirty.engine.dirty) == (False, True)
+    assert clean.id != dirty.id
+
+
 def test_a_benchmark_twice_in_a_file_of_pytest_is_one_with_all_its_repeats() -> None:
     once, twice = (read(PYTEST | {"benchmarks": PYTEST["benchmarks"] * times})[0] for times in (1, 2))
 

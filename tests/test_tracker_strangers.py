@@ -334,6 +334,17 @@ def test_a_version_is_judged_on_every_machine_that_measured_it(machines: Strange
         assert re.findall(r'name="default/run_time on (m\d)', (tmp_path / "x.xml").read_text())[0] == "m0"
 
 
+def test_releases_without_commits_are_judged_on_every_machine(tmp_path: Path) -> None:
+    rows = csv(3, 1.3).replace("commit,", "version,").replace("e" * 36, ".0")
+    (tmp_path / "x.csv").write_text(rows)
+    told = Strangers(tmp_path)
+    assert told("import", tmp_path / "x.csv")[0] == 0
+    code, said = told("judge", "latest")
+
+    assert (code, "on m0" in said) == (1, True)
+    assert "compared on 3 machines" in told("compare", "0015.0", "0029.0")[1]
+
+
 def test_versions_are_compared_machine_by_machine(machines: Strangers) -> None:
     """The commit before the latest is the previous one, not another machine's run of the latest."""
     code, said = machines("compare", f"{15:04d}", "latest")

@@ -7,6 +7,7 @@ are made here and nowhere else, so that every judge of a history judges them, to
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from datetime import timedelta
 from functools import cache
 from typing import Protocol, TypeVar
 
@@ -28,6 +29,7 @@ from spook_tracker.tracker.document.run_document import (
 from spook_tracker.tracker.judge.calibration import ladder_timing, that_counts
 from spook_tracker.tracker.judge.work import FAMILIES, Samples, families_of, with_work
 
+NIGHT = timedelta(days=1)  # runs of several machines within it are of one
 OneRun = TypeVar("OneRun", bound=Run)
 RECENT = 60  # runs read with all their evidence: state hashes, failures, counters, timings;
 SPARSE = 16  # of those before them one in so many, so that what was lost then is not forgotten
@@ -66,9 +68,17 @@ def line_of(runs: Sequence[OneRun], run: OneRun) -> list[OneRun]:
 
 
 def of_version(runs: Sequence[OneRun], run: OneRun) -> list[OneRun]:
-    """The runs of a run's version among these, in their order: all of its commit; of a build without one, itself alone."""
-    if not is_placed(run):
+    """The runs of a run's version among these, in their order: all of its commit.
+
+    Without a commit, those of one version string within a day: a string says less, as it may stay the same for months.
+    Of a build with local changes, itself alone: nothing says that another one has the same.
+    """
+    if run.engine.dirty:
         return [run]
+    if not is_placed(run):
+        same = [o for o in runs if (o.engine.name, o.engine.version) == (run.engine.name, run.engine.version)]
+        mine = (o for o in same if not o.engine.git_hash and not o.engine.dirty)
+        return [o for o in mine if abs(started(o) - started(run)) < NIGHT]
     version = run.engine.name, run.engine.git_hash
     return [o for o in runs if is_placed(o) and (o.engine.name, o.engine.git_hash) == version]
 

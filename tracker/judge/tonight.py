@@ -6,7 +6,6 @@ import math
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from datetime import timedelta
 
 from spook_tracker.tracker.document.about import started
 from spook_tracker.tracker.document.run_document import Run, SeriesDefinition
@@ -15,7 +14,7 @@ from spook_tracker.tracker.judge.events import name_of
 from spook_tracker.tracker.judge.explaining import beside_findings
 from spook_tracker.tracker.judge.judged import Judged, blame, blame_of, commit_of
 from spook_tracker.tracker.judge.known import judged_in
-from spook_tracker.tracker.judge.lane import Records, histories, line_of, machine_of, of_version
+from spook_tracker.tracker.judge.lane import NIGHT, Records, histories, line_of, machine_of, of_version
 from spook_tracker.tracker.judge.maps import ToldMap, stands_of, told_maps
 from spook_tracker.tracker.judge.repeats import looked_at
 from spook_tracker.tracker.judge.series_history import Told, is_noisy, judge_all
@@ -25,7 +24,6 @@ from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict, worse_t
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, WORSE_THAN_EXPECTED, Class, State
 
 MOST_NAMED = 8  # tests in one sentence
-NIGHT = timedelta(days=1)  # runs of several machines within it are of one
 HOW_TO_COMPARE = (
     "; to compare, put today's to the old commit: tracker backfill COMMIT, or the old ones to today's engine: "
     "tracker judge RUN --old-questions"

@@ -73,6 +73,7 @@ class ShortRun(Struct, frozen=True, kw_only=True):
     processor: Text = ""  # as a reader sees it; else the machine's name
     cores: int = 1
     operating_system: Text = ""
+    dirty: bool = False  # built with changes that are in no commit
 
 
 class _Peek(msgspec.Struct):
@@ -124,7 +125,7 @@ def document_of(short: ShortRun, identity: str, origin: str) -> RunDocument:
             name=short.engine,
             version=short.version,
             git_hash=short.commit,
-            dirty=False,
+            dirty=short.dirty,
             commit_time=short.commit_time,
             parents=short.parents,
         ),
