@@ -28,6 +28,7 @@ from spook_tracker.tracker.judge.shifts import (
     BASE,
     CLIP,
     FEWEST_BASE,
+    MANY,
     REACHED,
     clusters,
     remembered,
@@ -148,8 +149,16 @@ class PresentLevel:
     def _strays(self) -> float:
         """The relative change that nights of the segment go beyond now and then, and others do not; infinite if none do."""
         _, noise, threshold = self._level()
+        if threshold <= FLOOR:
+            return math.inf
         clear = max(FLOOR, SIGMAS * noise)
         return clear if threshold > clear else math.inf
+
+    def _strays_often(self, off: int) -> bool:
+        """Whether nights stray, and so many of the last ones, `off` of them not joined yet, that they may be a level."""
+        if self._strays() == math.inf:
+            return False
+        return 2 * (sum(reached > FLOOR for reached in self.reached[-max(MANY) :]) + off) >= min(MANY)
 
     def _reached(self) -> list[float]:
         """Deviations of nights that hold: the segment's own, filled up by those before it while it is young."""

@@ -196,10 +196,10 @@ class _Walk(DriftingLevel):
 
     def _together(self) -> tuple[int, Shift | None] | None:
         """Several nights that together lie above the segment's others."""
-        level, noise, _ = self._level()
+        level, noise, threshold = self._level()
         if len(self.now.places) + len(self.off) < FEWEST_BASE + FEWEST_SPAN or level <= 0.0:
             return None
-        mean, strays = self._last_above(level), self._strays() < math.inf
+        mean, strays = self._last_above(level), threshold > FLOOR and self._strays_often(len(self.off))
         if mean < LEAST and not strays:
             return None  # most nights: nothing to count
         nights = [*self.now.places[-BASE - max(MANY) :], *self.off]
@@ -424,7 +424,7 @@ class _Walk(DriftingLevel):
         verdict = Verdict(word="same", sentence=f"{words}, inside the noise")
         if fast:
             verdict = Verdict(word="improved", sentence=words)
-        elif change > self._strays():
+        elif change > FLOOR and change > self._strays():
             verdict = flaky(f"{words}, and nights of this level go as far now and then")
         return Noisy(verdict=verdict, state="green", against=good, levels=(level, self.values[place]))
 

@@ -28,6 +28,7 @@ if TYPE_CHECKING:  # NumPy takes a fifth of a second to import, and most histori
     Values: TypeAlias = npt.NDArray[np.float64]
 
 SPANS = (4, 6)  # last nights looked at together
+MOSTLY = 2.0 / 3.0  # of the last many nights are of a slower level
 MANY = (12, 24)  # the same of two clusters, where four nights in a row of the slower one are chance
 BASE = 100  # nights of the level before they are compared with
 FEWEST_BASE = 16  # fewer give no probability as small as this:
@@ -107,8 +108,11 @@ def more_of_the_slower(values: Sequence[float], before: Sequence[float] = ()) ->
         base, last = values[-BASE - span : -span], values[-span:]
         if len(base) < FEWEST_BASE:
             return None
-        change = sum(last) * len(base) / (span * sum(base)) - 1.0
-        if change > LEAST and (probability := _drawn_by_chance(base, last, before)) < RAREST:
+        middle = sum(base) / len(base)
+        change = sum(last) / (span * middle) - 1.0
+        if change <= LEAST or sum(night > middle for night in last) < MOSTLY * span:
+            continue
+        if (probability := _drawn_by_chance(base, last, before)) < RAREST:
             return Shift(span, change, probability)
     return None
 
