@@ -78,6 +78,11 @@ class Reference:
     nights: int  # that tell it
 
 
+def clear_of(noise: float) -> float:
+    """The relative change that stands clear of noise alone."""
+    return max(FLOOR, SIGMAS * noise)
+
+
 @dataclass
 class PresentLevel:
     """The present segment and what is remembered of those before it."""
@@ -134,7 +139,7 @@ class PresentLevel:
         tolerated = self._tolerated(level)
         if count < FEWEST or level == 0.0:
             return max(FEW_NIGHTS_FLOOR, tolerated)
-        clear = max(FLOOR, SIGMAS * noise)
+        clear = clear_of(noise)
         if own >= ENOUGH:
             clear = max(LEAST, min(clear, CLEAR * noise))
         reached = self._reached()
@@ -151,7 +156,7 @@ class PresentLevel:
         _, noise, threshold = self._level()
         if threshold <= FLOOR:
             return math.inf
-        clear = max(FLOOR, SIGMAS * noise)
+        clear = clear_of(noise)
         return clear if threshold > clear else math.inf
 
     def _strays_often(self, off: int) -> bool:
