@@ -23,6 +23,11 @@ MOST_XML = 16_000_000  # bytes of a file that is read as text: elements take ten
 MOST_FILES = 3_000
 DEEPEST = 200  # elements within elements; engines read models recursively
 MOST_COPIES = 10_000  # that one element makes: engines write out each of them before they look at the next
+MOST_ROOM = 100_000_000  # numbers that one element asks for without a file that holds them
+ROOM = {"hfield": ("nrow", "ncol"), "texture": ("width", "height")}  # whose product is that
+KEPT = ("nkey", "nuserdata")  # of <size>: rows of numbers
+ROW = 100  # numbers in one, at least
+SHORTEST = 1e-6  # s, of a time step: with less a second takes hours
 COPYING = ("replicate", "composite", "flexcomp")  # elements with a count, or a product of counts
 POINTER = b"version https://git-lfs"  # what a clone without Git LFS has in place of a file
 MOST_WATCHED = 8
@@ -172,15 +177,19 @@ class _Reader:
             root = ElementTree.fromstring(text)
         except (ElementTree.ParseError, ValueError, LookupError) as error:
             raise ModelError(f"{path} is no XML: {error}") from None
-        level, depth = [root], 0
+        level, depth = [(root, 1.0)], 0
         while level:
-            if greedy := next(
-                (one for one in level if one.tag in COPYING and _copies(one) > MOST_COPIES), None
-            ):
-                raise ModelError(
-                    f"{path}: <{greedy.tag}> makes {_copies(greedy):.3g} copies; it may make {MOST_COPIES}"
-                )
-            level, depth = [child for element in level for child in element], depth + 1
+            below: list[tuple[ElementTree.Element, float]] = []
+            for one, copies in level:
+                own = copies * _copies(one) if one.tag in COPYING else copies
+                if own > MOST_COPIES:
+                    raise ModelError(f"{path}: <{one.tag}> makes {own:.3g} copies; it may make {MOST_COPIES}")
+                if (room := _room(one)) > MOST_ROOM:
+                    raise ModelError(
+                        f"{path}: <{one.tag}> asks for {room:.3g} numbers; it may ask for {MOST_ROOM:.0e}"
+                    )
+                below += [(child, own) for child in one]
+            level, depth = below, depth + 1
             if depth > DEEPEST:
                 raise ModelError(f"{path} has elements nested deeper than {DEEPEST}")
         return root
@@ -386,6 +395,17 @@ def _copies(element: ElementTree.Element) -> float:
         return 1.0
 
 
+def _room(element: ElementTree.Element) -> float:
+    """How many numbers it asks for beside what files hold; what is no number is left to the engine."""
+    asked: dict[str, float] = {}
+    for name in (*ROOM.get(element.tag, ()), *(KEPT if element.tag == "size" else ())):
+        try:
+            asked[name] = float(element.get(name, "0"))
+        except ValueError:
+            return 0.0
+    return ROW * max(asked.values()) if element.tag == "size" else math.prod(asked.values())
+
+
 def _beside(file: Path, main: Path) -> str:
     """Where a file lies seen from the first one."""
     return Path(os.path.relpath(file, main)).as_posix()
@@ -401,7 +421,7 @@ def _step(text: str | None, path: Path) -> float:
         step = float(text or "")
     except ValueError:
         raise ModelError(f"{path}: its time step is {text!r}, which is no number") from None
-    if not 0.0 < step <= 1.0:
+    if not SHORTEST <= step <= 1.0:
         raise ModelError(f"{path}: its time step is {step:g} s")
     return step
 

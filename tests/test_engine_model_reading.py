@@ -97,6 +97,13 @@ BOMB = '<!DOCTYPE m [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><mujoco><worldbody
         (BOMB, "declares XML entities"),
         (_nested(DEEPEST + 1), "nested deeper"),
         ('<mujoco><worldbody><replicate count="1000000000"><body/></replicate></worldbody></mujoco>', "makes 1e\\+09 copies"),
+        (
+            '<mujoco><worldbody><replicate count="1000"><replicate count="1000"><body/></replicate></replicate></worldbody></mujoco>',
+            "makes 1e\\+06 copies",
+        ),
+        ('<mujoco><size nkey="10000000"/><worldbody><body/></worldbody></mujoco>', "asks for 1e\\+09 numbers"),
+        ('<mujoco><asset><hfield nrow="60000" ncol="60000"/></asset></mujoco>', "asks for 3.6e\\+09 numbers"),
+        ('<mujoco><option timestep="1e-12"/><worldbody><body><joint/></body></worldbody></mujoco>', "time step is 1e-12"),
         ("version https://git-lfs.github.com/spec/v1", "pointer of Git LFS"),
         ("<html/>", "begins with <html>"),
         ("<mujocoinclude/>", "no model by itself"),

@@ -189,6 +189,22 @@ def test_a_change_beyond_the_teams_tolerance_is_red() -> None:
     assert _judged(0.1, 0.102, tolerance=1e-3).red
 
 
+@pytest.mark.parametrize(("more", "role"), [("", "gate"), ("push = 0.01\n", "reported")])
+def test_what_is_pushed_all_the_time_is_held_to_its_motion_alone(
+    ball: Path, tmp_path: Path, more: str, role: str
+) -> None:
+    (tmp_path / "tracker.toml").write_text(f'[[model]]\nfile = "ball.xml"\ntolerance = 0.001\n{more}')
+
+    (test,) = catalogue(str(tmp_path / "tracker.toml")).values()
+    roles = {
+        m.configuration: {q.role for q in m.metrics if q.unit == "m" and q.better == "inside"}
+        for m in test.measurements
+    }
+
+    assert roles["motion"] == {"gate"}
+    assert roles["rest"] == {role}
+
+
 def test_beyond_the_predictable_time_no_place_is_compared() -> None:
     chaos = Sensitivity(rounding=Number(math.inf), step_error=Number(0.3), scale=Number(0.5))
 

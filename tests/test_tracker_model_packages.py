@@ -6,6 +6,7 @@ import re
 from functools import partial
 from pathlib import Path
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
 
@@ -13,7 +14,7 @@ from spook_tracker.engine.model_reading import read
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.cli.models import markdown_of
-from spook_tracker.tracker.measure import model_packages, model_standing
+from spook_tracker.tracker.measure import model_agreement, model_packages, model_standing
 from spook_tracker.tracker.measure.model_agreement import agreement
 from spook_tracker.tracker.measure.model_files import ModelFileError
 from spook_tracker.tracker.measure.model_packages import files_of, loaded, looked_at, stood
@@ -208,6 +209,24 @@ def test_a_swing_is_compared_with_mujocos(tmp_path: Path) -> None:
     assert "1 swing as in MuJoCo" in ran.output
     assert "0 swing otherwise; of 0 the steps say too little; 0 out of time" in ran.output
     assert alone.exit_code == 2
+
+
+def test_a_swing_that_breaks_off_at_long_steps_is_compared_at_shorter_ones(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[float] = []
+
+    def ran(model: object, engine: str, step: float, end: float) -> tuple[np.ndarray, float]:
+        asked.append(step)
+        if engine == "spook" and step > 0.004:
+            raise model_agreement.BrokeOff("spook: diverged")
+        return np.full((1, 3), 1e-8 if engine == "spook" else 0.0), 1.0
+
+    monkeypatch.setattr(model_agreement, "_ran", ran)
+    found = agreement(None, "spook")  # type: ignore[arg-type]
+
+    assert found.apart == pytest.approx(np.sqrt(3.0) * 1e-8) and found.resolved
+    assert asked == [1e-3, 5e-4, 1e-2, 5e-3, 2.5e-3, 1.25e-3]
 
 
 def test_a_swing_that_takes_longer_than_there_is_time_is_told(

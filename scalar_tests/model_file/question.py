@@ -27,14 +27,20 @@ def test_of(
     bodies: int = 0,
     driven: bool = False,
 ) -> ScalarTest:
-    """The test of a model watched for `duration` [s]; beyond `tolerance` [m, rad] a change is red."""
-    asked = Asked(model=model, duration=duration)
+    """The test of a model watched for `duration` [s]; beyond `tolerance` [m, rad] a change is red.
 
-    def part(configuration: str, metrics: tuple[Metric, ...], measure: Measure, note: str) -> Measurement:
+    What is driven or pushed all the time does not rest: of it the tolerance is that of its motion.
+    """
+    asked = Asked(model=model, duration=duration)
+    may_rest = model.drive.kind in ("zero", "hold") and not model.push
+
+    def part(
+        configuration: str, metrics: tuple[Metric, ...], measure: Measure, note: str, held: bool = True
+    ) -> Measurement:
         return Measurement(
             configuration=configuration,
             time_step=model.time_step,
-            metrics=tuple(_held(metric, tolerance) for metric in metrics),
+            metrics=tuple(_held(metric, tolerance if held else 0.0) for metric in metrics),
             measure=partial(measure, asked),
             note=note,
         )
@@ -68,7 +74,11 @@ def test_of(
         measurements=(
             part("motion", motion.metrics(asked), motion.measure, "as the file has it"),
             part(
-                "rest", rest.metrics(asked, stands_free), rest.measure, "as the file has it, until all rests"
+                "rest",
+                rest.metrics(asked, stands_free),
+                rest.measure,
+                "as the file has it, until all rests",
+                held=may_rest,
             ),
             part(
                 "books",

@@ -25,7 +25,11 @@ STEPS = {REFERENCE: 1e-3}  # s, to begin with
 STEP = 1e-2  # s, of an engine that is asked with the highest order it has
 FINEST = 1e-5  # s
 RESOLVED = 0.1 * ALIKE  # of the size: what halving a step may still change
-BUDGET = 240.0  # s of the processor that both engines may take together
+BUDGET = 60.0  # s of the processor that both engines may take together
+
+
+class BrokeOff(EngineError):
+    """A run did not come to its end."""
 
 
 class OutOfTime(EngineError):
@@ -59,7 +63,14 @@ def _resolved(
     model: ModelFile, engine: str, step: float, end: float
 ) -> tuple[npt.NDArray[np.float64], float, float]:
     """Places of the watched bodies at the end, what halving the step changed of them, and the size of what moves."""
-    before, size = _ran(model, engine, step, end)
+    while True:
+        try:
+            before, size = _ran(model, engine, step, end)
+            break
+        except BrokeOff:  # of a step that is too long for it
+            step *= 0.5
+            if step <= FINEST:
+                raise
     last = np.inf
     while True:
         step *= 0.5
@@ -77,7 +88,7 @@ def _ran(model: ModelFile, engine: str, step: float, end: float) -> tuple[npt.ND
     if done.status == "timed_out":
         raise OutOfTime(f"out of time: {engine} needs steps of {step:.2g} s or less")
     if not done.completed:
-        raise EngineError(f"{engine}: {done.failure}")
+        raise BrokeOff(f"{engine}: {done.failure}")
     return np.asarray(done["position"])[-1], float(done["size"])
 
 
