@@ -25,7 +25,7 @@ from typing import Literal
 import msgspec
 from msgspec.structs import replace
 
-from spook_tracker.tracker.document.run_document import Point, Points, Runs, SeriesDefinition, columns
+from spook_tracker.tracker.document.run_document import Point, Points, Runs, Sample, SeriesDefinition, columns
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.judged import Judged, commit_of, is_release, night_of, red_class, same_commit
 from spook_tracker.tracker.judge.repeats import Nights
@@ -93,13 +93,12 @@ def _repeating(state: KnownValue, points: Points, start: int) -> int:
     """The place after the last night from `start` on that repeats the calm night before; `start` if it does not."""
     if state.name != "calm" or state.level is None:
         return start
-    level, end = state.level, start
+    level, end = state.level.sample, start
     for sample, *_ in islice(points.said, start, None):
-        if sample is not level.sample or sample.value != sample.value:
-            night = points[end]
-            if not _repeats(level, night):
+        if sample is not level or sample.value != sample.value:
+            if not _repeats(level, sample):
                 break
-            level = night
+            level = sample
         end += 1
     return end
 
@@ -331,9 +330,8 @@ def with_tolerance(definition: SeriesDefinition, factor: float) -> SeriesDefinit
     )
 
 
-def _repeats(before: Point, after: Point) -> bool:
+def _repeats(old: Sample, new: Sample) -> bool:
     """The same bits of the same state under the same definition. Both are of one lane."""
-    old, new = before.sample, after.sample
     if old is new:
         return old.value == old.value
     return (

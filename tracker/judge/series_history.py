@@ -55,7 +55,7 @@ class Told:
 
     @cached_property
     def lanes(self) -> list[tuple[list[Judged], Judged | None]]:
-        """The nights that were judged against each other, and the night that ended them.
+        """The nights that were judged against each other, without those that only repeat, and the night that ended them.
 
         A lane ends where the definition of the test changes for good. There are none where nothing ever became
         worse, as in most series: there is nothing to look for in them.
@@ -65,9 +65,11 @@ class Told:
             return []
         lane = on_one_clock if is_noisy(self.definition) else _question
         found = []
-        for places in lanes_of([judged.night for judged in nights], lane):
+        told = nights.told if isinstance(nights, Nights) else range(len(nights))
+        points = nights.points if isinstance(nights, Nights) else [judged.night for judged in nights]
+        for places in lanes_of(points, lane):
             over = nights[places[-1]].night.test_version != nights[-1].night.test_version
-            found.append(([nights[i] for i in places], nights[places[-1] + 1] if over else None))
+            found.append(([nights[i] for i in places if i in told], nights[places[-1] + 1] if over else None))
         return found
 
 

@@ -176,18 +176,17 @@ def steady(test: TestHistory) -> list[Trend]:
 
 def changed(trend: Trend) -> list[int]:
     """The places at which a series begins, reads otherwise than before, or comes back after nights without it."""
-    said, nights = trend.said, trend.nights
-    return [
-        i
-        for i, now in enumerate(said)
-        if not i
-        or nights[i] != nights[i - 1] + 1
-        or (now is not said[i - 1] and _told(now[0]) != _told(said[i - 1][0]))
-    ]
-
-
-def _told(sample: Sample) -> tuple[str, str, bool]:
-    return repr(sample.value), sample.outcome, sample.set_point_held
+    found: list[int] = []
+    last: Sample | None = None  # most nights say the same by the same object
+    told = now = ("", "", False)
+    next_night = -1
+    for i, (night, (sample, *_)) in enumerate(zip(trend.nights, trend.said, strict=True)):
+        if sample is not last:
+            last, now = sample, (repr(sample.value), sample.outcome, sample.set_point_held)
+        if not i or night != next_night or now != told:
+            found.append(i)
+        told, next_night = now, night + 1
+    return found
 
 
 def _changes(trend: Trend, nights: Sequence[Night]) -> Iterable[list[Cell]]:

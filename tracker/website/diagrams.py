@@ -79,8 +79,16 @@ def moving(trends: Iterable[Trend]) -> list[Trend]:
     return [
         t
         for t in trends
-        if len(t.nights) >= FEWEST_NIGHTS and len({(repr(s.value), s.outcome) for s in t.distinct}) > 1
+        if len(t.nights) >= FEWEST_NIGHTS and any(_differ(t.said[0][0], sample) for sample, *_ in t.said)
     ]
+
+
+def _differ(one: Sample, other: Sample) -> bool:
+    """Whether they read differently: no two NaN do, and the zeros do."""
+    if one is other or one.outcome != other.outcome:
+        return one is not other
+    apart = one.value != other.value or one.value == 0.0
+    return apart and repr(one.value) != repr(other.value)
 
 
 def trend_chart(
