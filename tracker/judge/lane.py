@@ -85,7 +85,8 @@ def of_version(runs: Sequence[OneRun], run: OneRun) -> list[OneRun]:
 
 def machine_of(run: Run) -> str:
     """A run's machine in a few words that tell it from others."""
-    return f"{run.machine.processor} ({run.machine.fingerprint[:8]})"
+    processor, lane = run.machine.processor, run.machine.fingerprint
+    return processor if processor == lane else f"{processor} ({lane[:8]})"
 
 
 def forked_from(runs: Sequence[OneRun], run: OneRun, main_line: set[str]) -> OneRun | None:

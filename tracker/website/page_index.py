@@ -104,12 +104,14 @@ def lead(book: Book, causes: Sequence[Cause]) -> Lead:
     red = [told(cause, book) for cause in lasting(causes)]
     new, old = [c for c in red if c.new], [c for c in red if not c.new]
     state, found = health(book)
+    if any(test.gates() for test in book.tests):
+        headline = _headline(state, found, tonight(book), _red_maps(book))
+    else:
+        headline, state = _headline_without_limits(red), worst([state, *(cause.state for cause in red)])
     return {
         "state": state,
         "night": book.tonight,
-        "headline": _headline(state, found, tonight(book), _red_maps(book))
-        if any(test.gates() for test in book.tests)
-        else _headline_without_limits(red),
+        "headline": headline,
         "summary": summary(book),
         "new": new,
         "old": old[:MOST_OLD],
