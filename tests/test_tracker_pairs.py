@@ -14,7 +14,6 @@ import pytest
 from click.testing import CliRunner
 from msgspec.structs import replace
 
-import spook_tracker.tracker.judge.pairs as judge_pairs
 from spook_tracker.tracker.cli.change import _usual
 from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.document.errors import TrackerError
@@ -218,9 +217,6 @@ def pebble(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Pebble:
     monkeypatch.chdir(made.folder)
     for name in ("GITHUB_BASE_REF", "GITHUB_STEP_SUMMARY", "GITHUB_ACTIONS"):
         monkeypatch.delenv(name, raising=False)
-    monkeypatch.setattr(
-        judge_pairs, "ERROR", 0.2
-    )  # one more process of either side: how many, is asked above
     return made
 
 
