@@ -86,6 +86,8 @@ def shift(
     import numpy as np
 
     found: Shift | None = None
+    if clusters_only and clusters(np.array(values[-BASE - max(SPANS) : -max(SPANS)])) is None:
+        return None
     for span in SPANS:
         base, last = values[-BASE - span : -span], values[-span:]
         if len(base) < FEWEST_BASE or min(last) <= min(base):
