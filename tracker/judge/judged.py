@@ -13,7 +13,7 @@ import msgspec
 from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import Point, Run, Sample
 from spook_tracker.tracker.judge.segments import Segment
-from spook_tracker.tracker.judge.slower import Usual
+from spook_tracker.tracker.judge.slower import FLAKY, Usual
 from spook_tracker.tracker.judge.standing import NO_NUMBER
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import Class, State
@@ -58,7 +58,8 @@ class Judged(msgspec.Struct, frozen=True, kw_only=True):
     @property
     def pair(self) -> tuple[Number | None, Number]:
         """What is printed beside the sentence: the value before and now, of run times red, slow or recovered their levels."""
-        if self.state in ("detected", "recovered", "suspected") and self.levels is not None:
+        told = self.state in ("detected", "recovered", "suspected") or self.verdict.name == FLAKY
+        if told and self.levels is not None:
             return Number(self.levels[0]), Number(self.levels[1])
         return None if self.against is None else self.against.sample.value, self.night.sample.value
 

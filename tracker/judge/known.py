@@ -95,17 +95,11 @@ def noise_of(series: Told, judged: Judged) -> Usual | None:
     if judged.usual is None or judged.usual[1] < FEW_NIGHTS_FLOOR:
         return judged.usual
     level, least = judged.usual
-    lane, passed = on_one_clock(judged.night), False
-    for later in series.nights:
-        passed = passed or later is judged
-        if (
-            passed
-            and later.usual is not None
-            and later.usual[1] < least
-            and on_one_clock(later.night) == lane
-        ):
-            return level, later.usual[1]
-    return judged.usual
+    lane = on_one_clock(judged.night)
+    of_lane = [other for other in series.nights if on_one_clock(other.night) == lane]
+    later = of_lane[of_lane.index(judged) : -1]  # of the newest night's noise no other night knows yet
+    told = (other.usual[1] for other in later if other.usual is not None and other.usual[1] < least)
+    return level, next(told, least)
 
 
 def of_two(value: float, usual: Usual) -> Usual:

@@ -30,6 +30,7 @@ from spook_tracker.tracker.judge.shifts import (
     FEWEST_BASE,
     MANY,
     REACHED,
+    SPANS,
     clusters,
     remembered,
     standard_error,
@@ -164,6 +165,12 @@ class PresentLevel:
         if self._strays() == math.inf:
             return False
         return 2 * (sum(reached > FLOOR for reached in self.reached[-max(MANY) :]) + off) >= min(MANY)
+
+    def _last_above(self, level: float, off: Sequence[int]) -> float:
+        """How far the mean of the last few nights lies above a level."""
+        nights = [*self.now.places[-min(SPANS) :], *off] if off else self.now.places
+        last = [self.values[i] for i in nights[-min(SPANS) :]]
+        return worse_by(level, sum(last) / len(last), self.larger_is_better)
 
     def _reached(self) -> list[float]:
         """Deviations of nights that hold: the segment's own, filled up by those before it while it is young."""

@@ -27,7 +27,7 @@ from spook_tracker.tracker.judge.level import (
     way_back,
 )
 from spook_tracker.tracker.judge.noisy import Noisy
-from spook_tracker.tracker.judge.segments import Segment, boundary, spread_of
+from spook_tracker.tracker.judge.segments import Boundary, Segment, boundary, spread_of, until_the_next
 from spook_tracker.tracker.judge.shifts import (
     BASE,
     FEWEST_BASE,
@@ -40,7 +40,7 @@ from spook_tracker.tracker.judge.shifts import (
     more_of_the_slower,
     shift,
 )
-from spook_tracker.tracker.judge.slower import CONFIRM, LEAST, Usual, change_in_words, flaky, slower, worse_by
+from spook_tracker.tracker.judge.slower import CONFIRM, LEAST, Usual, change_in_words, flaky, slower
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import with_recoveries
 
@@ -107,7 +107,7 @@ class _Walk(DriftingLevel):
     reference: Reference | None = None  # while red or flaky
     over: list[Segment] = field(default_factory=list)
     first: tuple[int, int] | None = None  # of the red: last good and first bad night
-    broken: bool = False  # no finite value last night
+    broken: int | None = None  # the night since which there is no finite value
 
     def held_to(self) -> Usual:
         """The level that a night is held to, and by which change of the value it stands clear of it for the worse."""
@@ -128,7 +128,7 @@ class _Walk(DriftingLevel):
         if not self.timed[place]:
             return self._no_value(place, accepted)
         change = self._worse_by(level, value)
-        self.broken = False
+        self.broken = None
         self._see(place, self._costlier_by(level, value) if self.larger_is_better else change, threshold)
         found = self._begins()
         if not accepted and (mixed := self._of_two_levels(value, found)) is not None:
@@ -165,11 +165,12 @@ class _Walk(DriftingLevel):
         verdict = slower(math.inf, level, math.inf, "not finite")
         if accepted:
             return Noisy(verdict=verdict, state="accepted", against=good)
-        news, self.broken = not self.broken, True
+        news = self.broken is None
+        self.broken = place if self.broken is None else self.broken
         if news and not self._red:
             self.first = good, place
         last, first = self.first or (good, place)
-        return Noisy(verdict=verdict, state="detected", against=good, first_bad=first, last_good=last, worse_at=place if news else first, news=news, levels=(level, self.values[place]))  # fmt: skip
+        return Noisy(verdict=verdict, state="detected", against=good, first_bad=first, last_good=last, worse_at=self.broken, news=news, levels=(level, self.values[place]))  # fmt: skip
 
     def _see(self, place: int, change: float, threshold: float) -> None:
         """The nights in a row that stand clear of the segment on one side; what no second one confirmed is noise."""
@@ -199,7 +200,10 @@ class _Walk(DriftingLevel):
         level, noise, threshold = self._level()
         if len(self.now.places) + len(self.off) < FEWEST_BASE + FEWEST_SPAN or level <= 0.0:
             return None
-        mean, strays = self._last_above(level), threshold > FLOOR and self._strays_often(len(self.off))
+        mean, strays = (
+            self._last_above(level, self.off),
+            threshold > FLOOR and self._strays_often(len(self.off)),
+        )
         if mean < LEAST and not strays:
             return None  # most nights: nothing to count
         nights = [*self.now.places[-BASE - max(MANY) :], *self.off]
@@ -208,7 +212,7 @@ class _Walk(DriftingLevel):
             age = self.ages[nights[-1]] - self.ages[self.start]
             found = shift(costs, mean < noise, age, self._earlier())
         if found is None and strays:
-            found = more_of_the_slower(costs, self._earlier())
+            found = more_of_the_slower(costs)
         return (found.span, found) if found is not None and found.change > self._moves_by(found) else None
 
     def _above_both(self) -> tuple[int, Shift | None] | None:
@@ -217,18 +221,12 @@ class _Walk(DriftingLevel):
             return None
         level = self._level()[0]
         first = max(self.start, self.until - BASE - LONGEST_SPAN)
-        if self.until - first < FEWEST_BASE + FEWEST_SPAN or self._last_above(level) < 0.5 * LEAST:
+        if self.until - first < FEWEST_BASE + FEWEST_SPAN or self._last_above(level, self.off) < 0.5 * LEAST:
             return None
         nights = [i for i in range(first, self.until) if self.timed[i]]
         found = shift(self._costs(nights), True, self.ages[nights[-1]] - self.ages[self.start])
         told = found is not None and found.apart and found.change > self._tolerated(level)
         return (found.span, found) if found is not None and told else None
-
-    def _last_above(self, level: float) -> float:
-        """How far the mean of the last few nights lies above a level."""
-        nights = [*self.now.places[-FEWEST_SPAN:], *self.off] if self.off else self.now.places
-        last = [self.values[i] for i in nights[-FEWEST_SPAN:]]
-        return worse_by(level, sum(last) / len(last), self.larger_is_better)
 
     def _came_back(self) -> tuple[int, None] | None:
         """Whether the last nights of a red segment are more probably of the level before it (Page's cumulative sum)."""
@@ -441,11 +439,18 @@ class _Walk(DriftingLevel):
         if risen and where.best != first:
             words = f"{verdict.sentence}; the last step alone is {100.0 * step:+.1f} %"
             verdict = replace(verdict, sentence=words)
+        began = where if risen else self._began_at(first)
+        accused = (max(began.places[0] - 1, 0), began.places[-1]) if began else (good, first)
         return Noisy(
             verdict=verdict, state="detected", against=good, first_bad=first, last_good=good,
-            worse_at=where.best if risen else first, news=news, accused=(max(where.places[0] - 1, 0), where.places[-1]),
-            probability=where.probability, levels=(held, level),
+            worse_at=where.best if risen else first, news=news, accused=accused,
+            probability=began.probability if began else None, levels=(held, level),
         )  # fmt: skip
+
+    def _began_at(self, first: int) -> Boundary | None:
+        """Where the red began, of which the present segment is a better part: it is to blame, and not what mended some."""
+        began = (segment.boundary for segment in reversed(self.over))
+        return next((found for found in began if found is not None and found.best == first), None)
 
     def _second_at_once(self, night: Noisy, change: float) -> Noisy:
         """A red night that stands clear of its own level, too: told on that night, and blamed when another confirms it."""
@@ -492,7 +497,4 @@ class _Walk(DriftingLevel):
         level, noise, _ = self._level()
         first = self.now.where.best if self.now.where else self.start
         last = Segment(first, self.until - 1, level, noise, self.now.standing, self.now.where)
-        ends = [segment.first - 1 for segment in [*self.over, last][1:]]
-        return [
-            dataclasses.replace(segment, last=end) for segment, end in zip(self.over, ends, strict=True)
-        ] + [last]
+        return until_the_next([*self.over, last])

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING, Literal
 
@@ -58,6 +58,13 @@ class Segment:
     spread: float
     standing: Standing
     boundary: Boundary | None = None  # None: nothing is known before it
+
+
+def until_the_next(segments: Sequence[Segment]) -> list[Segment]:
+    """The same, each of them lasting until the next begins."""
+    ends = [after.first - 1 for after in segments[1:]]
+    lasting = [replace(one, last=end) for one, end in zip(segments, ends, strict=False)]
+    return [*lasting, *segments[-1:]]
 
 
 def spread_of(values: Sequence[float], level: float) -> float:

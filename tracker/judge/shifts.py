@@ -100,11 +100,11 @@ def shift(
     return found
 
 
-def more_of_the_slower(values: Sequence[float], before: Sequence[float] = ()) -> Shift | None:
+def more_of_the_slower(values: Sequence[float]) -> Shift | None:
     """The last twelve or 24 nights, if more of them are of the slower of two clusters than chance draws; see `shift`.
 
-    By the hypergeometric distribution. A level between the clusters, nearer to the slower one, counts as that: sums
-    of so spread values would need many more nights to tell it.
+    By the hypergeometric distribution. A night slower than each of the faster cluster counts, and so does a level between
+    the two: sums of so spread values would need many more nights to tell it.
     """
     for span in MANY:
         base, last = values[-BASE - span : -span], values[-span:]
@@ -114,25 +114,28 @@ def more_of_the_slower(values: Sequence[float], before: Sequence[float] = ()) ->
         change = sum(last) / (span * middle) - 1.0
         if change <= LEAST or sum(night > middle for night in last) < MOSTLY * span:
             continue
-        if (probability := _drawn_by_chance(base, last, before)) < RAREST:
+        if (probability := _drawn_by_chance(base, last)) < RAREST:
             return Shift(span, change, probability)
     return None
 
 
-def _drawn_by_chance(base: Sequence[float], last: Sequence[float], before: Sequence[float]) -> float:
+def _drawn_by_chance(base: Sequence[float], last: Sequence[float]) -> float:
     """How probably nights drawn at random have as many of the slower cluster among the last; 1 if nothing tells it."""
     import numpy as np
 
     nights = np.array(base)
     if (split := clusters(nights)) is None:
         return 1.0
-    middle = 0.5 * sum(split)
-    of_last = sum(night > middle for night in last)
-    slow, every = of_last + int((nights > middle).sum()), len(base) + len(last)
-    ways = range(of_last, min(len(last), slow) + 1)
-    chosen = sum(math.comb(slow, k) * math.comb(every - slow, len(last) - k) for k in ways)
-    probability = chosen / math.comb(every, len(last))
-    return probability if probability >= RAREST or not remembered(nights, before) else 1.0
+    above = float(nights[nights <= 0.5 * sum(split)].max())
+    slow = nights > above
+    off = slow - slow.mean()
+    if float(off[1:] @ off[:-1]) > CHANCE / math.sqrt(len(off)) * float(off @ off):
+        return 1.0  # visits to the slower one last
+    of_last = sum(night > above for night in last)
+    of_all, every = of_last + int(slow.sum()), len(base) + len(last)
+    ways = range(of_last, min(len(last), of_all) + 1)
+    chosen = sum(math.comb(of_all, k) * math.comb(every - of_all, len(last) - k) for k in ways)
+    return chosen / math.comb(every, len(last))
 
 
 def _tells_more(one: Shift, other: Shift) -> bool:

@@ -185,7 +185,9 @@ def _headline(state: Class, found: Count, fresh: Sequence[Trend], maps: Sequence
 
 def _headline_without_limits(red: Sequence[ToldCause]) -> str:
     """Of histories that other tools measured: whatever is red, on the newest night or before it."""
-    series = sum(len(cause.hits) for cause in red)
+    series = len(
+        {(hit.series, hit.bad and hit.bad.machine.fingerprint) for cause in red for hit in cause.hits}
+    )
     return ("One series is red" if series == 1 else f"{series} series are red") if red else "No series is red"
 
 
