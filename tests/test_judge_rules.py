@@ -182,3 +182,33 @@ def test_more_nights_of_the_slower_cluster_in_a_row_than_chance_draws_are_a_leve
 
     assert {night.state for night in said[60:66]} <= {"green", "suspected"}
     assert (said[72].state, said[-1].worse_at, said[-1].verdict.name) == ("detected", 60, "slower")
+
+
+@pytest.mark.parametrize(("every", "slow", "step"), [(5, 1.5, 1.4), (4, 1.5, 1.3), (6, 2.0, 1.5)])
+def test_a_step_is_told_whatever_nights_were_slow_in_turn_before(
+    every: int, slow: float, step: float
+) -> None:
+    nights = 1.0 + 0.01 * np.random.default_rng(2).standard_normal(90)
+    nights[:60:every] *= slow
+    nights[60:] *= step
+    told = judge_noisy(list(nights))[-1]
+
+    assert (told.state, told.worse_at) == ("detected", 60)
+
+
+def test_what_mended_a_part_of_a_red_is_not_accused() -> None:
+    nights = 1.0 + 0.01 * np.random.default_rng(1).standard_normal(70)
+    nights[40:] *= 1.5
+    nights[55:] *= 0.8
+    told = judge_noisy(list(nights))[-1]
+
+    assert (told.state, told.worse_at, told.accused) == ("detected", 40, (39, 40))
+
+
+def test_values_that_are_lost_on_a_red_series_keep_the_commit_that_lost_them() -> None:
+    slow = [*around(1.0, 0.01, 30), *around(1.3, 0.01, 15)]
+    told = judge_noisy([*slow, *[math.inf] * 3])[-3:]
+
+    assert [(night.first_bad, night.worse_at, night.news) for night in told] == [
+        (30, 45, True), (30, 45, False), (30, 45, False)
+    ]  # fmt: skip

@@ -213,6 +213,9 @@ def test_a_slow_night_as_there_are_now_and_then_is_called_flaky(tmp_path: Path) 
     code, said = told("judge", "latest")
 
     assert (code, "; 1 flaky\n! f/default/run_time: flaky; " in said) == (0, True)
+    pair = re.search(r"flaky; (\S+) → (\S+) s; no limit; \+(\S+) % for the worse", said)
+    assert pair is not None
+    assert float(pair[2]) / float(pair[1]) == pytest.approx(1.0 + 0.01 * float(pair[3]), abs=1e-3)
     assert json.loads(told("judge", "latest", "--json")[1])[0]["name"] == "flaky"
 
 
@@ -257,6 +260,25 @@ def test_a_benchmark_with_repeats_is_red_once(tmp_path: Path) -> None:
         1,
         ["x/default/heap_ms"],
     )
+
+
+@pytest.mark.parametrize("factor", [1.1, 1.3])
+def test_a_version_of_a_young_history_is_not_held_to_what_it_tells_itself(
+    factor: float, tmp_path: Path
+) -> None:
+    """Of five nights the fifth is the first that tells noise: judge and compare know none of it that night."""
+    values = [1000.0 * x * (factor if n == 4 else 1.0) for n, x in enumerate(noise(4)[:5])]
+    told = imported(tmp_path, data({"f": values}))
+
+    assert (told("judge", "latest")[0], told("compare", "previous", "latest")[0]) == (0, 0)
+
+
+def test_the_first_page_counts_a_series_once(tmp_path: Path) -> None:
+    values = [1000.0 * x * (2.0 if n >= 60 else 1.2 if n >= 30 else 1.0) for n, x in enumerate(noise(6))]
+    told = imported(tmp_path, data({"f": values}))
+    assert told("publish", "--out", tmp_path / "site")[0] == 0
+
+    assert "<h1>One series is red</h1>" in (tmp_path / "site" / "index.html").read_text()
 
 
 def test_a_benchmark_of_asv_is_its_version_its_parameters_and_its_unit(tmp_path: Path) -> None:
