@@ -13,6 +13,7 @@ from click.testing import CliRunner
 from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.measure.other_tools import of_other_tools
+from spook_tracker.tracker.past import compare_documents
 
 COMMIT = "a" * 40
 FAILED = "crashed"
@@ -195,6 +196,22 @@ def test_local_changes_of_pytest_benchmark_make_another_run_and_no_version() -> 
     )
     assert (clean.engine.dirty, dirty.engine.dirty) == (False, True)
     assert clean.id != dirty.id
+
+
+def test_two_runs_with_repeats_are_compared_where_no_history_tells_their_noise() -> None:
+    """So that a search of commits finds where a benchmark became slower."""
+    stats = [0.5, 0.51, 0.52, 0.53]
+    fast, slow = (
+        read(
+            PYTEST
+            | {"benchmarks": [PYTEST["benchmarks"][0] | {"stats": {"data": [factor * s for s in stats]}}]}
+        )[0]
+        for factor in (1.0, 1.5)
+    )
+    told = compare_documents(fast, slow)
+
+    assert [change.sentence for change in told.changes if change.red] == ["+50 % run time"]
+    assert not any(change.red for change in compare_documents(slow, fast).changes)
 
 
 def test_a_benchmark_twice_in_a_file_of_pytest_is_one_with_all_its_repeats() -> None:

@@ -86,7 +86,8 @@ def compare(
     changes = _series_changes(before, after, history) + _map_changes(before, after)
     same_machine = before.side.machine == after.side.machine
     if same_machine and before.side.run != after.side.run:
-        changes += [_in_history(change, history) for change in run_times(before.samples, after.samples)]
+        timed = run_times(before.samples, after.samples, history.usual.keys())
+        changes += [_in_history(change, history) for change in timed]
     changes = beside_run_times(list(map(calm, changes)), before.samples, after.samples)
     changes = [_blamed(accept(change, accepted, after.night), history.first_bad) for change in changes]
     changes.sort(key=lambda change: (WORD_RANK[change.word], change.role != "gate", change.series))

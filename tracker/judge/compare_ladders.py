@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 
 import msgspec
 
@@ -22,10 +22,14 @@ Rung = tuple[SeriesDefinition, Sample, Sample]
 PROBES = 9  # errors, and times, at which two ladders are compared
 
 
-def run_times(before: Samples, after: Samples) -> list[Change]:
-    """One change per ladder configuration: run times over its rungs, by statistics that do not cry wolf."""
+def run_times(before: Samples, after: Samples, by_history: Collection[str] = ()) -> list[Change]:
+    """One change per ladder configuration: run times over its rungs, by statistics that do not cry wolf.
+
+    `by_history`: times of which the history tells the noise, and so are judged by that.
+    """
     changes = []
-    for rungs in [*_ladders(before, after).values(), *_single(before, after)]:
+    single = (rungs for key, rungs in _single(before, after) if key not in by_history)
+    for rungs in [*_ladders(before, after).values(), *single]:
         definition = rungs[0][0]
         timed = [(old.timing, new.timing) for _, old, new in rungs]
         both: list[tuple[Timing, Timing]] = [(old, new) for old, new in timed if old and new]
@@ -39,7 +43,7 @@ def run_times(before: Samples, after: Samples) -> list[Change]:
             continue  # a time without repeats is told by itself
         word: Word = "regressed" if found.slower else "improved" if found.faster else "same"
         percent = 100.0 * (found.ratio - 1.0)
-        sentence = f"{percent:+.0f} % run time over {found.rungs} rungs"
+        sentence = f"{percent:+.0f} % run time" + f" over {found.rungs} rungs" * (definition.kind == "ladder")
         if loud := _unquiet(both):
             word, sentence = "same", f"{sentence}; {loud}"
         elif not found.repeated:
@@ -105,14 +109,14 @@ def _ladders(before: Samples, after: Samples) -> dict[tuple[str, str, str], list
     return groups
 
 
-def _single(before: Samples, after: Samples) -> Iterator[list[Rung]]:
-    """Series outside ladders that carry repeats of their own; one that is a time itself is judged as that."""
+def _single(before: Samples, after: Samples) -> Iterator[tuple[str, list[Rung]]]:
+    """Series outside ladders that carry repeats of their own, by key."""
     for key, (definition, new) in after.items():
-        if definition.kind in ("ladder", "time") or new.timing is None or key not in before:
+        if definition.kind == "ladder" or new.timing is None or key not in before:
             continue
         earlier, old = before[key]
         if earlier.test_version == definition.test_version:
-            yield [(definition, old, new)]
+            yield key, [(definition, old, new)]
 
 
 def frontiers(before: Samples, after: Samples, same_machine: bool) -> Iterator[Frontier]:
