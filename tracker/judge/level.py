@@ -40,6 +40,7 @@ from spook_tracker.tracker.judge.slower import FROM_NONE, LEAST, worse_by
 if TYPE_CHECKING:
     from spook_tracker.tracker.judge.shifts import Shift, Values
 
+FEWEST_SPAN = min(SPANS)
 WINDOW = 30  # nights that say what is usual, and that are remembered of the segments before
 FEWEST = 5  # of them before noise can be told; until then only a gross change counts
 FEW_NIGHTS_FLOOR = 0.5  # relative, while the noise is not known
@@ -117,16 +118,14 @@ class PresentLevel:
     def _costs(self, places: Sequence[int]) -> list[float]:
         """Values of which larger is worse, and a change as many per cent: a rate gives the time of one."""
         if not self.larger_is_better:
-            return [self.values[i] for i in places]
+            return list(map(self.values.__getitem__, places))
         return [1.0 / value if (value := self.values[i]) else math.inf for i in places]
 
     def _level(self) -> tuple[float, float, float]:
         """Level, noise and threshold of the present segment, by its last nights."""
         if self._told is not None:
             return self._told
-        own = sorted(
-            [self.values[i] for i in self.now.places[-WINDOW:]]
-        )  # so that their distances come nearly sorted
+        own = sorted(map(self.values.__getitem__, self.now.places[-WINDOW:]))  # distances come nearly sorted
         level = median_of_sorted(own)
         off = [abs(value / level - 1.0) for value in own] if level else [0.0]
         if len(own) < ENOUGH:
@@ -168,9 +167,10 @@ class PresentLevel:
 
     def _last_above(self, level: float, off: Sequence[int]) -> float:
         """How far the mean of the last few nights lies above a level."""
-        nights = [*self.now.places[-min(SPANS) :], *off] if off else self.now.places
-        last = [self.values[i] for i in nights[-min(SPANS) :]]
-        return worse_by(level, sum(last) / len(last), self.larger_is_better)
+        nights = [*self.now.places[-FEWEST_SPAN:], *off] if off else self.now.places
+        last = nights[-FEWEST_SPAN:]
+        mean = sum(map(self.values.__getitem__, last)) / len(last)
+        return worse_by(level, mean, self.larger_is_better)
 
     def _reached(self) -> list[float]:
         """Deviations of nights that hold: the segment's own, filled up by those before it while it is young."""

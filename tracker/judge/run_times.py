@@ -355,11 +355,11 @@ class _Walk(DriftingLevel):
 
     def _settle(self) -> None:
         """The boundary of a young segment again, with one more night behind it; nights change sides with it."""
-        old, count = self.now.where, len(self.now.places)
-        if old is None or len(old.places) == 1 or count > SETTLED or self.now.places[0] != old.best:
+        old = self.now.where
+        if old is None or len(old.places) == 1 or len(self.now.places) > SETTLED:
             return  # or it is sure already
-        if count > SETTLED // 3 and count % (SETTLED // 6):
-            return  # one more night tells little by then
+        if self.now.places[0] != old.best:
+            return
         nights = [*self.now.before, *self.now.places]
         where = boundary(nights, self._costs(nights), len(self.now.places))
         best = where.best

@@ -128,9 +128,10 @@ def _drawn_by_chance(base: Sequence[float], last: Sequence[float]) -> float:
         return 1.0
     above = float(nights[nights <= 0.5 * sum(split)].max())
     slow = nights > above
-    off = slow - slow.mean()
-    if float(off[1:] @ off[:-1]) > CHANCE / math.sqrt(len(off)) * float(off @ off):
-        return 1.0  # visits to the slower one last
+    for values in (slow, nights):
+        off = values - values.mean()
+        if float(off[1:] @ off[:-1]) > CHANCE / math.sqrt(len(off)) * float(off @ off):
+            return 1.0  # visits to the slower one last
     of_last = sum(night > above for night in last)
     of_all, every = of_last + int(slow.sum()), len(base) + len(last)
     ways = range(of_last, min(len(last), of_all) + 1)
