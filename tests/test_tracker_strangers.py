@@ -238,10 +238,11 @@ def test_a_comparison_blames_no_commit_that_both_versions_have(tmp_path: Path) -
 
 def test_two_nights_of_a_young_history_are_compared_by_the_noise_that_is_known_today(tmp_path: Path) -> None:
     values = [1000.0 * x * (1.3 if n >= 3 else 1.0) for n, x in enumerate(noise(4)[:9])]
-    told = imported(tmp_path, data({"f": values}))
+    told = imported(tmp_path, data({"heap/64": values}))
     code, said = told("compare", "0001" + "a" * 6, "0007" + "a" * 6)
 
     assert told("judge", "latest")[0] == code == 1, said
+    assert "heap/64 run_time [default]: slower" in said
 
 
 def test_a_benchmark_with_repeats_is_red_once(tmp_path: Path) -> None:

@@ -92,7 +92,8 @@ def where(change: Change) -> str:
 
 def red_line(change: Change) -> str:
     """All a reader needs to act: test, metric, both values, limit, first bad commit, page to open."""
-    place = ", ".join([change.configuration, *change.series.split("/")[3:]])
+    asked = change.series.removeprefix(f"{change.test}/{change.configuration}/{change.metric}").strip("/")
+    place = ", ".join([change.configuration, *filter(None, asked.split("/"))])
     parts = [
         f"✗ {change.test} {change.metric} [{place}]: {change.name or change.word}",
         " → ".join(both(change)),

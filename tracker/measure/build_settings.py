@@ -4,7 +4,7 @@
 command = "cmake -S . -B build && cmake --build build"
 environment = {PYTHONPATH = "{checkout}/build/python"}  # for building and asking; {checkout} is the commit's folder
 questions = ["tracking"]         # today's, laid over every commit, so that old ones answer what is asked now
-ask = "build/bench > $ANSWERS"   # by default `tracker run`; a run document, or a file `tracker import` reads
+ask = "build/bench > $ANSWERS"   # by default `tracker run`; a run document, or a run of pytest-benchmark …
 """
 
 from __future__ import annotations
