@@ -214,8 +214,7 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
             for (const int body : {later.first, later.second})
                 prefetch(velocity_[body]), prefetch(dv_ext_[body]);
         }
-        supported_.note(points_[k], *bodies_, velocity_, dv_ext_,
-                        surfaces_->pair(points_[k].contact).restitution);
+        supported_.note(points_[k], *bodies_, velocity_, dv_ext_);
     }
 }
 

@@ -37,7 +37,7 @@ void SupportedBodies::begin(std::size_t bodies) {
 }
 
 void SupportedBodies::note(StepContact& point, const ContactBodies& bodies, const std::vector<Vec6>& velocity,
-                           const std::vector<Vec6>& dv_ext, double restitution) {
+                           const std::vector<Vec6>& dv_ext) {
     const int a = point.contact.first, b = point.contact.second;
     const Vec3 n = point.contact.point.normal;
     const double first = dot(contact_row(n, point.first_arm), dv_ext[a]),
@@ -45,10 +45,7 @@ void SupportedBodies::note(StepContact& point, const ContactBodies& bodies, cons
                  least = pressed_by * (norm(linear(dv_ext[a])) + norm(linear(dv_ext[b])));
     point.approach = relative_velocity(point, n, velocity);
     point.dv_ext = first + second;
-    // What rebounds so fast that it is away for many steps is not carried.
-    const auto presses = [&](double push) {
-        return push < -least && point.approach + push < 0.0 && restitution * point.approach > leaves * push;
-    };
+    const auto presses = [&](double push) { return push < -least && point.approach + push < 0.0; };
     const bool both = bodies.moves(a) && bodies.moves(b) && presses(first + second);
     pairs_.push_back({a, b, both || presses(first), both || presses(second), both});
     supported_[a] = supported_[b] = 1;

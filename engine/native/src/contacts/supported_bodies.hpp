@@ -15,7 +15,7 @@ public:
     void begin(std::size_t bodies);
     /// Takes down which way the forces press the bodies of a closed point, if they do not part faster; measures the point.
     void note(StepContact& point, const ContactBodies& bodies, const std::vector<Vec6>& velocity,
-              const std::vector<Vec6>& dv_ext, double restitution);
+              const std::vector<Vec6>& dv_ext);
     /// Leaves those that are supported.
     void find(const ContactBodies& bodies);
     bool operator[](std::size_t body) const noexcept { return supported_[body] != 0; }

@@ -249,7 +249,6 @@ inline constexpr double relief =
 namespace tolerances::supported_bodies {
 inline constexpr double pressed_by = 1e-9;  // of a kick: what presses less does not
 inline constexpr double level = 1e-6;       // of a kick, or a speed: a part along the forces that is none
-inline constexpr double leaves = 8.0;  // kicks of a step: what rebounds as fast is away for sixteen steps
 }  // namespace tolerances::supported_bodies
 
 }  // namespace spook
