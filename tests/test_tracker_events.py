@@ -96,5 +96,5 @@ def test_a_renamed_series_keeps_its_newest_definition() -> None:
     made = told(0.5, 0.6, limit=2.0)
 
     assert made.tests[0].trends[0].definition.limit == 2.0
-    assert made.tests[0].trends[0].values == [0.5, 0.6]
+    assert made.tests[0].trends[0].values[:] == [0.5, 0.6]
     assert GATE.key == made.tests[0].trends[0].definition.key
