@@ -1,6 +1,6 @@
 """What this machine takes for fixed work, measured in the same run as what is limited.
 
-A limit in seconds was set on one machine. It is a multiple of what that machine took for work of the same kind, and is
+A limit in seconds holds on the machine whose fixed work stands below: it is a multiple of what that took, and is
 carried to another by measuring the same work there:
 
     arithmetic    double precision out of the first cache levels, in NumPy: the engine's steps

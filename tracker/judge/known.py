@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from spook_tracker.tracker.document.run_document import Point
@@ -70,7 +70,8 @@ def known_of(told: Mapping[str, Told], before: Mapping[str, Judged], after: Mapp
             first_bad[key] = (commit_of(good.run) if good else "", commit_of(new.worse_at.run))
         if series.definition.kind != "time" or old is None or old.usual is None:
             continue
-        usual[key] = of_two(_time(old), noise_of(series, old) or old.usual)
+        young = old.usual[1] >= FEW_NIGHTS_FLOOR
+        usual[key] = of_two(_time(old), known_noise(series)[old.night.run.id] if young else old.usual)
         if new is not None:
             values[key] = (_time(old), _time(new))
             if new.state == "suspected":
@@ -90,16 +91,27 @@ def _lies_after(series: Told, night: Point, before: Judged | None) -> bool:
     return True
 
 
-def noise_of(series: Told, judged: Judged) -> Usual | None:
-    """What is usual after a night; where it was too young to tell noise, the noise that later nights of its lane tell."""
-    if judged.usual is None or judged.usual[1] < FEW_NIGHTS_FLOOR:
-        return judged.usual
-    level, least = judged.usual
-    lane = on_one_clock(judged.night)
-    of_lane = [other for other in series.nights if on_one_clock(other.night) == lane]
-    later = of_lane[of_lane.index(judged) : -1]  # of the newest night's noise no other night knows yet
-    told = (other.usual[1] for other in later if other.usual is not None and other.usual[1] < least)
-    return level, next(told, least)
+def known_noise(series: Told) -> dict[str, Usual]:
+    """What is usual after each night, by its run; the nights too young to tell noise have what the next that could tells.
+
+    Of the newest night's noise no other night of its lane knows yet.
+    """
+    found: dict[str, Usual] = {}
+    later: dict[
+        Hashable, float
+    ] = {}  # by lane: the noise that the next night tells; infinite behind the newest
+    for judged in reversed(series.nights):
+        lane, usual = on_one_clock(judged.night), judged.usual
+        if usual is not None:
+            level, threshold = usual
+            young = threshold >= FEW_NIGHTS_FLOOR
+            found[judged.night.run.id] = (
+                (level, min(threshold, later.get(lane, math.inf))) if young else usual
+            )
+            if not young and lane in later:
+                later[lane] = threshold
+        later.setdefault(lane, math.inf)
+    return found
 
 
 def of_two(value: float, usual: Usual) -> Usual:

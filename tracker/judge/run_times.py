@@ -200,10 +200,8 @@ class _Walk(DriftingLevel):
         level, noise, threshold = self._level()
         if len(self.now.places) + len(self.off) < FEWEST_BASE + FEWEST_SPAN or level <= 0.0:
             return None
-        mean, strays = (
-            self._last_above(level, self.off),
-            threshold > FLOOR and self._strays_often(len(self.off)),
-        )
+        mean = self._last_above(level, self.off)
+        strays = threshold > FLOOR and self._strays_often(len(self.off))
         if mean < LEAST and not strays:
             return None  # most nights: nothing to count
         nights = [*self.now.places[-BASE - max(MANY) :], *self.off]

@@ -18,7 +18,7 @@ from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
 from spook_tracker.tracker.document.wording import clean, conditions, limit, named, slug
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.judged import commit_of, night_of
-from spook_tracker.tracker.judge.known import noise_of, of_two
+from spook_tracker.tracker.judge.known import known_noise, of_two
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
 from spook_tracker.tracker.judge.rank import Question, question
 from spook_tracker.tracker.judge.repeats import looked_at
@@ -131,14 +131,14 @@ def all_marks(told: Mapping[str, Told]) -> dict[str, Marks]:
     found: dict[str, Marks] = {}
     for key, series in told.items():
         timed = series.definition.kind == "time" and not is_read_off(series.definition)
+        noise = known_noise(series) if timed else {}
         for judged in (
             series.nights
             if timed
             else [night for night in looked_at(series.nights) if night.state == "detected"]
         ):
-            usual = None
-            if timed and (known := noise_of(series, judged)) is not None:
-                usual = of_two(judged.night.value, known)
+            known = noise.get(judged.night.run.id)
+            usual = None if known is None else of_two(judged.night.value, known)
             suspected = timed and judged.state == "suspected"
             blame = ""
             if judged.red and judged.worse_at is not None:
