@@ -274,6 +274,18 @@ def test_a_version_of_a_young_history_is_not_held_to_what_it_tells_itself(
     assert (told("judge", "latest")[0], told("compare", "previous", "latest")[0]) == (0, 0)
 
 
+def test_the_worst_is_what_became_most_times_worse(tmp_path: Path) -> None:
+    steps = {"a": 1.2, "z": 3.0}
+    told = imported(
+        tmp_path,
+        data({name: [1000.0 * x for x in noise(8) * from_night(LAST, by)] for name, by in steps.items()}),
+    )
+    said = told("judge", "latest")[1]
+
+    assert re.findall(r"the worst: (\w)/", said) == ["z", "z"]
+    assert re.findall(r"^✗ (\w)/", said, re.MULTILINE) == ["z", "a"]
+
+
 def test_the_first_page_counts_a_series_once(tmp_path: Path) -> None:
     values = [1000.0 * x * (2.0 if n >= 60 else 1.2 if n >= 30 else 1.0) for n, x in enumerate(noise(6))]
     told = imported(tmp_path, data({"f": values}))
