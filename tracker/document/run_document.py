@@ -8,9 +8,9 @@ imported with nothing else.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal, NamedTuple, Protocol, overload
+from typing import Annotated, Literal, NamedTuple, Protocol
 
 import msgspec
 
@@ -393,41 +393,6 @@ class Runs(tuple[Run, ...]):
 
     def __eq__(self, other: object) -> bool:
         return self is other
-
-
-class Points(Sequence[Point]):
-    """Points as two columns: `runs`, which series that were measured in the same runs share, and `said`, in which nights
-    that say the same share one object. Ten million points take 80 MB; a point is made when it is asked for."""
-
-    __slots__ = ("runs", "said")
-
-    def __init__(self, runs: Runs, said: Sequence[Said]) -> None:
-        self.runs, self.said = runs, said
-
-    def __len__(self) -> int:
-        return len(self.said)
-
-    @overload
-    def __getitem__(self, place: int) -> Point: ...
-    @overload
-    def __getitem__(self, place: slice) -> Points: ...
-    def __getitem__(self, place: int | slice) -> Point | Points:
-        if isinstance(place, slice):
-            return Points(Runs(self.runs[place]), self.said[place])
-        return Point(self.runs[place], *self.said[place])
-
-    def __iter__(self) -> Iterator[Point]:
-        return (Point(run, *said) for run, said in zip(self.runs, self.said, strict=True))
-
-
-def columns(points: Sequence[Point]) -> Points:
-    """The same points as columns."""
-    if isinstance(points, Points):
-        return points
-    return Points(
-        Runs(point.run for point in points),
-        [(point.sample, point.test_version, point.recorded) for point in points],
-    )
 
 
 @dataclass(frozen=True, slots=True)

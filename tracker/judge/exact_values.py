@@ -19,13 +19,18 @@ from __future__ import annotations
 from bisect import bisect_left
 from collections.abc import Sequence
 from functools import lru_cache
-from itertools import islice
 from typing import Literal
 
 import msgspec
 from msgspec.structs import replace
 
-from spook_tracker.tracker.document.run_document import Point, Points, Runs, Sample, SeriesDefinition, columns
+from spook_tracker.tracker.document.points import Points, columns
+from spook_tracker.tracker.document.run_document import (
+    Point,
+    Runs,
+    Sample,
+    SeriesDefinition,
+)
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.judged import Judged, commit_of, is_release, night_of, red_class, same_commit
 from spook_tracker.tracker.judge.repeats import Nights
@@ -94,12 +99,12 @@ def _repeating(state: KnownValue, points: Points, start: int) -> int:
     if state.name != "calm" or state.level is None:
         return start
     level, end = state.level.sample, start
-    for sample, *_ in islice(points.said, start, None):
+    for _, last, (sample, *_) in points.stretches(start):
         if sample is not level or sample.value != sample.value:
             if not _repeats(level, sample):
                 break
             level = sample
-        end += 1
+        end = last
     return end
 
 

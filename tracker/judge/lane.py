@@ -15,16 +15,15 @@ import msgspec
 
 from spook_tracker.tracker.document.about import about, started
 from spook_tracker.tracker.document.json_form import NAN, Number
+from spook_tracker.tracker.document.points import Evidence, Points, Stretches, columns
 from spook_tracker.tracker.document.run_document import (
     MapData,
     Point,
-    Points,
     Run,
     Runs,
     Sample,
     SeriesDefinition,
     SeriesHistory,
-    columns,
 )
 from spook_tracker.tracker.judge.calibration import ladder_timing, that_counts
 from spook_tracker.tracker.judge.work import FAMILIES, Samples, families_of, with_work
@@ -169,18 +168,15 @@ def histories(
     looked_at = [runs[i] for i in looked_at_again(len(runs), RECENT)]
     recent = records.samples_of([run.id for run in looked_at], tests)
     found: dict[str, SeriesHistory] = {}
-    known: dict[Runs, tuple[list[int] | None, Runs, list[tuple[int, Samples]]]] = {}
+    known: dict[Runs, tuple[list[int] | None, Runs, list[int], list[Samples]]] = {}
     for key, stored in records.series(keys, evidence=False).items():
         points = columns(stored.points)
         if points.runs not in known:
             known[points.runs] = _of_line(points.runs, place, recent)
-        chosen, ours, evidence = known[points.runs]
-        said = list(points.said) if chosen is None else [points.said[i] for i in chosen]
-        for i, samples in evidence:
-            if key in samples:
-                said[i] = samples[key][1], said[i][1], True
+        chosen, ours, places, measured = known[points.runs]
+        said = points.said if chosen is None else Stretches.of(map(points.said.__getitem__, chosen))
         if said:
-            found[key] = SeriesHistory(stored.definition, Points(ours, said))
+            found[key] = SeriesHistory(stored.definition, Points(ours, said, Evidence(key, places, measured)))
     whole = None if tests is None else cache(lambda run_id: _families(records.answered([run_id])[run_id]))
     found = with_missing(found, runs, recent, whole)
     return found | run_times(found) | work(looked_at, recent, tests)
@@ -188,12 +184,13 @@ def histories(
 
 def _of_line(
     runs: Runs, place: Mapping[str, Run], recent: Mapping[str, Samples]
-) -> tuple[list[int] | None, Runs, list[tuple[int, Samples]]]:
-    """Which of these runs stand in the line (None: all), as they stand there, and the places of those with evidence."""
+) -> tuple[list[int] | None, Runs, list[int], list[Samples]]:
+    """Which of these runs stand in the line (None: all), as they stand there, the places of those with evidence, and it."""
     chosen = [i for i, run in enumerate(runs) if run.id in place]
     ours = Runs(place[runs[i].id] for i in chosen)
-    evidence = [(i, recent[run.id]) for i, run in enumerate(ours) if recent.get(run.id)]
-    return None if len(chosen) == len(runs) else chosen, ours, evidence
+    places = [i for i, run in enumerate(ours) if recent.get(run.id)]
+    measured = [recent[ours[i].id] for i in places]
+    return None if len(chosen) == len(runs) else chosen, ours, places, measured
 
 
 def run_time_histories(
@@ -354,7 +351,7 @@ def run_times(found: Mapping[str, SeriesHistory]) -> dict[str, SeriesHistory]:
     ladders: dict[str, list[SeriesHistory]] = {}
     for series in found.values():
         definition = series.definition
-        if definition.kind == "ladder" and any(sample.timing for sample, *_ in columns(series.points).said):
+        if definition.kind == "ladder" and columns(series.points).timed():
             key = f"{definition.test}/{definition.configuration}/{definition.metric}:run-time"
             ladders.setdefault(key, []).append(series)
     return {key: _run_time(key, rungs) for key, rungs in ladders.items()}

@@ -9,7 +9,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import overload
 
-from spook_tracker.tracker.document.run_document import Points
+from spook_tracker.tracker.document.points import Points
 from spook_tracker.tracker.judge.judged import Judged
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import Class

@@ -18,13 +18,12 @@ import msgspec
 from msgspec.structs import replace
 
 from spook_tracker.tracker.document.collection import no_collection
+from spook_tracker.tracker.document.points import Points, columns
 from spook_tracker.tracker.document.run_document import (
     Point,
-    Points,
     Runs,
     SeriesDefinition,
     SeriesHistory,
-    columns,
 )
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.calibration import engines_own, taken_again, unquiet
@@ -53,6 +52,12 @@ class Told:
     definition: SeriesDefinition
     nights: Sequence[Judged]
 
+    @property
+    def points(self) -> Sequence[Point]:
+        """The nights without their verdicts."""
+        nights = self.nights
+        return nights.points if isinstance(nights, Nights) else [judged.night for judged in nights]
+
     @cached_property
     def lanes(self) -> list[tuple[list[Judged], Judged | None]]:
         """The nights that were judged against each other, without those that only repeat, and the night that ended them.
@@ -66,7 +71,7 @@ class Told:
         lane = on_one_clock if is_noisy(self.definition) else _question
         found = []
         told = nights.told if isinstance(nights, Nights) else range(len(nights))
-        points = nights.points if isinstance(nights, Nights) else [judged.night for judged in nights]
+        points = self.points
         for places in lanes_of(points, lane):
             over = nights[places[-1]].night.test_version != nights[-1].night.test_version
             found.append(([nights[i] for i in places if i in told], nights[places[-1] + 1] if over else None))
@@ -126,7 +131,7 @@ def _under_another_definition(history: Points, found: Mapping[int, Judged], star
 def lanes_of(history: Sequence[Point], lane: Callable[[Point], Hashable]) -> list[list[int]]:
     """The places of the nights that can be compared with each other, lane by lane, in the order of their firsts."""
     one_machine = isinstance(history, Points) and len(_machines(history.runs)) == 1
-    if isinstance(history, Points) and one_machine and len({said[1] for said in history.said}) == 1:
+    if isinstance(history, Points) and one_machine and len({said[1] for said in history.said.each}) == 1:
         return [list(range(len(history)))]
     known: dict[
         tuple[str, int], list[int]

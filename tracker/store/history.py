@@ -19,11 +19,11 @@ from typing import TYPE_CHECKING, Any, TypeVar, cast
 from spook_tracker.tracker.document import run_document as document
 from spook_tracker.tracker.document.collection import no_collection
 from spook_tracker.tracker.document.errors import DocumentError, UnknownName
+from spook_tracker.tracker.document.points import Points, Stretches
 from spook_tracker.tracker.document.run_document import (
     EngineVersion,
     Machine,
     Point,
-    Points,
     RunDocument,
     Runs,
     Said,
@@ -256,7 +256,9 @@ class History:
             name = places.tobytes()
             if name not in shared:
                 shared[name] = Runs(self._runs[i] for i in places)
-            result[key] = SeriesHistory(said[what[-1]][0], Points(shared[name], [said[i][1] for i in what]))
+            result[key] = SeriesHistory(
+                said[what[-1]][0], Points(shared[name], Stretches.of([said[i][1] for i in what]))
+            )
         return result
 
     def figures(self, run_id: str) -> tuple[document.FigureData, ...]:

@@ -12,14 +12,13 @@ import json
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
-from itertools import groupby
+from itertools import groupby, pairwise
 from typing import TYPE_CHECKING
 
 from msgspec import structs
 
 from spook_tracker.tracker.document.json_form import boxed, encode
 from spook_tracker.tracker.document.outside import escaped
-from spook_tracker.tracker.document.run_document import Sample
 from spook_tracker.tracker.website.events import Event
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory, Trend
 
@@ -176,17 +175,21 @@ def steady(test: TestHistory) -> list[Trend]:
 
 def changed(trend: Trend) -> list[int]:
     """The places at which a series begins, reads otherwise than before, or comes back after nights without it."""
-    found: list[int] = []
-    last: Sample | None = None  # most nights say the same by the same object
-    told = now = ("", "", False)
-    next_night = -1
-    for i, (night, (sample, *_)) in enumerate(zip(trend.nights, trend.said, strict=True)):
-        if sample is not last:
-            last, now = sample, (repr(sample.value), sample.outcome, sample.set_point_held)
-        if not i or night != next_night or now != told:
-            found.append(i)
-        told, next_night = now, night + 1
-    return found
+    found = {0, *returns(trend)} if trend.nights else set()
+    told = ("", "", False)
+    for start, _, (sample, *_) in trend.said.from_place(0):
+        now = repr(sample.value), sample.outcome, sample.set_point_held
+        if now != told:
+            found.add(start)
+        told = now
+    return sorted(found)
+
+
+def returns(trend: Trend) -> list[int]:
+    """The places at which a series comes back after nights without it."""
+    if trend.nights and trend.nights[-1] - trend.nights[0] == len(trend.nights) - 1:
+        return []
+    return [i for i, (one, other) in enumerate(pairwise(trend.nights), start=1) if other != one + 1]
 
 
 def _changes(trend: Trend, nights: Sequence[Night]) -> Iterable[list[Cell]]:

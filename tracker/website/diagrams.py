@@ -79,7 +79,7 @@ def moving(trends: Iterable[Trend]) -> list[Trend]:
     return [
         t
         for t in trends
-        if len(t.nights) >= FEWEST_NIGHTS and any(_differ(t.said[0][0], sample) for sample, *_ in t.said)
+        if len(t.nights) >= FEWEST_NIGHTS and any(_differ(t.said[0][0], sample) for sample, *_ in t.said.each)
     ]
 
 

@@ -45,7 +45,7 @@ def model_history(trends: Sequence[Trend]) -> list[Version]:
     for trend in trends:
         if trend.definition.sensitivity is None:
             continue
-        nights = [judged.night for judged in trend.told.nights]
+        nights = list(trend.told.points)
         for earlier, later in itertools.pairwise(nights):
             versions = earlier.run.engine.version, later.run.engine.version
             if versions[0] == versions[1] or _question(earlier) != _question(later):

@@ -10,9 +10,11 @@ import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import repeat
 from operator import attrgetter
 from typing import Protocol, TypeVar, overload
 
+from spook_tracker.tracker.document.points import Stretches, columns
 from spook_tracker.tracker.document.run_document import (
     Asked,
     EngineVersion,
@@ -21,13 +23,11 @@ from spook_tracker.tracker.document.run_document import (
     MapData,
     Run,
     Runs,
-    Said,
     Sample,
     SeriesDefinition,
     SeriesHistory,
     TestCard,
     Trajectory,
-    columns,
 )
 from spook_tracker.tracker.document.wording import day, short_hash, version
 from spook_tracker.tracker.judge.accepted import Accepted
@@ -85,7 +85,7 @@ class Column(Sequence[Cell]):
 
     __slots__ = ("_read", "_said")
 
-    def __init__(self, said: Sequence[Said], read: Callable[[Sample], Cell]) -> None:
+    def __init__(self, said: Stretches, read: Callable[[Sample], Cell]) -> None:
         self._said, self._read = said, read
 
     def __len__(self) -> int:
@@ -97,12 +97,13 @@ class Column(Sequence[Cell]):
     def __getitem__(self, place: slice) -> list[Cell]: ...
     def __getitem__(self, place: int | slice) -> Cell | list[Cell]:
         if isinstance(place, slice):
-            return [self._read(said[0]) for said in self._said[place]]
+            return list(Column(self._said[place], self._read))
         return self._read(self._said[place][0])
 
     def __iter__(self) -> Iterator[Cell]:
         read = self._read
-        return (read(said[0]) for said in self._said)
+        for start, end, said in self._said.from_place(0):
+            yield from repeat(read(said[0]), end - start)
 
 
 @dataclass
@@ -111,7 +112,7 @@ class Trend:
 
     told: Told
     nights: list[int]
-    said: Sequence[Said]
+    said: Stretches
     latest: Sample | None = None  # of the newest night that has one, with its evidence
     earlier: dict[int, Sample] = field(default_factory=dict)  # of a ladder: by index of `Chapter.earlier`
     order: int = 0  # place in its run's document
@@ -139,7 +140,7 @@ class Trend:
     @property
     def distinct(self) -> list[Sample]:
         """What it has ever said, most nights' saying the same once."""
-        return [said[0] for said in {id(said): said for said in self.said}.values()]
+        return [said[0] for said in {id(said): said for said in self.said.each}.values()]
 
     @property
     def value(self) -> float:
@@ -322,7 +323,7 @@ def _chapter(
         points = judged.points if isinstance(judged, Nights) else columns([one.night for one in judged])
         if points.runs not in places:
             places[points.runs] = [as_night(run).index for run in points.runs]
-        trends[key] = Trend(told, places[points.runs], points.said, latest=points.said[-1][0])
+        trends[key] = Trend(told, places[points.runs], points.said, latest=points[-1].sample)
     _add_evidence(history, nights, trends)
     earlier = _add_earlier_ladders(history, nights, trends)
     cards: dict[str, TestCard] = {}

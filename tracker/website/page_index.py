@@ -147,9 +147,9 @@ def counts_by_night(book: Book, most: int) -> dict[int, Count]:
     for test in book.tests:
         for trend in test.trends:
             if expected(trend.definition):
-                for night, judged in zip(trend.nights[-most:], trend.told.nights[-most:], strict=True):
+                for night, point in zip(trend.nights[-most:], trend.told.points[-most:], strict=True):
                     if night in pairs:
-                        pairs[night].append((trend.definition, judged.night))
+                        pairs[night].append((trend.definition, point))
     return {night: count_points(found) for night, found in pairs.items()}
 
 
