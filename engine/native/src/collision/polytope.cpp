@@ -12,6 +12,7 @@ namespace spook {
 Polytope::Polytope(std::vector<Vec3> given, std::vector<int> rounds, const std::vector<int>& counts)
     : corners(std::move(given)), loops(std::move(rounds)) {
     if (corners.size() > most_corners) throw std::invalid_argument("a polytope has too many corners");
+    if (counts.size() > most_faces) throw std::invalid_argument("a polytope has too many faces");
     int begin = 0;
     std::map<std::pair<int, int>, int> sides;  // from, to: the face on its left
     for (const int count : counts) {

@@ -9,6 +9,7 @@ namespace spook {
 
 struct Polytope {
     static constexpr int most_corners = 64, most_round_a_face = 16;
+    static constexpr int most_faces = 2 * most_corners - 4;  // all of them triangles (Euler)
 
     struct Face {
         int begin, count;  // its corners in `loops`, anticlockwise seen from outside
@@ -30,7 +31,7 @@ struct Polytope {
     double volume = 0.0;     // m³
 
     /// From corners and the loops of faces, `counts[k]` indices each. Throws std::invalid_argument where an edge does
-    /// not part two faces, or there are more corners than the limits above.
+    /// not part two faces, or there are more corners or faces than the limits above.
     Polytope(std::vector<Vec3> corners, std::vector<int> loops, const std::vector<int>& counts);
 
     /// The corner k of a face, 0 … count − 1 and round again.

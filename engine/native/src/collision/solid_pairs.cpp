@@ -23,12 +23,6 @@ Solid::Solid(const Primitive& primitive, const Pose& at) noexcept
     thickness = box ? 2.0 * std::min({half.x, half.y, half.z}) : shape.thickness;
 }
 
-double Solid::lowest(Vec3 n) const noexcept {
-    double least = 1e300;
-    for (int k = 0; k < count(); ++k) least = std::min(least, dot(n, corners[k]));
-    return least;
-}
-
 namespace {
 
 /// The face of `one` that the other lies farthest beyond; `sign` turns its normal from second to first.
@@ -36,11 +30,31 @@ SolidAxes::Best best_face(const Solid& one, const Solid& other, double sign) noe
     SolidAxes::Best best{-1e300, sign * one.normal(0), 0, 0};  // also of what is no number
     for (int k = 0; k < static_cast<int>(one.shape.faces.size()); ++k) {
         const Vec3 n = one.normal(k);
-        const double gap = other.lowest(n) - dot(n, one.corner_of(one.face(k), 0));
-        if (gap > best.gap) best = {gap, sign * n, k, k};
+        const double on = dot(n, one.corner_of(one.face(k), 0));
+        double lowest = 1e300;
+        for (int c = 0; c < other.count() && !(lowest - on <= best.gap); ++c)
+            lowest = std::min(lowest, dot(n, other.corners[c]));
+        if (lowest - on > best.gap) best = {lowest - on, sign * n, k, k};
     }
     return best;
 }
+
+/// The inward normals of a solid's faces in world axes, each coordinate by itself.
+struct Inward {
+    double x[Polytope::most_faces], y[Polytope::most_faces], z[Polytope::most_faces];
+    int count;
+
+    explicit Inward(const Solid& solid) noexcept : count(static_cast<int>(solid.shape.faces.size())) {
+        for (int k = 0; k < count; ++k) {
+            const Vec3 n = -solid.normal(k);
+            x[k] = n.x, y[k] = n.y, z[k] = n.z;
+        }
+    }
+    Vec3 operator[](int k) const noexcept { return {x[k], y[k], z[k]}; }
+    void along(Vec3 v, double* found) const noexcept {
+        for (int k = 0; k < count; ++k) found[k] = x[k] * v.x + y[k] * v.y + z[k] * v.z;
+    }
+};
 
 }  // namespace
 
@@ -50,13 +64,16 @@ SolidAxes solid_axes(const Solid& first, const Solid& second, double margin) noe
     axes.second_face = best_face(second, first, 1.0);
     if (std::max(axes.first_face.gap, axes.second_face.gap) > margin) return axes;
     const auto &ours = first.shape.edges, &theirs = second.shape.edges;
+    const Inward inward(second);
+    double beside[Polytope::most_faces];  // of each face of the second, its normal along `ba`
     for (std::size_t i = 0; i < ours.size(); ++i) {
         const Vec3 a = first.normal(ours[i].left), b = first.normal(ours[i].right);
         const Vec3 along = first.corners[ours[i].to] - first.corners[ours[i].from], ba = cross(b, a);
+        inward.along(ba, beside);
         for (std::size_t j = 0; j < theirs.size(); ++j) {
-            const Vec3 c = -second.normal(theirs[j].left), d = -second.normal(theirs[j].right);
-            const double cba = dot(c, ba), dba = dot(d, ba);
+            const double cba = beside[theirs[j].left], dba = beside[theirs[j].right];
             if (!(cba * dba < 0.0)) continue;
+            const Vec3 c = inward[theirs[j].left], d = inward[theirs[j].right];
             const Vec3 dc = cross(d, c);
             const double adc = dot(a, dc), bdc = dot(b, dc);
             if (!(adc * bdc < 0.0 && cba * bdc > 0.0)) continue;

@@ -22,7 +22,6 @@ struct Solid {
         const int place = face.begin + k % face.count;
         return corners[shape.loops[static_cast<std::size_t>(place)]];
     }
-    double lowest(Vec3 n) const noexcept;  // least n · corner
 };
 
 /// The axis along which two solids are farthest apart: a face of the first, one of the second, an edge of each.
