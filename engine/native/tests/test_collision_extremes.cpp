@@ -3,6 +3,7 @@
 #include <limits>
 #include <memory>
 #include <random>
+#include <stdexcept>
 #include <vector>
 
 #include "collision/narrow_phase.hpp"
@@ -96,9 +97,33 @@ void far_away_clipping_stays_in_bounds() {
     }
 }
 
+/// A ring of triangles: each edge parts two faces, and there are more of these than any hull of so many corners has.
+void a_ring_is_no_hull() {
+    constexpr int side = 8;  // 64 corners, 128 faces
+    std::vector<Vec3> corners;
+    std::vector<int> loops;
+    for (int i = 0; i < side; ++i)
+        for (int j = 0; j < side; ++j) {
+            const double along = 6.283 * i / side, across = 6.283 * j / side, out = 2.0 + std::cos(across);
+            corners.push_back({out * std::cos(along), out * std::sin(along), std::sin(across)});
+            const int right = (i + 1) % side, up = (j + 1) % side;
+            for (const int corner : {side * i + j, side * right + j, side * right + up, side * i + j,
+                                     side * right + up, side * i + up})
+                loops.push_back(corner);
+        }
+    bool refused = false;
+    try {
+        Polytope(corners, loops, std::vector<int>(loops.size() / 3, 3));
+    } catch (const std::invalid_argument&) {
+        refused = true;
+    }
+    EXPECT(refused);
+}
+
 }  // namespace
 
 int main() {
+    a_ring_is_no_hull();
     every_pair_is_answered_where_numbers_end();
     far_away_clipping_stays_in_bounds();
     return report();
