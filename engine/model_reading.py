@@ -42,6 +42,7 @@ FILES_OF = {  # element: attributes that name files
     "flexcomp": ("file",),
     "texture": ("file", "filename", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback"),
 }
+NAMING_SDF = ("include", "mesh", "heightmap", "image")  # whose <uri> is read; a material's script is not
 MOVES_URDF = (
     "revolute",
     "continuous",
@@ -273,9 +274,12 @@ class _Reader:
     # URDF and SDF
 
     def urdf(self, root: ElementTree.Element) -> Reading:
-        links = {link.get("name", ""): _Body(link.get("name", "")) for link in root.findall("link")}
+        names = [link.get("name", "") for link in root.findall("link")]
+        links = {name: _Body(name) for name in names}
         if not links:
             raise ModelError(f"{self.path} is no model: it has no links")
+        if twice := [name for name in links if names.count(name) > 1][:1] if len(names) > len(links) else []:
+            raise ModelError(f"{self.path} has two links {twice[0]!r}")
         inner = set()
         for joint in root.findall("joint"):
             ends = [joint.find("parent"), joint.find("child")]
@@ -284,14 +288,18 @@ class _Reader:
                 raise ModelError(
                     f"{self.path}: joint {joint.get('name', '')!r} ties link {stray[0]!r}, which is not there"
                 )
+            if names[1] in inner:
+                raise ModelError(
+                    f"{self.path}: link {names[1]!r} hangs from two joints, which no URDF allows"
+                )
             child = links[names[1]]
             child.moves = joint.get("type") in MOVES_URDF
             child.free = joint.get("type") == "floating"
             links[names[0]].children.append(child)
             inner.add(names[1])
         bodies = _Body("", children=[link for name, link in links.items() if name not in inner])
-        if not bodies.children:
-            raise ModelError(f"{self.path}: its joints make a circle, so no link is the first")
+        if self.reached(bodies) < len(links):
+            raise ModelError(f"{self.path}: its joints make a circle, so none of its links is the first")
         assets = {}
         for collision in (False, True):  # what collides goes before what is only seen
             for mesh in (
@@ -313,12 +321,23 @@ class _Reader:
     def sdf(self, root: ElementTree.Element) -> Reading:
         bodies = _Body("")
         step = root.findtext(".//physics/max_step_size")
+        self.sdf_models(root, self.path, (self.path.resolve(),), bodies)
+        if not bodies.children:
+            raise ModelError(f"{self.path} is no model: it has no links")
+        self.reached(bodies)
+        gravity = _gravity([root.findtext(".//gravity")], self.path)
+        return self.found("SDF", bodies, _step(step, self.path) if step else 0.001, gravity=gravity)
+
+    def sdf_models(
+        self, root: ElementTree.Element, file: Path, within: tuple[Path, ...], bodies: _Body
+    ) -> None:
+        """The links of a file's models and of those it includes, and the files that all of them name."""
         for model in root.iter("model"):
             links = {link.get("name", ""): _Body(link.get("name", "")) for link in model.findall("link")}
             inner = set()
             for joint in model.findall("joint"):
                 parent, child = (joint.findtext(end, "").strip() for end in ("parent", "child"))
-                if child in links:
+                if child in links and child not in inner:
                     links[child].moves = joint.get("type") in MOVES_URDF
                     inner.add(child)
                     if parent in links:
@@ -328,15 +347,34 @@ class _Reader:
                 if name not in inner:
                     link.moves = link.free = not fixed
                     bodies.children.append(link)
-        if not bodies.children:
-            raise ModelError(f"{self.path} is no model: it has no links")
-        for mesh in root.iter("uri"):
-            if mesh.text and "://" not in mesh.text.removeprefix("file://").removeprefix("model://"):
-                self.first(
-                    mesh.text.removeprefix("model://"), [self.path.parent, self.path.parent.parent], self.path
-                )
-        gravity = _gravity([root.findtext(".//gravity")], self.path)
-        return self.found("SDF", bodies, _step(step, self.path) if step else 0.001, gravity=gravity)
+        for element in root.iter():
+            for uri in element.findall("uri") if element.tag in NAMING_SDF else ():
+                found = self.of_uri((uri.text or "").strip(), file)
+                if element.tag != "include":
+                    continue
+                if found in within:
+                    raise ModelError(f"{file} includes {found.name}, which includes it")
+                self.sdf_models(self.parsed(found, file), found, (*within, found), bodies)
+
+    def of_uri(self, uri: str, file: Path) -> Path:
+        """The file that an SDF means: beside it, beside its folder, or in a folder above of the name it begins with; of a
+        folder, its model.sdf."""
+        name = uri.removeprefix("model://").removeprefix("package://")
+        first = name.partition("/")[0]
+        above = [folder.parent for folder in file.resolve().parents if folder.name == first]
+        places = [file.parent, file.parent.parent, *above]
+        if any((place / name / "model.sdf").is_file() for place in places):
+            name = f"{name}/model.sdf"
+        return self.first(name, places, file)
+
+    def reached(self, bodies: _Body) -> int:
+        """How many bodies hang from it in all; ModelError where one hangs from more than engines take."""
+        level, count, depth = bodies.children, 0, 0
+        while level:
+            level, count, depth = [b for body in level for b in body.children], count + len(level), depth + 1
+            if depth > DEEPEST:
+                raise ModelError(f"{self.path} has links that hang from more than {DEEPEST} others")
+        return count
 
     def found(
         self,

@@ -38,6 +38,7 @@ def engine(request: pytest.FixtureRequest) -> Any:
 
 
 def _model(folder: Path, text: str, **facts: Any) -> ModelFile:
+    folder.mkdir(exist_ok=True)
     file = folder / "model.urdf"
     file.write_text(text)
     found = read(file)
@@ -75,6 +76,44 @@ def test_the_same_bits_come_twice_and_pushes_move_it(tmp_path: Path, engine: Any
     ]
 
     assert runs[0].state_hash == runs[1].state_hash != runs[2].state_hash
+
+
+LIAR = b"x" * 80 + b"\xff" * 4 + bytes(50)  # an STL of one triangle that says it has four thousand million
+
+
+@pytest.mark.parametrize("name", ["drake", "dart", "pybullet"])
+def test_a_broken_mesh_is_one_sentence_and_nothing_is_loaded(
+    tmp_path: Path, name: str, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+) -> None:
+    try:
+        simulate = find(name).simulate
+    except EngineMissing as missing:
+        pytest.skip(str(missing))
+    capfd.readouterr()
+    monkeypatch.chdir(tmp_path)
+    Path("mesh.stl").write_bytes(LIAR)
+    shape = '<collision><geometry><mesh filename="mesh.stl"/></geometry></collision>'
+    model = _model(Path(), ARM.replace('<link name="bar">', f'<link name="bar">{shape}'))
+    with pytest.raises(NotSupported, match=r"model\.urdf") as raised:
+        simulate(ModelRun(model=model), time_step=0.001, duration=0.1)
+
+    assert "mesh" in str(raised.value).lower() and "\n" not in str(raised.value)
+    sound = _model(Path(), ARM)
+    assert simulate(ModelRun(model=sound), time_step=0.001, duration=0.01).completed
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_shape_that_drake_asserts_on_is_refused(tmp_path: Path) -> None:
+    try:
+        simulate = find("drake").simulate
+    except EngineMissing as missing:
+        pytest.skip(str(missing))
+    inverted = _model(tmp_path, BOX.replace('radius=".1"', 'radius="-1"'))
+    unread = _model(tmp_path / "other", ARM.replace('xyz="0 1 0"', 'xyz="up"'))
+
+    for model, said in ((inverted, "radius = -1"), (unread, "Expected 3 values")):
+        with pytest.raises(NotSupported, match=said):
+            simulate(ModelRun(model=model), time_step=0.001, duration=0.1)
 
 
 def test_what_it_cannot_be_asked_is_said(tmp_path: Path, engine: Any) -> None:

@@ -85,6 +85,16 @@ def _nested(levels: int) -> str:
     return "<mujoco><worldbody>" + "<body>" * levels + "</body>" * levels + "</worldbody></mujoco>"
 
 
+def _chain(links: int, more: str = "") -> str:
+    """A URDF in which each link hangs from the one before."""
+    joints = (
+        f'<joint name="{k}"><parent link="{k - 1}"/><child link="{k}"/></joint>' for k in range(1, links)
+    )
+    return (
+        "<robot>" + "".join(f'<link name="{k}"/>' for k in range(links)) + "".join(joints) + f"{more}</robot>"
+    )
+
+
 BOMB = '<!DOCTYPE m [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><mujoco><worldbody><body name="&b;"/></worldbody></mujoco>'
 
 
@@ -124,6 +134,13 @@ BOMB = '<!DOCTYPE m [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><mujoco><worldbody
             '<robot><link name="a"/><joint name="j" type="fixed"><parent link="a"/><child link="a"/></joint></robot>',
             "make a circle",
         ),
+        ('<robot><link name="a"/><link name="a"/></robot>', "two links 'a'"),
+        (_chain(2, '<link name="b"/><joint name="again"><parent link="b"/><child link="1"/></joint>'), "'1' hangs from two joints"),
+        (_chain(DEEPEST + 1), "hang from more than 200"),
+        ('<sdf><include><uri>../secret.xml</uri></include></sdf>', "lies outside"),
+        ('<sdf><include><uri>model://parts</uri></include></sdf>', "secret.stl, which lies outside"),
+        ('<sdf><include><uri>robot.xml</uri></include></sdf>', "which includes it"),
+        ('<sdf><model><link><mesh><uri>http://a/b.stl</uri></mesh></link></model></sdf>', "b.stl, which is no file"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_read_is_one_sentence_that_names_the_file(
@@ -134,13 +151,17 @@ def test_what_cannot_be_read_is_one_sentence_that_names_the_file(
     (tmp_path / "models/meshes").mkdir(parents=True)
     (tmp_path / "models/parts").mkdir()
     (tmp_path / "models/parts/ball.xml").write_text(BALL)
+    (tmp_path / "models/parts/model.sdf").write_text(
+        "<sdf><model><mesh><uri>../../secret.stl</uri></mesh></model></sdf>"
+    )
     file = tmp_path / "models/robot.xml"
     file.write_text(text)
 
     with pytest.raises(ModelError, match=said) as raised:
         read(file)
 
-    assert "\n" not in str(raised.value) and "robot.xml" in str(raised.value)
+    assert "\n" not in str(raised.value)
+    assert "robot.xml" in str(raised.value) or "model.sdf" in str(raised.value)
 
 
 @pytest.mark.parametrize(
@@ -152,6 +173,24 @@ def test_an_encoding_that_engines_do_not_read_is_refused(cart: Path, encoding: s
 
     with pytest.raises(ModelError, match=r"no text in UTF-8"):
         read(cart)
+
+
+def test_an_sdf_is_all_the_files_it_includes_and_no_script_of_its_looks(tmp_path: Path) -> None:
+    (tmp_path / "robots/wheel").mkdir(parents=True)
+    (tmp_path / "robots/wheel/model.sdf").write_text(
+        '<sdf><model><link name="hub"/><link name="rim"><mesh><uri>model://robots/rim.stl</uri></mesh></link>'
+        '<joint type="revolute"><parent>hub</parent><child>rim</child></joint></model></sdf>'
+    )
+    (tmp_path / "robots/rim.stl").write_text("a mesh")
+    (tmp_path / "tracker.toml").write_text("")
+    file = tmp_path / "robots/cart.sdf"
+    file.write_text(
+        "<sdf><include><uri>model://wheel</uri></include><material><script><uri>file://gone.material</uri></script></material></sdf>"
+    )
+    found = read(file)
+
+    assert {one.name for one in found.files} == {"cart.sdf", "model.sdf", "rim.stl"}
+    assert [one.label for one in found.watched] == ["hub", "rim"]
 
 
 def test_a_byte_order_mark_changes_nothing_but_the_hash(cart: Path) -> None:

@@ -7,6 +7,7 @@ DART leaves out unless told.
 
 from __future__ import annotations
 
+import re
 import time
 from pathlib import Path
 from typing import Any
@@ -24,11 +25,14 @@ from spook_tracker.engine.peers.model_loop import (
     resident,
     said,
 )
-from spook_tracker.engine.peers.stepped import quiet
+from spook_tracker.engine.peers.stepped import overheard
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result
 
 READS = ("URDF", "SDF", "MJCF")
+NOTE = re.compile(  # colours, the kind and line before each of what it writes, and its own functions
+    r"\x1b\[[0-9;]*m|(Warning|Error) \[[\w.]+:\d+\]|^Error:|at line \d+ in \S+|\[\w+(::\w+)*\]", re.MULTILINE
+)
 
 
 def run_model(run: ModelRun, time_step: float, duration: float, time_limit: float | None) -> Result:
@@ -37,8 +41,7 @@ def run_model(run: ModelRun, time_step: float, duration: float, time_limit: floa
     if run.elsewhere:
         return elsewhere(__name__, run, time_step, duration, time_limit)
     before, began = resident(), time.perf_counter()
-    with quiet():
-        world = _loaded(run)
+    world = _loaded(run)
     simulation = _Simulation(run, world, time_step, time_limit)
     load = time.perf_counter() - began
     simulation.megabytes = resident() - before
@@ -46,7 +49,17 @@ def run_model(run: ModelRun, time_step: float, duration: float, time_limit: floa
 
 
 def _loaded(run: ModelRun) -> Any:
-    path = Path(run.model.path)
+    path = Path(run.model.path).absolute()  # it finds no other
+    with overheard() as heard:
+        world = _read(run, path)
+        if world is None or not world.getNumSkeletons():
+            lines = NOTE.sub(" ", heard().replace("file://", "")).split("\n")
+            notes = " ".join(dict.fromkeys(line.strip() for line in lines)).strip()
+            raise NotSupported(f"dart finds no model in {path.name}{': ' * bool(notes)}{said(notes, path)}")
+    return world
+
+
+def _read(run: ModelRun, path: Path) -> Any:
     try:
         if run.model.format == "URDF":
             loader = dart.utils.DartLoader()
@@ -61,10 +74,13 @@ def _loaded(run: ModelRun) -> Any:
         else:
             parser = dart.utils.SdfParser if run.model.format == "SDF" else dart.utils.MjcfParser
             world = parser.readWorld(str(path))
+            if world is None and run.model.format == "SDF":  # a model without a world around it
+                skeleton = parser.readSkeleton(str(path))
+                world = dart.simulation.World()
+                if skeleton is not None:
+                    world.addSkeleton(skeleton)
     except (RuntimeError, ValueError, TypeError) as error:
         raise NotSupported(f"dart refuses {path.name}: {said(error, path)}") from None
-    if world is None or not world.getNumSkeletons():
-        raise NotSupported(f"dart finds no model in {path.name}")
     return world
 
 

@@ -17,6 +17,7 @@ from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from spook_tracker.engine.errors import EngineError
 from spook_tracker.engine.model_file import ModelRun, Watched
 from spook_tracker.engine.peers.model_loop import (
     Array,
@@ -27,6 +28,7 @@ from spook_tracker.engine.peers.model_loop import (
     resident,
     said,
 )
+from spook_tracker.engine.peers.stepped import quiet
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result
 
@@ -39,7 +41,14 @@ def run_model(run: ModelRun, time_step: float, duration: float, time_limit: floa
     if run.elsewhere:
         return elsewhere(__name__, run, time_step, duration, time_limit)
     before, began = resident(), time.perf_counter()
-    simulation = _Simulation(run, time_step, time_limit)
+    path = Path(run.model.path)
+    with quiet():  # it writes what it raises, too
+        try:
+            simulation = _Simulation(run, time_step, time_limit)
+        except (RuntimeError, ValueError, SystemExit) as error:  # the last where Drake asserts
+            if isinstance(error, EngineError):
+                raise
+            raise NotSupported(f"drake refuses {path.name}: {said(error, path)}") from None
     load = time.perf_counter() - began
     simulation.megabytes = resident() - before
     return simulation.result(duration, load)
@@ -75,10 +84,7 @@ class _Simulation(LoadedModel):
         parser = Parser(self.plant, self.graph)
         for name, folder in packages(run).items():
             parser.package_map().Add(name, folder)
-        try:
-            made = parser.AddModels(str(path))
-        except RuntimeError as error:
-            raise NotSupported(f"drake refuses {path.name}: {said(error, path)}") from None
+        made = parser.AddModels(str(path))
         if run.model.format != "URDF":
             return
         for model in made:
@@ -115,7 +121,7 @@ class _Simulation(LoadedModel):
         self.taken += count
         try:
             self.simulator.AdvanceTo(self.taken * self.step)
-        except RuntimeError as error:
+        except (RuntimeError, SystemExit) as error:
             self.broken = " ".join(str(error).split())[:200]
 
     broken = ""

@@ -69,9 +69,9 @@ def refuse_settings(engine: str, run: ModelRun) -> None:
         raise NotSupported(f"{engine} is asked without controls, keyframes and other settings than its own")
 
 
-def said(error: Exception, path: Path) -> str:
+def said(error: object, path: Path) -> str:
     """A loader's message on one line, without the folder of the file."""
-    return " ".join(str(error).split()).replace(f"{path.parent}/", "")[:200]
+    return " ".join(str(error).split()).replace(f"{path.absolute().parent}/", "")[:200]
 
 
 def packages(run: ModelRun) -> dict[str, str]:

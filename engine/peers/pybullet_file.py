@@ -6,12 +6,12 @@ Gravity is the file's, which Bullet's importers leave out; the floor is whatever
 
 from __future__ import annotations
 
+import re
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pybullet as bullet
 
 from spook_tracker.engine.model_file import ModelRun, Watched
 from spook_tracker.engine.peers.model_loop import (
@@ -22,12 +22,17 @@ from spook_tracker.engine.peers.model_loop import (
     resident,
     said,
 )
-from spook_tracker.engine.peers.stepped import quiet
+from spook_tracker.engine.peers.stepped import overheard, quiet
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result
 
+with quiet():  # it says when it was built
+    import pybullet as bullet
+
 READS = ("URDF", "SDF", "MJCF")
 SWEEPS = 500  # in place of 50, as in this engine's other questions
+NOTE = re.compile(r"b3(Warning|Error)\[[^\]]*\]:\n?")  # before each of what its importers write
+UNREAD = re.compile(r"(?:cannot extract|issue extracting)[^\n]* '?([^\s']+)'?")  # a mesh; it goes on without
 
 
 def run_model(run: ModelRun, time_step: float, duration: float, time_limit: float | None) -> Result:
@@ -51,14 +56,23 @@ def run_model(run: ModelRun, time_step: float, duration: float, time_limit: floa
 def _loaded(run: ModelRun, client: int) -> list[int]:
     path = Path(run.model.path)
     bullet.setAdditionalSearchPath(str(path.parent), physicsClientId=client)
-    try:
-        if run.model.format == "URDF":
-            flags = bullet.URDF_USE_INERTIA_FROM_FILE
-            return [bullet.loadURDF(str(path), useFixedBase=True, flags=flags, physicsClientId=client)]
-        loader = bullet.loadSDF if run.model.format == "SDF" else bullet.loadMJCF
-        return list(loader(str(path), physicsClientId=client))
-    except bullet.error as error:
-        raise NotSupported(f"pybullet refuses {path.name}: {said(error, path)}") from None
+    flags = bullet.URDF_USE_INERTIA_FROM_FILE
+    with overheard() as heard:
+        try:
+            if run.model.format == "URDF":
+                made = [bullet.loadURDF(str(path), useFixedBase=True, flags=flags, physicsClientId=client)]
+            else:
+                loader = bullet.loadSDF if run.model.format == "SDF" else bullet.loadMJCF
+                made = list(loader(str(path), physicsClientId=client))
+        except bullet.error as error:
+            _, *notes = NOTE.split(heard())
+            why = [note for kind, note in zip(notes[::2], notes[1::2], strict=True) if kind == "Error"]
+            raise NotSupported(
+                f"pybullet refuses {path.name}: {said(' '.join([str(error), *why]), path)}"
+            ) from None
+        if unread := UNREAD.search(heard()):
+            raise NotSupported(f"pybullet cannot read the mesh {Path(unread[1]).name} of {path.name}")
+    return made
 
 
 class _Simulation(LoadedModel):

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
 import os
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,23 +20,52 @@ from spook_tracker.engine.result import Array
 
 BLOCK = 1000  # steps between two looks at the clock where nothing is recorded between, at most
 LOOK = 0.05  # s after which it is looked at again, or sooner
+MOST_HEARD = 100_000  # bytes of what an engine has written last
 
 
 @contextlib.contextmanager
 def quiet() -> Iterator[None]:
     """What an engine writes past Python, to standard output or error, goes nowhere; its outcome says it."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    kept, nowhere = [os.dup(1), os.dup(2)], os.open(os.devnull, os.O_WRONLY)
+    with Path(os.devnull).open("wb") as nowhere, _written_to(nowhere.fileno()):
+        yield
+
+
+@contextlib.contextmanager
+def overheard() -> Iterator[Callable[[], str]]:
+    """The same; it gives a function that tells what has been written so far."""
+    with tempfile.TemporaryFile() as kept, _written_to(kept.fileno()):
+
+        def heard() -> str:
+            _flush()
+            size = os.fstat(kept.fileno()).st_size
+            first = max(0, size - MOST_HEARD)
+            return os.pread(kept.fileno(), size - first, first).decode(errors="replace")
+
+        yield heard
+
+
+@contextlib.contextmanager
+def _written_to(place: int) -> Iterator[None]:
+    """Standard output and error, until the end, to that open file."""
+    _flush()
+    kept = [os.dup(1), os.dup(2)]
     try:
-        os.dup2(nowhere, 1)
-        os.dup2(nowhere, 2)
+        os.dup2(place, 1)
+        os.dup2(place, 2)
         yield
     finally:
+        _flush()
         for number, whole in enumerate(kept, start=1):
             os.dup2(whole, number)
             os.close(whole)
-        os.close(nowhere)
+
+
+def _flush() -> None:
+    """What Python and C keep back of both."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    with contextlib.suppress(OSError, TypeError, AttributeError):  # Windows has no such library
+        ctypes.CDLL(None).fflush(None)
 
 
 class Kept:
