@@ -10,18 +10,26 @@ from __future__ import annotations
 import hashlib
 import math
 import os
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
 
-from spook_tracker.engine.errors import EngineError
+from spook_tracker.engine.model_bodies import (
+    DEEPEST,
+    Body,
+    ModelError,
+    drives,
+    hang_mjcf,
+    hang_sdf,
+    hanging,
+    moving,
+    urdf_bodies,
+)
 from spook_tracker.engine.model_file import Format, Watched
 
 MOST_BYTES = 64_000_000  # of one file; the largest mesh of the robots people share has a third of that
 MOST_XML = 16_000_000  # bytes of a file that is read as text: elements take ten times their text in memory
 MOST_FILES = 3_000
-DEEPEST = 200  # elements within elements; engines read models recursively
 MOST_COPIES = 10_000  # that one element makes: engines write out each of them before they look at the next
 MOST_ROOM = 100_000_000  # numbers that one element asks for without a file that holds them
 ROOM = {"hfield": ("nrow", "ncol"), "texture": ("width", "height")}  # whose product is that
@@ -43,21 +51,6 @@ FILES_OF = {  # element: attributes that name files
     "texture": ("file", "filename", "fileright", "fileleft", "fileup", "filedown", "filefront", "fileback"),
 }
 NAMING_SDF = ("include", "mesh", "heightmap", "image")  # whose <uri> is read; a material's script is not
-MOVES_URDF = (
-    "revolute",
-    "continuous",
-    "prismatic",
-    "floating",
-    "planar",
-    "ball",
-    "universal",
-    "screw",
-    "revolute2",
-)
-
-
-class ModelError(EngineError, ValueError):
-    """A model file cannot be read; one sentence that names the file and what is wrong with it."""
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -76,16 +69,6 @@ class Reading:
     driven: bool = False  # it has actuators
     gravity: tuple[float, float, float] = GRAVITY  # m/s²
     assets: dict[str, Path] = field(default_factory=dict)  # a URDF's meshes, by the name after the last slash
-
-
-@dataclass(slots=True)
-class _Body:
-    """A body of the file; `moves` by joints of its own."""
-
-    name: str
-    moves: bool = False
-    free: bool = False
-    children: list[_Body] = field(default_factory=list)
 
 
 def folder_of(path: Path) -> Path:
@@ -211,9 +194,9 @@ class _Reader:
 
     def mjcf(self, root: ElementTree.Element) -> Reading:
         self.expand(root, self.path.parent, self.path, (self.path.resolve(),))
-        bodies = _Body("")
+        bodies = Body("")
         for world in root.findall("worldbody"):
-            _gather(world, bodies)
+            hang_mjcf(world, bodies)
         if not any(len(world) for world in root.findall("worldbody")):
             raise ModelError(
                 f"{self.path} is no model by itself: nothing is in its world; it is a part for inclusion"
@@ -274,32 +257,7 @@ class _Reader:
     # URDF and SDF
 
     def urdf(self, root: ElementTree.Element) -> Reading:
-        names = [link.get("name", "") for link in root.findall("link")]
-        links = {name: _Body(name) for name in names}
-        if not links:
-            raise ModelError(f"{self.path} is no model: it has no links")
-        if twice := [name for name in links if names.count(name) > 1][:1] if len(names) > len(links) else []:
-            raise ModelError(f"{self.path} has two links {twice[0]!r}")
-        inner = set()
-        for joint in root.findall("joint"):
-            ends = [joint.find("parent"), joint.find("child")]
-            names = [end.get("link", "") if end is not None else "" for end in ends]
-            if stray := [name for name in names if name not in links]:
-                raise ModelError(
-                    f"{self.path}: joint {joint.get('name', '')!r} ties link {stray[0]!r}, which is not there"
-                )
-            if names[1] in inner:
-                raise ModelError(
-                    f"{self.path}: link {names[1]!r} hangs from two joints, which no URDF allows"
-                )
-            child = links[names[1]]
-            child.moves = joint.get("type") in MOVES_URDF
-            child.free = joint.get("type") == "floating"
-            links[names[0]].children.append(child)
-            inner.add(names[1])
-        bodies = _Body("", children=[link for name, link in links.items() if name not in inner])
-        if self.reached(bodies) < len(links):
-            raise ModelError(f"{self.path}: its joints make a circle, so none of its links is the first")
+        bodies = urdf_bodies(root, self.path)
         assets = {}
         for collision in (False, True):  # what collides goes before what is only seen
             for mesh in (
@@ -319,34 +277,20 @@ class _Reader:
         return [*(named if package else []), self.path.parent]
 
     def sdf(self, root: ElementTree.Element) -> Reading:
-        bodies = _Body("")
+        bodies = Body("")
         step = root.findtext(".//physics/max_step_size")
         self.sdf_models(root, self.path, (self.path.resolve(),), bodies)
         if not bodies.children:
             raise ModelError(f"{self.path} is no model: it has no links")
-        self.reached(bodies)
+        hanging(bodies, self.path)
         gravity = _gravity([root.findtext(".//gravity")], self.path)
         return self.found("SDF", bodies, _step(step, self.path) if step else 0.001, gravity=gravity)
 
     def sdf_models(
-        self, root: ElementTree.Element, file: Path, within: tuple[Path, ...], bodies: _Body
+        self, root: ElementTree.Element, file: Path, within: tuple[Path, ...], bodies: Body
     ) -> None:
         """The links of a file's models and of those it includes, and the files that all of them name."""
-        for model in root.iter("model"):
-            links = {link.get("name", ""): _Body(link.get("name", "")) for link in model.findall("link")}
-            inner = set()
-            for joint in model.findall("joint"):
-                parent, child = (joint.findtext(end, "").strip() for end in ("parent", "child"))
-                if child in links and child not in inner:
-                    links[child].moves = joint.get("type") in MOVES_URDF
-                    inner.add(child)
-                    if parent in links:
-                        links[parent].children.append(links[child])
-            fixed = model.findtext("static", "false").strip() in ("true", "1")
-            for name, link in links.items():
-                if name not in inner:
-                    link.moves = link.free = not fixed
-                    bodies.children.append(link)
+        hang_sdf(root, bodies)
         for element in root.iter():
             for uri in element.findall("uri") if element.tag in NAMING_SDF else ():
                 found = self.of_uri((uri.text or "").strip(), file)
@@ -367,26 +311,17 @@ class _Reader:
             name = f"{name}/model.sdf"
         return self.first(name, places, file)
 
-    def reached(self, bodies: _Body) -> int:
-        """How many bodies hang from it in all; ModelError where one hangs from more than engines take."""
-        level, count, depth = bodies.children, 0, 0
-        while level:
-            level, count, depth = [b for body in level for b in body.children], count + len(level), depth + 1
-            if depth > DEEPEST:
-                raise ModelError(f"{self.path} has links that hang from more than {DEEPEST} others")
-        return count
-
     def found(
         self,
         format: Format,
-        bodies: _Body,
+        bodies: Body,
         time_step: float,
         keyframes: tuple[str, ...] = (),
         assets: dict[str, Path] | None = None,
         driven: bool = False,
         gravity: tuple[float, float, float] = GRAVITY,
     ) -> Reading:
-        every = list(_moving(bodies, "", (), False))
+        every = list(moving(bodies, "", (), False))
         if not every:
             raise ModelError(f"nothing in {self.path} moves: it has no joints; it is a part of other models")
         tops = [body for _, body, top in every if top]
@@ -397,7 +332,7 @@ class _Reader:
             digest=self.digest(),
             time_step=time_step,
             watched=_labelled(
-                [found for found, body, top in every if body.free or not _drives(body)][:MOST_WATCHED]
+                [found for found, body, top in every if body.free or not drives(body)][:MOST_WATCHED]
             ),
             keyframes=keyframes,
             bodies=len(every),
@@ -472,46 +407,6 @@ def _gravity(texts: list[str | None], path: Path) -> tuple[float, float, float]:
     except ValueError:
         raise ModelError(f"{path}: its gravity is {named[-1][:60]!r}, which is no three numbers") from None
     return x, y, z
-
-
-def _gather(element: ElementTree.Element, into: _Body) -> None:
-    """Bodies of MJCF, also those in frames."""
-    for child in element:
-        if child.tag == "body":
-            body = _Body(child.get("name", ""))
-            body.free = any(
-                j.tag == "freejoint" or (j.tag == "joint" and j.get("type") == "free") for j in _joints(child)
-            )
-            body.moves = any(True for _ in _joints(child))
-            into.children.append(body)
-            _gather(child, body)
-        elif child.tag in ("frame", "replicate"):
-            _gather(child, into)
-
-
-def _joints(body: ElementTree.Element) -> Iterator[ElementTree.Element]:
-    for child in body:
-        if child.tag in ("joint", "freejoint"):
-            yield child
-        elif child.tag == "frame":
-            yield from _joints(child)
-
-
-def _moving(
-    body: _Body, name: str, path: tuple[int, ...], inside: bool
-) -> Iterator[tuple[Watched, _Body, bool]]:
-    """Bodies with joints of their own, how each is found, and whether nothing above it moves."""
-    for place, child in enumerate(body.children):
-        where = (child.name, ()) if child.name else (name, (*path, place))
-        if child.moves:
-            label = child.name or ".".join([name or "world", *map(str, where[1])])
-            yield Watched(label=label.replace("/", "."), name=where[0], path=where[1]), child, not inside
-        yield from _moving(child, *where, inside or child.moves)
-
-
-def _drives(body: _Body) -> bool:
-    """Whether some body below it has joints of its own."""
-    return any(child.moves or _drives(child) for child in body.children)
 
 
 def _labelled(found: list[Watched]) -> tuple[Watched, ...]:

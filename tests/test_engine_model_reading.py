@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from spook_tracker.engine.model_reading import DEEPEST, ModelError, folder_of, read
+from spook_tracker.engine.model_bodies import DEEPEST, ModelError
+from spook_tracker.engine.model_reading import folder_of, read
 
 CART = """<mujoco><compiler meshdir="meshes"/><option timestep=".004"/>
 <asset><mesh name="wheel" file="wheel.stl"/></asset>

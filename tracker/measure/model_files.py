@@ -30,8 +30,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Required, TypedDict, cast
 
+from spook_tracker.engine.model_bodies import ModelError
 from spook_tracker.engine.model_file import Drive, ModelFile, Watched
-from spook_tracker.engine.model_reading import ModelError, Reading, read, shown
+from spook_tracker.engine.model_reading import Reading, read, shown
 from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.scalar_tests.catalogue import QUESTIONS
 from spook_tracker.scalar_tests.model_file.question import test_of

@@ -15,8 +15,9 @@ from typing import Literal
 import spook_tracker.tracker.measure.workers as crew
 from spook_tracker.engine.errors import EngineError
 from spook_tracker.engine.find import find
+from spook_tracker.engine.model_bodies import ModelError
 from spook_tracker.engine.model_file import ModelFile, ModelRun
-from spook_tracker.engine.model_reading import ModelError, Reading, read
+from spook_tracker.engine.model_reading import Reading, read
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.tracker.measure.model_agreement import (
     ALIKE,
