@@ -16,6 +16,7 @@ from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.library import record
 from spook_tracker.tracker.store.database import session_on
 from spook_tracker.tracker.store.history import History
+from spook_tracker.tracker.store.reader import FileReader
 from spook_tracker.tracker.store.remove import remove
 from spook_tracker.tracker.website.options import SiteOptions
 from spook_tracker.tracker.website.publish import publish
@@ -27,6 +28,15 @@ NIGHTS = [night(n, one(0.1 if n < 3 else 0.3 if n < 6 else 0.5)) for n in range(
 LATE = 3  # the first of them
 WITHOUT_IT = [run for n, run in enumerate(NIGHTS) if n != LATE]
 TAKEN = Accepted(series="t/*", low=0.2, high=0.4, who="Ada Example", why="a trade", until=None)
+
+
+@pytest.fixture(autouse=True)
+def small_histories(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is kept of long histories is kept of these: checkpoints two nights back, one night in two read closely."""
+    monkeypatch.setattr("spook_tracker.tracker.judge.lane.RECENT", 2)
+    monkeypatch.setattr("spook_tracker.tracker.judge.lane.SPARSE", 2)
+    monkeypatch.setattr("spook_tracker.tracker.judge.checkpoints.LATE", 3)
+    monkeypatch.setattr("spook_tracker.tracker.judge.checkpoints.STEP", 1)
 
 
 def other_engine(number: int) -> RunDocument:
@@ -120,6 +130,43 @@ def test_a_database_that_grew_and_shrank_gives_the_site_of_what_it_holds(tmp_pat
     published("put back with another value")
     record(NIGHTS[-1], url)
     published("one more night")
+
+
+def test_one_more_night_reads_its_own_samples(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    url, site = f"sqlite:///{tmp_path / 'tracker.db'}", tmp_path / "site"
+    read: list[str] = []
+    once = FileReader.each_row
+    monkeypatch.setattr(
+        FileReader, "each_row", lambda reader, query: read.append(query) or once(reader, query)
+    )
+    many = [night(n, one(0.1)) for n in range(5)]
+    for run in many[:-1]:
+        record(run, url)
+    with History.open(url) as history:
+        publish(history, site)
+    record(many[-1], url)
+    read.clear()
+
+    with History.open(url) as history:
+        publish(history, site)
+        (newest,) = (run.key for run in history.runs() if run.id == many[-1].id)
+
+    (query,) = read
+    assert f"r.key IN ({newest})" in query
+
+
+@pytest.mark.parametrize(
+    "damage", [Path.unlink, lambda file: file.write_bytes(file.read_bytes()[:-9] + b"unlikely!")]
+)
+def test_what_is_kept_beside_the_site_may_go_or_be_damaged(
+    damage: Callable[[Path], object], tmp_path: Path
+) -> None:
+    publish(DocumentHistory(NIGHTS[:-1]), tmp_path / "site")
+    damage(tmp_path / ".site.kept")
+    publish(DocumentHistory(NIGHTS), tmp_path / "site")
+    publish(DocumentHistory(NIGHTS), tmp_path / "anew")
+
+    assert files(tmp_path / "site") == files(tmp_path / "anew")
 
 
 def of_many(number: int, *tests: str, days: int = 27) -> RunDocument:

@@ -27,6 +27,7 @@ from spook_tracker.tracker.measure.step_cost import (
     metrics,
     step_costs,
 )
+from spook_tracker.tracker.website.data_files import NightTexts
 from spook_tracker.tracker.website.data_files import test_json as data_of
 from spook_tracker.tracker.website.nights import book
 from spook_tracker.tracker.website.page_overviews import covered
@@ -191,4 +192,4 @@ def test_the_page_has_what_leaving_out_saves_and_its_data_files_do_not() -> None
     rows = {row.test: row for row, _ in covered(told).context["rows"]}
 
     assert rows[test.name].cells[2] == "3 times (2.5 to 3.58), same to the bit"
-    assert b"3.57713" not in data_of(told, test)
+    assert b"3.57713" not in data_of(test, NightTexts(told.nights))

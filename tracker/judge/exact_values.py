@@ -77,13 +77,25 @@ class Seen(msgspec.Struct, frozen=True):
 
 def judge_values(series: Series, history: Sequence[Point], before: Judged | None = None) -> Nights:
     """Every night's verdict, oldest first; `before` is the last night of another definition of the test."""
-    state, points = KnownValue(), columns(history)
+    points = columns(history)
+    return Nights(points, judge_on(series, points, begun(before), 0, len(points))[1])
+
+
+def begun(before: Judged | None) -> KnownValue:
+    """What is known before the first night; `before` is the last night of another definition of the test."""
     if before is not None and (level := _last_answer(before)) is not None:
-        state = KnownValue("held", level, level, level)
+        return KnownValue("held", level, level, level)
+    return KnownValue()
+
+
+def judge_on(
+    series: Series, points: Points, state: KnownValue, start: int, end: int
+) -> tuple[KnownValue, dict[int, Judged]]:
+    """From what is known before a night on to another: what is known then, and the verdicts of what does not repeat."""
     told: dict[int, Judged] = {}
-    i, count = 0, len(points)
-    while i < count:
-        again = _repeating(state, points, i)
+    i = start
+    while i < end:
+        again = min(_repeating(state, points, i), end)
         if again > i:
             last = _last_release(points.runs, i, again)
             state = _stood_still(state, points[again - 1], state.release if last is None else points[last])
@@ -91,7 +103,7 @@ def judge_values(series: Series, history: Sequence[Point], before: Judged | None
         else:
             state, told[i] = step(series, state, points[i])
             i += 1
-    return Nights(points, told)
+    return state, told
 
 
 def _repeating(state: KnownValue, points: Points, start: int) -> int:

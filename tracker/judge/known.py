@@ -6,9 +6,10 @@ import math
 from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from spook_tracker.tracker.document.run_document import Point
+from spook_tracker.tracker.document.run_document import Point, Runs
 from spook_tracker.tracker.judge.judged import Judged, commit_of
 from spook_tracker.tracker.judge.level import FEW_NIGHTS_FLOOR
+from spook_tracker.tracker.judge.repeats import Nights
 from spook_tracker.tracker.judge.series_history import Told, on_one_clock
 from spook_tracker.tracker.judge.slower import Usual
 
@@ -41,7 +42,15 @@ def newest_in(told: Mapping[str, Told], runs: Sequence[str]) -> dict[str, Judged
 def judged_in(told: Mapping[str, Told], runs: Collection[str]) -> dict[str, dict[str, Judged]]:
     """The verdicts of some runs, by the run's id and by series."""
     found: dict[str, dict[str, Judged]] = {run: {} for run in runs}
+    places: dict[Runs, list[tuple[str, int]]] = {}  # of series that were measured in the same runs
     for key, series in told.items():
+        if isinstance(nights := series.nights, Nights):
+            of = nights.points.runs
+            if of not in places:
+                places[of] = [(run.id, i) for i, run in enumerate(of) if run.id in found]
+            for run_id, i in places[of]:
+                found[run_id][key] = nights.state_at(i)
+            continue
         missing = len(found)
         for judged in reversed(series.nights):
             if judged.night.run.id in found:

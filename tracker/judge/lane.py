@@ -41,6 +41,7 @@ class Records(Protocol):
     def series(
         self, keys: Iterable[str] | None = None, *, evidence: bool = True
     ) -> Mapping[str, SeriesHistory]: ...
+    def series_of(self, engine: str) -> Mapping[str, SeriesHistory]: ...
     def samples(self, run_id: str) -> Samples: ...
     def samples_of(
         self, run_ids: Sequence[str], tests: set[str] | None = None, keys: Iterable[str] | None = None
@@ -169,7 +170,10 @@ def histories(
     recent = records.samples_of([run.id for run in looked_at], tests)
     found: dict[str, SeriesHistory] = {}
     known: dict[Runs, tuple[list[int] | None, Runs, list[int], list[Samples]]] = {}
-    for key, stored in records.series(keys, evidence=False).items():
+    stored_of = (
+        records.series_of(runs[0].engine.name) if keys is None else records.series(keys, evidence=False)
+    )
+    for key, stored in stored_of.items():
         points = columns(stored.points)
         if points.runs not in known:
             known[points.runs] = _of_line(points.runs, place, recent)
@@ -213,8 +217,13 @@ def looked_at_again(count: int, recent: int) -> list[int]:
 
     Where the last ones begin moves by so many nights at once: one more night leaves what was said of the others.
     """
-    dense = max(0, count - recent) // SPARSE * SPARSE
+    dense = settled_nights(count, recent)
     return [*range(0, dense, SPARSE), *range(dense, count)]
+
+
+def settled_nights(count: int, recent: int) -> int:
+    """How many of the first nights are looked at as they will be from now on, whatever follows them."""
+    return max(0, count - recent) // SPARSE * SPARSE
 
 
 def _says(run: Run) -> bool:

@@ -27,13 +27,21 @@ from spook_tracker.tracker.document.run_document import (
 )
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.calibration import engines_own, taken_again, unquiet
-from spook_tracker.tracker.judge.exact_values import Series, judge_values, why_not
+from spook_tracker.tracker.judge.checkpoints import Checkpoints
+from spook_tracker.tracker.judge.exact_values import (
+    KnownValue,
+    Series,
+    begun,
+    judge_on,
+    judge_values,
+    why_not,
+)
 from spook_tracker.tracker.judge.explaining import calm_nights
 from spook_tracker.tracker.judge.judged import Judged, is_release, night_of, red_class
 from spook_tracker.tracker.judge.lane import looked_at_again
 from spook_tracker.tracker.judge.lent import walk_with
 from spook_tracker.tracker.judge.noisy import Noisy
-from spook_tracker.tracker.judge.repeats import Nights, looked_at
+from spook_tracker.tracker.judge.repeats import Nights, states_of
 from spook_tracker.tracker.judge.run_times import judged_and_segments
 from spook_tracker.tracker.judge.slower import by_outcome, only_followed
 from spook_tracker.tracker.judge.standing import NOT_SUPPORTED, standing
@@ -66,7 +74,7 @@ class Told:
         worse, as in most series: there is nothing to look for in them.
         """
         nights = self.nights
-        if {judged.state for judged in looked_at(nights)}.isdisjoint(("detected", "accepted")):
+        if states_of(nights).isdisjoint(("detected", "accepted")):
             return []
         lane = on_one_clock if is_noisy(self.definition) else _question
         found = []
@@ -79,43 +87,63 @@ class Told:
 
 
 @no_collection()
-def judge_all(histories: Mapping[str, SeriesHistory], accepted: Sequence[Accepted] = ()) -> dict[str, Told]:
-    """Every series with the verdict of each of its nights, by key."""
+def judge_all(
+    histories: Mapping[str, SeriesHistory],
+    accepted: Sequence[Accepted] = (),
+    known: Checkpoints | None = None,
+) -> dict[str, Told]:
+    """Every series with the verdict of each of its nights, by key; `known` is where the judge stood before."""
     return {
         key: Told(
             key,
             found.definition,
-            calm_nights(found.definition, judge_history(key, found.definition, found.points, accepted)),
+            calm_nights(
+                found.definition, judge_history(key, found.definition, found.points, accepted, known)
+            ),
         )
         for key, found in histories.items()
     }
 
 
 def judge_history(
-    key: str, definition: SeriesDefinition, history: Sequence[Point], accepted: Sequence[Accepted] = ()
+    key: str,
+    definition: SeriesDefinition,
+    history: Sequence[Point],
+    accepted: Sequence[Accepted] = (),
+    known: Checkpoints | None = None,
 ) -> Sequence[Judged]:
     """Every night's verdict, oldest first."""
     taken = [level for level in accepted if level.names(key)]
     if is_noisy(definition):
         return _judge_times(key, definition, list(history), taken)
     series, points = Series(key, definition, taken), columns(history)
-    lanes = lanes_of(points, _question)
-    if len(lanes) < 2:
-        return judge_values(series, points)
+    if known is None:
+        return Nights(points, _judge_lanes(series, points)[0])
+    return known.judged(series, points, partial(_judge_lanes, series, points))
+
+
+def _judge_lanes(
+    series: Series, points: Points, mark: int = 0
+) -> tuple[dict[int, Judged], KnownValue | None]:
+    """The verdicts of what does not repeat, and what is known before the night at a place that is in the midst of the last
+    lane; None where the place is not."""
     found: dict[int, Judged] = {}
-    for places in lanes:
+    then: KnownValue | None = None
+    for places in lanes_of(points, _question):
         start, end = places[0], places[-1] + 1
         before = _under_another_definition(points, found, start)
         if end - start == len(places):
-            told = judge_values(series, points[start:end], before)
-            found |= {start + i: judged for i, judged in told.told.items()}
+            state, middle = begun(before), mark if start < mark < end == len(points) else start
+            state, told = judge_on(series, points, state, start, middle)
+            then = state if middle > start else None
+            found |= told | judge_on(series, points, state, middle, end)[1]
         else:  # beside another lane: the night before is not the one that a night repeats
-            told = judge_values(series, [points[i] for i in places], before)
-            found |= zip(places, told, strict=True)
+            nights = judge_values(series, [points[i] for i in places], before)
+            found |= zip(places, nights, strict=True)
         if start > 0 and found[start].verdict.word == "new":
             why = Verdict(word="not_comparable", sentence=why_not(points[start - 1], points[start]))
             found[start] = msgspec.structs.replace(found[start], verdict=why)
-    return Nights(points, found)
+    return found, then
 
 
 def _under_another_definition(history: Points, found: Mapping[int, Judged], start: int) -> Judged | None:

@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Iterable, Mapping, Sequence
 
 from spook_tracker.tracker.document.json_form import encode
+from spook_tracker.tracker.document.kept import Kept
 from spook_tracker.tracker.document.run_document import (
     FigureData,
     MapData,
@@ -24,6 +25,7 @@ class DocumentHistory:
 
     def __init__(self, documents: Sequence[RunDocument]) -> None:
         self.documents = {d.id: d for d in documents}
+        self.kept = Kept()
         self.bare: dict[int, list[Sample]] = {}
         made = {id(d.samples): d for d in documents}  # many nights may have the same
         self.made = {
@@ -49,6 +51,15 @@ class DocumentHistory:
                 )
         chosen = points.keys() if keys is None else points.keys() & set(keys)
         return {key: SeriesHistory(newest[key], tuple(points[key])) for key in sorted(chosen)}
+
+    def series_of(self, engine: str) -> Mapping[str, SeriesHistory]:
+        ours = {
+            key: SeriesHistory(
+                found.definition, tuple(p for p in found.points if p.run.engine.name == engine)
+            )
+            for key, found in self.series(evidence=False).items()
+        }
+        return {key: found for key, found in ours.items() if found.points}
 
     def _bare(self, run: RunDocument) -> list[Sample]:
         """The samples of a run without what stands behind them."""

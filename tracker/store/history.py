@@ -12,13 +12,15 @@ from collections.abc import Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import replace
 from datetime import UTC, datetime, timedelta
+from functools import partial
 from operator import lt
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar, cast
+from typing import TYPE_CHECKING, TypeVar, cast
 
 from spook_tracker.tracker.document import run_document as document
 from spook_tracker.tracker.document.collection import no_collection
 from spook_tracker.tracker.document.errors import DocumentError, UnknownName
+from spook_tracker.tracker.document.kept import Kept
 from spook_tracker.tracker.document.points import Points, Stretches
 from spook_tracker.tracker.document.run_document import (
     EngineVersion,
@@ -33,8 +35,11 @@ from spook_tracker.tracker.document.run_document import (
 )
 from spook_tracker.tracker.store import git, rows
 from spook_tracker.tracker.store.ancestry import commit_order, lineages
+from spook_tracker.tracker.store.columns import Lane
 from spook_tracker.tracker.store.damage import told_of_damage
+from spook_tracker.tracker.store.evidence import Behind, Pair
 from spook_tracker.tracker.store.identity import identity
+from spook_tracker.tracker.store.lanes import histories_of, newest_definitions, read_lanes
 from spook_tracker.tracker.store.reader import (
     CHUNK,
     Reader,
@@ -45,6 +50,14 @@ from spook_tracker.tracker.store.reader import (
     listed,
 )
 from spook_tracker.tracker.store.release_order import in_release_order
+from spook_tracker.tracker.store.sample_rows import (
+    OF_ITS_RUN,
+    OF_RUN,
+    SAMPLE,
+    bare_sample_of,
+    sample_of,
+    sample_rows,
+)
 from spook_tracker.tracker.store.versions import RunInfo, resolve
 
 if TYPE_CHECKING:
@@ -68,14 +81,6 @@ RUN = (
     "gates_passed",
     "content",
 )
-SAMPLE = "s.run_key, s.series_id, s.definition_id, s.value, s.special, s.outcome, s.passed, s.set_point_held"
-EVIDENCE = """, e.failure, e.state_hash, e.counters, t.seconds, t.runs_per_repeat, t.instructions, t.stage_seconds,
-    t.cpu_seconds, t.calibration, t.again"""
-BESIDE = """
-    LEFT JOIN evidence e ON e.started_at = s.started_at AND e.run_key = s.run_key AND e.series_id = s.series_id
-    LEFT JOIN timing t ON t.started_at = s.started_at AND t.run_key = s.run_key AND t.series_id = s.series_id"""
-OF_RUN = "s.started_at = (SELECT started_at FROM run WHERE key = :run) AND s.run_key = :run"  # one range of the key
-OF_ITS_RUN = "s.started_at = r.started_at AND s.run_key = r.key"
 Found = tuple[RunInfo, int, SeriesDefinition, Sample]  # run, series id, definition, sample
 
 
@@ -95,10 +100,15 @@ class History:
         self._runs = tuple(run for run in every if run.started_at <= latest)
         self.ahead = tuple(run for run in every if run.started_at > latest)
         self._by_id = {run.id: run for run in every}
+        self._by_key = {run.key: run for run in every}
         self._canonical = self._read_names()
         self._definitions: dict[int, SeriesDefinition] = {}
         self._with_maps: frozenset[str] | None = None
         self._maps: dict[str, tuple[document.MapData, ...]] = {}  # by run, those that were asked for
+        self.kept = (
+            Kept()
+        )  # of an earlier reading: its runs are not read again by `series_of` and `evidence_of`
+        self._lanes: dict[str, Lane] = {}
 
     @classmethod
     @contextmanager
@@ -164,7 +174,7 @@ class History:
     ) -> dict[str, dict[str, tuple[SeriesDefinition, Sample]]]:
         """The samples of several runs, of these tests or series (all if None): `samples` of each, read at once."""
         if tests is None and keys is None:
-            return {run_id: self.samples(run_id) for run_id in run_ids}
+            return self._whole(run_ids)
         chosen = self._canonical.keys() if keys is None else self._ids_of(keys)
         wanted = [i for i in chosen if tests is None or self._canonical[i].partition("/")[0] in tests]
         series = listed(wanted)
@@ -177,6 +187,17 @@ class History:
                 if key not in found[run.id] or definition.key == key:
                     found[run.id][key] = definition, sample
         return found
+
+    def _whole(self, run_ids: Sequence[str]) -> dict[str, dict[str, Pair]]:
+        """`samples` of each: what is equal is one object, and what is kept of them is not read again."""
+        behind = Behind(self.run(run_ids[0]).engine.name if run_ids else "", self.kept)
+        found: dict[str, dict[str, Pair]] = {}
+        for run_id in run_ids:
+            run = self.run(run_id)
+            read = partial(sample_rows, self._reader, OF_RUN, {"run": run.key})
+            found[run_id] = {} if behind.take(run_id, run.key, run.content, read) else self.samples(run_id)
+        behind.keep(self.kept)
+        return found | behind.samples(self._canonical, self._read_definitions)
 
     def answered(self, run_ids: Sequence[str]) -> dict[str, set[tuple[str, str]]]:
         """By run: tests and kinds of the series that it has samples of."""
@@ -200,6 +221,22 @@ class History:
         where = "" if keys is None else f"s.series_id IN {listed(self._ids_of(keys))}"
         with no_collection():
             return self._gathered(where, evidence)
+
+    def series_of(self, engine: str) -> dict[str, SeriesHistory]:
+        """Histories of all series over the runs of an engine, by today's key, without evidence.
+
+        As `series` gives them: the definition is that of the newest run that has the series, whichever engine's it is.
+        """
+        with no_collection():
+            if not self._lanes:
+                engines = dict.fromkeys(run.engine.name for run in self._runs)
+                ours = {engine: self.runs(engine) for engine in engines}
+                self._lanes = read_lanes(self._reader, ours, self.kept)
+            place = {run.key: i for i, run in enumerate(self._runs)}
+            newest = newest_definitions(self._lanes, place, self._canonical, self._read_definitions)
+            return histories_of(
+                self._lanes[engine], self.runs(engine), newest, self._canonical, self._read_definitions
+            )
 
     def _gathered(self, where: str, evidence: bool) -> dict[str, SeriesHistory]:
         if not evidence:
@@ -242,7 +279,7 @@ class History:
             columns[1].append(known.setdefault(tuple(told), len(known)))
         definitions = self._read_definitions(told[0] for told in known)
         said = [
-            (definitions[i], (_bare_sample(definitions[i].key, *told), definitions[i].test_version, True))
+            (definitions[i], (bare_sample_of(definitions[i].key, *told), definitions[i].test_version, True))
             for i, *told in known
         ]
         by_key: dict[str, list[int]] = {}
@@ -413,33 +450,15 @@ class History:
 
     def _read_samples(self, where: str, parameters: dict[str, SqlValue], by_run: bool = False) -> list[Found]:
         """Samples in the order of time, then of their document; `by_run` where the conditions name runs."""
-        query = f"SELECT {SAMPLE}{EVIDENCE} FROM "
-        query += (
-            "run r CROSS JOIN sample s" if by_run else "sample s"
-        )  # SQLite keeps to the order of a cross join
-        query += BESIDE + (f" WHERE {where}" if where else "")
-        stored = self._reader.rows(f"{query} ORDER BY s.started_at, s.run_key, s.position", **parameters)
+        stored = sample_rows(self._reader, where, parameters, by_run)
         definitions = self._read_definitions(row[2] for row in stored)
-        runs = {run.key: run for run in self._by_id.values()}
+        runs = self._by_key
         found = []
         for row in stored:
             if row[0] not in runs:  # recorded by another process since
                 continue
             definition = definitions[row[2]]
-            more: dict[str, Any] = {}
-            if row[8] is not None:
-                more = {"failure": row[8], "state_hash": row[9], "counters": rows.counters_of(row[10])}
-            if row[11] is not None:
-                more["timing"] = rows.timing_of(*row[11:18])
-            read = Sample(
-                series=definition.key,
-                value=rows.joined(row[3], row[4]),
-                outcome=row[5],
-                passed=bool(row[6]),
-                set_point_held=bool(row[7]),
-                **more,
-            )
-            found.append((runs[row[0]], row[1], definition, read))
+            found.append((runs[row[0]], row[1], definition, sample_of(definition.key, row)))
         return found
 
     def _bodies(self, table: str, run_id: str, kind: type[Body]) -> tuple[Body, ...]:
@@ -462,19 +481,6 @@ def _in_order(
             chosen[here] = what
     ordered = array("l", sorted(chosen))
     return ordered, array("l", map(chosen.__getitem__, ordered))
-
-
-def _bare_sample(
-    key: str, value: float | None, special: str | None, outcome: document.OutcomeClass, passed: int, held: int
-) -> Sample:
-    """A stored sample without its evidence."""
-    return Sample(
-        series=key,
-        value=rows.joined(value, special),
-        outcome=outcome,
-        passed=bool(passed),
-        set_point_held=bool(held),
-    )
 
 
 def _utc(time: str) -> str:

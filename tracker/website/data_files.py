@@ -12,13 +12,15 @@ import json
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
-from itertools import groupby, pairwise
+from itertools import chain, groupby
 from typing import TYPE_CHECKING
 
+import msgspec
 from msgspec import structs
 
 from spook_tracker.tracker.document.json_form import boxed, encode
 from spook_tracker.tracker.document.outside import escaped
+from spook_tracker.tracker.document.run_document import SeriesDefinition
 from spook_tracker.tracker.website.events import Event
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory, Trend
 
@@ -104,7 +106,7 @@ def work(book: Book) -> Table:
     kinds = sorted({kind for counted in groups.values() for kind in counted})
     lines: list[list[Cell]] = []
     for group, counted in groups.items():
-        told = {t.nights[i] for t in counted.values() for i in changed(t)}
+        told = {t.nights[i] for t in counted.values() for i, _ in t.changes}
         for night in sorted(told | _without_one(list(counted.values()))):
             counts = {kind: _counted(t, night) for kind, t in counted.items()}
             lines.append([*group, book.nights[night].started, *map(counts.get, kinds)])
@@ -160,12 +162,13 @@ CHANGES = (
 )  # fmt: skip
 
 
-def changes_csv(book: Book, test: TestHistory) -> bytes:
+def changes_csv(test: TestHistory, texts: NightTexts) -> bytes:
     """Every series of a test but run times: a line for its first night, and one for each that changed it.
 
     A night without a change leaves the file as it is.
     """
-    return table(CHANGES, (line for trend in steady(test) for line in _changes(trend, book.nights)))
+    lines = chain.from_iterable(_changes(trend, texts) for trend in steady(test))
+    return b"".join((table(CHANGES, ()), "".join(lines).encode("utf-8", "replace")))
 
 
 def steady(test: TestHistory) -> list[Trend]:
@@ -173,36 +176,51 @@ def steady(test: TestHistory) -> list[Trend]:
     return [trend for trend in test.trends if trend.definition.kind not in ("time", "work")]
 
 
-def changed(trend: Trend) -> list[int]:
-    """The places at which a series begins, reads otherwise than before, or comes back after nights without it."""
-    found = {0, *returns(trend)} if trend.nights else set()
-    told = ("", "", False)
-    for start, _, (sample, *_) in trend.said.from_place(0):
-        now = repr(sample.value), sample.outcome, sample.set_point_held
-        if now != told:
-            found.add(start)
-        told = now
-    return sorted(found)
+class NightTexts:
+    """What files say of a night, written once: thousands of lines name the same."""
+
+    def __init__(self, nights: Sequence[Night]) -> None:
+        self._nights = nights
+        self._cells: dict[int, str] = {}
+        self._fields: dict[int, tuple[str, msgspec.Raw]] = {}
+
+    def cells(self, index: int) -> str:
+        """The last cells of a line of a CSV file."""
+        found = self._cells.get(index)
+        if found is None:
+            night = self._nights[index]
+            found = self._cells[index] = _written(night.started, night.engine.version, night.engine.git_hash)
+        return found
+
+    def fields(self, index: int) -> tuple[str, msgspec.Raw]:
+        """Id and fields in JSON."""
+        found = self._fields.get(index)
+        if found is None:
+            night = self._nights[index]
+            fields = {
+                "started": night.started, "version": night.engine.version, "git_hash": night.engine.git_hash,
+            }  # fmt: skip
+            found = self._fields[index] = night.id, msgspec.Raw(encode(fields))
+        return found
 
 
-def returns(trend: Trend) -> list[int]:
-    """The places at which a series comes back after nights without it."""
-    if trend.nights and trend.nights[-1] - trend.nights[0] == len(trend.nights) - 1:
-        return []
-    return [i for i, (one, other) in enumerate(pairwise(trend.nights), start=1) if other != one + 1]
+def _written(*cells: Cell) -> str:
+    """Cells beside each other as `table` writes them, without the end of the line."""
+    out = io.StringIO()
+    csv.writer(out, lineterminator="").writerow([inert(cell) for cell in cells])
+    return out.getvalue()
 
 
-def _changes(trend: Trend, nights: Sequence[Night]) -> Iterable[list[Cell]]:
-    d = trend.definition
+def _changes(trend: Trend, texts: NightTexts) -> Iterable[str]:
+    d, nights = trend.definition, trend.nights
     low, high = ends(d.limit, d.better)
-    for i in changed(trend):
-        night = nights[trend.nights[i]]
-        yield [
-            d.test, d.configuration, d.metric, d.time_step,
-            " ".join(f"{key}={value:g}" for key, value in sorted(d.parameters.items())), d.role, d.kind, d.unit,
-            low, high, *(d.set_point or (None, None)), trend.values[i], trend.outcomes[i], trend.held[i],
-            night.started, night.engine.version, night.engine.git_hash,
-        ]  # fmt: skip
+    parameters = " ".join(f"{key}={value:g}" for key, value in sorted(d.parameters.items()))
+    first = _written(
+        d.test, d.configuration, d.metric, d.time_step, parameters, d.role, d.kind, d.unit, low, high,
+        *(d.set_point or (None, None)),
+    )  # fmt: skip
+    for i, sample in trend.changes:
+        yield f"{first},{sample.value!r},{sample.outcome},{sample.set_point_held},{texts.cells(nights[i])}\r\n"
 
 
 def run_times(book: Book) -> Iterator[tuple[str, bytes, Callable[[], bytes]]]:
@@ -264,12 +282,12 @@ def _night_line(night: Night) -> list[Cell]:
     ]  # fmt: skip
 
 
-def test_json(book: Book, test: TestHistory) -> bytes:
+def test_json(test: TestHistory, texts: NightTexts) -> bytes:
     """Everything about one test but run times, work and the drawing of its scene: its card, definitions, and each series
     with the place of its definition, what it says beside, and what it was on the nights that changed it."""
     definitions: dict[str, int] = {}
-    nights: dict[str, dict[str, str]] = {}
-    series = [_series(t, definitions, nights, book.nights) for t in steady(test)]
+    nights: dict[str, msgspec.Raw] = {}
+    series = [_series(t, definitions, nights, texts) for t in steady(test)]
     card = {
         name: value for name, value in structs.asdict(test.card).items() if name not in ("scene", "saving")
     }
@@ -285,27 +303,27 @@ def test_json(book: Book, test: TestHistory) -> bytes:
     return escaped(encode(whole).decode()).encode()
 
 
+FIELDS = structs.fields(SeriesDefinition)
 OWN = ("key", "time_step", "parameters")  # of a series: all else of its definition others share
 WHOLE = ("test", "title")  # what the card says
 
 
 def _series(
-    trend: Trend, definitions: dict[str, int], used: dict[str, dict[str, str]], nights: Sequence[Night]
+    trend: Trend, definitions: dict[str, int], used: dict[str, msgspec.Raw], texts: NightTexts
 ) -> dict[str, Writable]:
     said: dict[str, Writable] = {
         field.name: value
-        for field in structs.fields(trend.definition)
+        for field in FIELDS
         if (value := getattr(trend.definition, field.name)) != field.default and value not in ({}, (), "")
     }
     own = {name: said.pop(name) for name in OWN if name in said}
     shared = encode({name: value for name, value in said.items() if name not in WHOLE}).decode()
     changes = []
-    for i in changed(trend):
-        night = nights[trend.nights[i]]
-        used[night.id] = {
-            "started": night.started, "version": night.engine.version, "git_hash": night.engine.git_hash,
-        }  # fmt: skip
-        changes.append([night.id, boxed(trend.values[i]), trend.outcomes[i]])
+    nights, fields = trend.nights, texts.fields
+    for i, sample in trend.changes:
+        night, told = fields(nights[i])
+        used[night] = told
+        changes.append((night, boxed(sample.value), sample.outcome))
     newest = {"state_hash": trend.latest.state_hash, "failure": trend.latest.failure} if trend.latest else {}
     return {
         **own,

@@ -21,7 +21,7 @@ from spook_tracker.tracker.judge.judged import commit_of, night_of
 from spook_tracker.tracker.judge.known import known_noise, of_two
 from spook_tracker.tracker.judge.lane import asked_for, asked_whole
 from spook_tracker.tracker.judge.rank import Question, question
-from spook_tracker.tracker.judge.repeats import looked_at
+from spook_tracker.tracker.judge.repeats import looked_at, states_of
 from spook_tracker.tracker.judge.series_history import Told
 from spook_tracker.tracker.judge.work import Samples, is_read_off, with_work
 from spook_tracker.tracker.website.folder import digest
@@ -136,6 +136,8 @@ def all_marks(told: Mapping[str, Told]) -> dict[str, Marks]:
             series.nights
             if timed
             else [night for night in looked_at(series.nights) if night.state == "detected"]
+            if "detected" in states_of(series.nights)
+            else ()
         ):
             known = noise.get(judged.night.run.id)
             usual = None if known is None else of_two(judged.night.value, known)

@@ -10,10 +10,11 @@ import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from itertools import repeat
+from itertools import pairwise, repeat
 from operator import attrgetter
 from typing import Protocol, TypeVar, overload
 
+from spook_tracker.tracker.document.kept import Kept
 from spook_tracker.tracker.document.points import Stretches, columns
 from spook_tracker.tracker.document.run_document import (
     Asked,
@@ -31,6 +32,7 @@ from spook_tracker.tracker.document.run_document import (
 )
 from spook_tracker.tracker.document.wording import day, short_hash, version
 from spook_tracker.tracker.judge.accepted import Accepted
+from spook_tracker.tracker.judge.checkpoints import Checkpoints
 from spook_tracker.tracker.judge.lane import histories, lines
 from spook_tracker.tracker.judge.maps import ToldMap, map_key, told_maps
 from spook_tracker.tracker.judge.repeats import Nights
@@ -136,6 +138,27 @@ class Trend:
     def held(self) -> Column[bool]:
         """Whether its set point was held."""
         return Column(self.said, _HELD)
+
+    @cached_property
+    def changes(self) -> list[tuple[int, Sample]]:
+        """The places at which it begins, reads otherwise than before, or comes back after nights without it."""
+        nights = self.nights
+        back: list[int] = []
+        if nights and nights[-1] - nights[0] != len(nights) - 1:
+            back = [i for i, (one, other) in enumerate(pairwise(nights), start=1) if other != one + 1]
+        found: list[tuple[int, Sample]] = []
+        told = ("", "", False)
+        following = 0
+        for start, end, (sample, *_) in self.said.from_place(0):
+            now = repr(sample.value), sample.outcome, sample.set_point_held
+            if now != told:
+                found.append((start, sample))
+                told = now
+            while following < len(back) and back[following] < end:
+                if not found or found[-1][0] != back[following]:
+                    found.append((back[following], sample))
+                following += 1
+        return found
 
     @property
     def distinct(self) -> list[Sample]:
@@ -270,10 +293,13 @@ class StoredRun(Run, Protocol):
 class Records(Protocol):
     """What is read of `tracker.store.history.History`."""
 
+    kept: Kept
+
     def runs(self, engine: str | None = None) -> Sequence[StoredRun]: ...
     def series(
         self, keys: Iterable[str] | None = None, *, evidence: bool = True
     ) -> Mapping[str, SeriesHistory]: ...
+    def series_of(self, engine: str) -> Mapping[str, SeriesHistory]: ...
     def samples(self, run_id: str) -> Mapping[str, tuple[SeriesDefinition, Sample]]: ...
     def samples_of(
         self, run_ids: Sequence[str], tests: set[str] | None = None, keys: Iterable[str] | None = None
@@ -287,8 +313,10 @@ class Records(Protocol):
     def trajectories(self, run_id: str) -> Sequence[Trajectory]: ...
 
 
-def book(history: Records, accepted: Sequence[Accepted] = ()) -> Book:
-    """The book of a history. The engine it is about comes first."""
+def book(history: Records, accepted: Sequence[Accepted] = (), kept: Kept | None = None) -> Book:
+    """The book of a history. The engine it is about comes first. What is `kept` of an earlier one is not made again."""
+    if kept is not None:
+        history.kept = kept
     runs = list(history.runs())
     if not runs:
         return Book([], [], [])
@@ -316,7 +344,10 @@ def _chapter(
     ]  # fmt: skip
     trends: dict[str, Trend] = {}
     places: dict[Runs, list[int]] = {}
-    for key, told in judge_all(histories(history, nights), accepted).items():
+    known = Checkpoints(history.kept, nights)
+    judged_all = judge_all(histories(history, nights), accepted, known)
+    known.keep(history.kept)
+    for key, told in judged_all.items():
         if not told.nights:
             continue
         judged = told.nights

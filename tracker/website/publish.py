@@ -19,6 +19,7 @@ import msgspec
 
 from spook_tracker.tracker.document.collection import no_collection
 from spook_tracker.tracker.document.json_form import Number, plain
+from spook_tracker.tracker.document.kept import Kept
 from spook_tracker.tracker.document.wording import clean, slug, web_address
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.causes import Cause
@@ -123,7 +124,9 @@ def publish(
     names = {name: _hashed(ASSETS[name], content) for name, content in contents.items()}
     making = digest(*(path.read_bytes() for path in sorted([*templates.iterdir(), *_sources()])))
     made = environment(templates)
-    told = book(history, accepted)
+    place = Path.cwd() / out
+    kept = Kept(place.with_name(f".{place.name}.kept"), making)
+    told = book(history, accepted, kept)
     beside = told_beside(read_files(options.recorded), told) if options.recorded and told.nights else None
     failed: list[str] = []
     documents, mutants = options.documents, read_mutants(options.mutants) if options.mutants else ()
@@ -204,6 +207,7 @@ def publish(
                 raise
             except Exception as error:
                 failed.append(f"{path}: {type(error).__name__}: {clean(str(error))[:300]}")
+    kept.save()
     return Report(folder.written, folder.skipped, folder.old, tuple(failed))
 
 
@@ -231,10 +235,11 @@ def _data(told: Book, events: Sequence[Event], causes: Sequence[Cause], author: 
     """Files of numbers."""
     if not told.nights:
         return
+    texts = data_files.NightTexts(told.nights)
     for test in told.tests:
         for kind, content in (
-            ("csv", data_files.changes_csv(told, test)),
-            ("json", data_files.test_json(told, test)),
+            ("csv", data_files.changes_csv(test, texts)),
+            ("json", data_files.test_json(test, texts)),
         ):
             yield f"data/{slug(test.name)}.{kind}", content, partial(bytes, content)
     for month, source, make in data_files.run_times(told):
