@@ -26,7 +26,7 @@ from spook_tracker.tracker.document.run_document import (
     SeriesHistory,
 )
 from spook_tracker.tracker.judge.calibration import ladder_timing, that_counts
-from spook_tracker.tracker.judge.work import FAMILIES, Samples, families_of, with_work
+from spook_tracker.tracker.judge.work import FAMILIES, Samples, Summed, families_of, with_work
 
 NIGHT = timedelta(days=1)  # runs of several machines within it are of one
 OneRun = TypeVar("OneRun", bound=Run)
@@ -237,13 +237,12 @@ def work(
     """The histories of exact work of these tests (all if None): tracker/judge/work.py."""
     points: dict[str, list[Point]] = {}
     newest: dict[str, SeriesDefinition] = {}
+    known: Summed = {}
     for run in runs:
-        counted = {
-            key: pair
-            for key, pair in measured.get(run.id, {}).items()
-            if tests is None or key.partition("/")[0] in tests
-        }
-        for key, (definition, sample) in with_work(counted, run.engine).items():
+        counted = measured.get(run.id, {})
+        if tests is not None:
+            counted = {key: pair for key, pair in counted.items() if key.partition("/")[0] in tests}
+        for key, (definition, sample) in with_work(counted, run.engine, known).items():
             if definition.kind == "work":
                 newest[key] = definition
                 points.setdefault(key, []).append(Point(run, sample, definition.test_version))

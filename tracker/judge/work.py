@@ -76,18 +76,30 @@ def is_read_off(definition: SeriesDefinition) -> bool:
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 
 
-def with_work(samples: Samples, engine: EngineVersion) -> dict[str, tuple[SeriesDefinition, Sample]]:
+Summed = dict[tuple[object, ...], list[tuple[SeriesDefinition, Sample]]]
+
+
+def with_work(
+    samples: Samples, engine: EngineVersion, known: Summed | None = None
+) -> dict[str, tuple[SeriesDefinition, Sample]]:
     """The samples of a run, and each of its counters, summed over a configuration, as samples more.
 
-    The definition's hash stands for the series summed over and for the build: other sums are not comparable.
+    The definition's hash stands for the series summed over and for the build: other sums are not comparable. `known` has
+    the sums of the runs before, whose samples must not have gone: what many runs share is summed once.
     """
     grouped: dict[tuple[str, str, str], list[tuple[SeriesDefinition, Sample]]] = {}
-    for definition, sample in samples.values():
+    for pair in samples.values():
+        definition, sample = pair
         if sample.counters:
             place = (definition.test, definition.configuration, FAMILIES[definition.kind])
-            grouped.setdefault(place, []).append((definition, sample))
+            grouped.setdefault(place, []).append(pair)
     found = dict(samples)
     for (test, configuration, family), members in grouped.items():
+        group = engine.compiler, engine.flags, test, configuration, family, *map(id, members)
+        if known is not None and group in known:
+            found.update((pair[0].key, pair) for pair in known[group])
+            continue
+        sums: list[tuple[SeriesDefinition, Sample]] = []
         facts = tuple(sorted([f"{d.key} {d.test_version}" for d, _ in members]))
         answers = _hash(*sorted([f"{d.key} {s.value!r} {s.state_hash}" for d, s in members]))
         tolerance = max(d.iteration_tolerance for d, _ in members)
@@ -104,13 +116,14 @@ def with_work(samples: Samples, engine: EngineVersion) -> dict[str, tuple[Series
             definition = _definition(
                 asked, members[0][0].title, facts, allowed, engine.compiler, engine.flags, explains
             )
-            found[definition.key] = (
-                definition,
-                Sample(
-                    series=definition.key, value=Number(count), outcome="value", passed=True, set_point_held=True,
-                    state_hash=answers,
-                ),
+            sample = Sample(
+                series=definition.key, value=Number(count), outcome="value", passed=True, set_point_held=True,
+                state_hash=answers,
             )  # fmt: skip
+            sums.append((definition, sample))
+        if known is not None:
+            known[group] = sums
+        found.update((pair[0].key, pair) for pair in sums)
     return found
 
 

@@ -29,10 +29,14 @@ class ChartFiles:
 
     nightly: dict[str, set[bytes]] = field(default_factory=dict)  # address to what it calls
 
-    def add(self, context: Mapping[str, object]) -> dict[str, bytes]:
-        """Address and content of the script of each chart of a page; the charts are told where theirs is."""
+    def add(self, context: Mapping[str, object]) -> dict[str, tuple[str, bytes]]:
+        """Address of the script of each chart of a page, what it is made from, and its content, empty where it is there as
+        it was; the charts are told where theirs is."""
         files = {}
         for view in _views(list(context.values())):
+            if view.figure is None:  # as it was
+                files[view.file] = view.mark, b""
+                continue
             data = as_json(view.figure)
             view.figure = None  # a page is made from where its numbers are, not from the numbers
             if view.nightly:
@@ -42,7 +46,9 @@ class ChartFiles:
                 continue
             view.key = digest(data.encode("utf-8", "replace"))
             view.file = f"charts/{view.key}.js"
-            files[view.file] = call("charted", view.key, data)
+            script = call("charted", view.key, data)
+            view.mark = digest(script)
+            files[view.file] = view.mark, script
         return files
 
     def add_part(self, test: str, text: str) -> None:

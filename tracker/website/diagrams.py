@@ -28,6 +28,7 @@ from spook_tracker.tracker.website.nights import Night, TestHistory, Trend, as_n
 from spook_tracker.tracker.website.svg import describe
 
 MOST_NIGHTS = 1500  # points of one trend; a value that stands still costs two, so this is many years
+MOVES = 500  # nights by which the beginning of a chart of more than four times as many moves
 MOST_TIMES = 400  # of a run time, which never stands still
 FEWEST_NIGHTS = 3  # of a chart over nights
 WORDS = {
@@ -56,6 +57,7 @@ class View:
     nightly: str = ""  # slug of the test whose run times it shows: every night has others
     key: str = ""  # of its data, once that is known
     file: str = ""  # address of the script with its data, below the root
+    mark: str = ""  # what the file was made from
 
 
 def view(chart: Chart, nightly: str = "") -> View:
@@ -91,6 +93,12 @@ def _differ(one: Sample, other: Sample) -> bool:
     return apart and repr(one.value) != repr(other.value)
 
 
+def first_drawn(count: int) -> int:
+    """The place of the first night of a chart over so many: it moves by many at once, so that most nights leave it."""
+    over = max(0, count - MOST_NIGHTS * 4)
+    return -(-over // MOVES) * MOVES
+
+
 def trend_chart(
     trend: Trend,
     nights: Sequence[Night],
@@ -104,9 +112,8 @@ def trend_chart(
     still, so that the file of a series stays as it is for as long as the series does.
     """
     definition = trend.definition
-    values = trend.values[-MOST_NIGHTS * 4 :]
-    at = trend.nights[-MOST_NIGHTS * 4 :]
-    outcomes = trend.outcomes[-MOST_NIGHTS * 4 :]
+    first = first_drawn(len(trend.nights))
+    values, at, outcomes = trend.values[first:], trend.nights[first:], trend.outcomes[first:]
     turned = {i for i, now in enumerate(outcomes) if i and now != outcomes[i - 1]}
     places = sorted({*turning(values), *turned})  # a class may change where the value stands still
     goes_on = each == "night" and at[-1] == nights[-1].index

@@ -20,12 +20,11 @@ from spook_tracker.tracker.website.diagrams import (
     ladder_charts,
     map_grid,
     moving,
-    trend_chart,
-    view,
 )
 from spook_tracker.tracker.website.events import Event, map_verdicts
 from spook_tracker.tracker.website.feed import badge_words
 from spook_tracker.tracker.website.judged_nights import BLOCK, file_stem
+from spook_tracker.tracker.website.known_charts import KnownCharts
 from spook_tracker.tracker.website.nights import Book, TestHistory
 from spook_tracker.tracker.website.page_index import RED, counts_by_night, health, lead
 from spook_tracker.tracker.website.page_rows import Page, address, row
@@ -71,7 +70,7 @@ def _row(trend: Trend, test: TestHistory) -> Row:
     return row(trend, test.card.title, address(test))
 
 
-def stability(book: Book, events: Sequence[Event]) -> Page:
+def stability(book: Book, charts: KnownCharts) -> Page:
     """Break points and maps of all tests."""
     points = [(test, t) for test in book.tests for t in test.of_kind("break_point")]
     context = {
@@ -86,7 +85,7 @@ def stability(book: Book, events: Sequence[Event]) -> Page:
             for m in test.maps
         ],
         "trends": [
-            view(trend_chart(t, book.nights, events, test.card.title))
+            charts.view(t, test.card.title)
             for test in book.tests
             for t in moving(test.of_kind("break_point"))
         ],

@@ -22,6 +22,7 @@ from spook_tracker.tracker.website.diagrams import (
     view,
 )
 from spook_tracker.tracker.website.events import Event, of_test
+from spook_tracker.tracker.website.known_charts import KnownCharts
 from spook_tracker.tracker.website.model_history import model_history
 from spook_tracker.tracker.website.nights import Book, TestHistory
 from spook_tracker.tracker.website.page_rows import Page, Times, address, event_row, row
@@ -34,7 +35,7 @@ NO_SPARK: Spark = {"path": "", "last": None, "failed": [], "width": 0.0, "height
 LARGE = 3  # charts over nights that are not folded
 
 
-def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
+def test_page(book: Book, test: TestHistory, events: Sequence[Event], charts: KnownCharts) -> Page:
     """Everything about one test."""
     here = address(test)
     every = {id(t): row(t, test.card.title, here) for t in test.trends}
@@ -75,14 +76,14 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event]) -> Page:
         "state": test.state,
         "broken": [{**vars(every[id(one.trend)]), **one.card} for one in cards],
         "broken_left_out": len(found) - len(cards),
-        "broken_charts": [view(trend_chart(t, book.nights, events)) for t in first],
+        "broken_charts": list(map(charts.view, first)),
         "seen": shown(test, found, book),
         "stale": "" if newest == book.tonight.index else day(book.nights[newest].started),
         "gates": gates,
         "model_history": history,
         "contents": contents,
-        "trends": [view(trend_chart(t, book.nights, events)) for t in over[:LARGE]],
-        "more_trends": [view(trend_chart(t, book.nights, events)) for t in over[LARGE:]],
+        "trends": list(map(charts.view, over[:LARGE])),
+        "more_trends": list(map(charts.view, over[LARGE:])),
         "time_trends": [view(trend_chart(t, book.nights, events), slug(test.name)) for t in moving(times)],
         "figures": [view(figure_chart(f)) for f in test.figures],
         "ladders": ladders,

@@ -11,6 +11,7 @@ from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.website import page_engines, page_overviews
 from spook_tracker.tracker.website.comparisons import Comparisons
 from spook_tracker.tracker.website.events import Event
+from spook_tracker.tracker.website.known_charts import KnownCharts
 from spook_tracker.tracker.website.live_module import live_page
 from spook_tracker.tracker.website.nights import Book
 from spook_tracker.tracker.website.page_index import index
@@ -46,6 +47,7 @@ def pages(
     events: Sequence[Event],
     causes: Sequence[Cause],
     compared: Callable[[], Comparisons],
+    charts: KnownCharts,
     module: str = "",
     mutants: Sequence[Mutant] = (),
     recorded: Recorded | None = None,
@@ -59,7 +61,7 @@ def pages(
         return
     yield Planned("index.html", "Tonight", partial(index, book, causes))
     yield Planned("error-time.html", "Error against run time", partial(page_overviews.error_time, book))
-    yield Planned("stability.html", "Stability", partial(page_overviews.stability, book, events))
+    yield Planned("stability.html", "Stability", partial(page_overviews.stability, book, charts))
     yield Planned("coverage.html", "Coverage", partial(page_overviews.covered, book))
     if module:
         yield Planned("live.html", "Live", partial(live_page, module))
@@ -88,4 +90,4 @@ def pages(
     yield Planned("data.html", "Data", partial(page_overviews.data, book, events))
     yield Planned("document.html", "Report", partial(page_overviews.document, book, causes))
     for test in book.tests:
-        yield Planned(address(test), clean(test.card.title), partial(test_page, book, test, events))
+        yield Planned(address(test), clean(test.card.title), partial(test_page, book, test, events, charts))

@@ -38,6 +38,7 @@ from spook_tracker.tracker.website.comparisons import (
 )
 from spook_tracker.tracker.website.events import Event, all_events
 from spook_tracker.tracker.website.folder import FolderError, digest, replacing
+from spook_tracker.tracker.website.known_charts import KnownCharts
 from spook_tracker.tracker.website.live_module import built_module, module_script
 from spook_tracker.tracker.website.nights import Book, Records, book
 from spook_tracker.tracker.website.options import DEFAULTS, SiteOptions
@@ -170,8 +171,9 @@ def publish(
                 return source, b""
             return source, made.get_template(page.template).render(context).encode("utf-8", "replace")
 
-        for planned in pages(told, events, causes, compared, module, mutants, beside):
-            charts: dict[str, bytes] = {}
+        over_nights = KnownCharts(kept, told.nights, events, folder.unchanged)
+        for planned in pages(told, events, causes, compared, over_nights, module, mutants, beside):
+            charts: dict[str, tuple[str, bytes]] = {}
             try:
                 made_page = planned.make()
                 found = drawn.add(made_page.context)  # what stands on the page is where the numbers are
@@ -186,9 +188,9 @@ def publish(
                 context = {"what": planned.title, "reason": reason}
                 source, text = render(Page(planned.path, "failed.html", planned.title, "", context))
             folder.add(planned.path, source, partial(bytes, text))
-            for address, content in charts.items():
+            for address, (mark, content) in charts.items():
                 if address not in folder.made:  # the overviews have charts of the tests again
-                    folder.add(address, digest(content), partial(bytes, content))
+                    folder.add(address, mark, partial(bytes, content))
         for address, content in drawn.nightly_files().items():
             folder.add(address, digest(content), partial(bytes, content))
         for address, content in tonight_scripts(told).items() if told.nights else ():
@@ -207,6 +209,7 @@ def publish(
                 raise
             except Exception as error:
                 failed.append(f"{path}: {type(error).__name__}: {clean(str(error))[:300]}")
+    over_nights.keep(kept)
     kept.save()
     return Report(folder.written, folder.skipped, folder.old, tuple(failed))
 

@@ -1,0 +1,99 @@
+"""Charts over nights that are as the last publication drew them: most series stand still from one night to the next."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable, Mapping, Sequence
+
+import msgspec
+
+from spook_tracker.tracker.document.json_form import encode
+from spook_tracker.tracker.document.kept import Kept
+from spook_tracker.tracker.website.diagrams import View, first_drawn, trend_chart, view
+from spook_tracker.tracker.website.events import Event
+from spook_tracker.tracker.website.nights import Night, Trend
+
+NAME = "charts"
+
+
+class _Drawn(msgspec.Struct, frozen=True, array_like=True):
+    """A chart without its data."""
+
+    made_from: bytes
+    words: tuple[str, str, str, str, str]  # name, title, thesis, note, description
+    tall: bool
+    key: str
+    file: str
+    mark: str  # of the file: what it was made from
+
+
+class KnownCharts:
+    """The charts of a publication by series; `there` tells whether the last website has a file, made from what is named."""
+
+    def __init__(
+        self, kept: Kept, nights: Sequence[Night], events: Sequence[Event], there: Callable[[str, str], bool]
+    ) -> None:
+        self._known: Mapping[str, _Drawn] = kept.get(NAME, dict[str, _Drawn]) or {}
+        self._new: dict[str, tuple[bytes, View]] = {}
+        self._nights, self._there = nights, there
+        self._events: dict[str, list[Event]] = {}
+        for event in events:
+            self._events.setdefault(event.definition.key, []).append(event)
+        self._of_night: dict[int, bytes] = {}
+        self._of_said: dict[int, bytes] = {}
+
+    def view(self, trend: Trend, title: str = "") -> View:
+        """The chart of a series over nights; without its data where its file is there."""
+        events = self._events.get(trend.definition.key, [])
+        made_from, name = self._made_from(trend, events, title), f"{title}/{trend.definition.key}"
+        known = self._known.get(name)
+        if known is not None and known.made_from == made_from and self._there(known.file, known.mark):
+            made = View(*known.words, None, known.tall, key=known.key, file=known.file, mark=known.mark)
+        else:
+            made = view(trend_chart(trend, self._nights, events, title))
+        self._new[name] = made_from, made
+        return made
+
+    def keep(self, kept: Kept) -> None:
+        """For the next time."""
+        drawn = {
+            name: _Drawn(
+                made_from,
+                (made.name, made.title, made.thesis, made.note, made.description),
+                made.tall,
+                made.key,
+                made.file,
+                made.mark,
+            )
+            for name, (made_from, made) in self._new.items()
+            if made.file
+        }
+        kept.put(NAME, drawn)
+
+    def _made_from(self, trend: Trend, events: Sequence[Event], title: str) -> bytes:
+        """All that the chart says: nothing of tonight unless the value changed tonight."""
+        said, nights = trend.said, trend.nights
+        goes_on, count = nights[-1] == self._nights[-1].index, len(nights)
+        last = count - (said.ends[-2] if len(said.ends) > 1 else 0)  # how many nights it has stood still
+        first = first_drawn(count)
+        whole = trend.definition, title, goes_on, last == 1, first, nights[0], list(map(repr, events))
+        parts = [encode(whole), self._night(nights[first])]
+        for start, end, (sample, *_) in said.from_place(0):
+            one = self._of_said.get(id(sample))
+            if one is None:
+                told = f"{sample.value!r} {sample.outcome}".encode("utf-8", "replace")
+                one = self._of_said[id(sample)] = _short(told)
+            closed = end < count or not goes_on
+            parts += (one, self._night(nights[start]), self._night(nights[end - 1]) if closed else b"")
+        return hashlib.blake2b(b"".join(parts), digest_size=16).digest()
+
+    def _night(self, index: int) -> bytes:
+        found = self._of_night.get(index)
+        if found is None:
+            told = f"{index} {self._nights[index].label}".encode("utf-8", "replace")
+            found = self._of_night[index] = _short(told)
+        return found
+
+
+def _short(told: bytes) -> bytes:
+    return hashlib.blake2b(told, digest_size=8).digest()
