@@ -77,4 +77,5 @@ def escaped(json: str) -> str:
         code -= 0x10000
         return f"\\u{0xD800 + (code >> 10):04x}\\u{0xDC00 + (code & 0x3FF):04x}"
 
-    return MARK.sub(r"#\\u0023", UNSEEN.sub(escape, json))
+    seen = json if json.isascii() and "\x7f" not in json else UNSEEN.sub(escape, json)
+    return MARK.sub(r"#\\u0023", seen) if "#" in seen else seen

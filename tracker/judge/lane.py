@@ -26,7 +26,7 @@ from spook_tracker.tracker.document.run_document import (
     SeriesHistory,
 )
 from spook_tracker.tracker.judge.calibration import ladder_timing, that_counts
-from spook_tracker.tracker.judge.work import FAMILIES, Samples, Summed, families_of, with_work
+from spook_tracker.tracker.judge.work import FAMILIES, Samples, Sums, families_of, with_work
 
 NIGHT = timedelta(days=1)  # runs of several machines within it are of one
 OneRun = TypeVar("OneRun", bound=Run)
@@ -237,7 +237,7 @@ def work(
     """The histories of exact work of these tests (all if None): tracker/judge/work.py."""
     points: dict[str, list[Point]] = {}
     newest: dict[str, SeriesDefinition] = {}
-    known: Summed = {}
+    known = Sums()
     for run in runs:
         counted = measured.get(run.id, {})
         if tests is not None:

@@ -12,7 +12,7 @@ them, and with equal answers they are equal. A test may say of any counter wheth
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from itertools import chain
 
@@ -76,11 +76,29 @@ def is_read_off(definition: SeriesDefinition) -> bool:
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 
 
-Summed = dict[tuple[object, ...], list[tuple[SeriesDefinition, Sample]]]
+Pair = tuple[SeriesDefinition, Sample]
+
+
+class Sums:
+    """What was summed of earlier runs, by the objects it was summed from: those must not have gone."""
+
+    def __init__(self) -> None:
+        self.groups: dict[tuple[str, str, str, str, str, tuple[int, ...]], list[Pair]] = {}
+        self._texts: dict[int, tuple[str, str]] = {}
+
+    def texts(self, pairs: Sequence[Pair]) -> tuple[tuple[str, ...], list[str]]:
+        """The series, and what they said, each in order."""
+        texts = self._texts
+        for pair in pairs:
+            if id(pair) not in texts:
+                d, s = pair
+                texts[id(pair)] = f"{d.key} {d.test_version}", f"{d.key} {s.value!r} {s.state_hash}"
+        both = [texts[id(pair)] for pair in pairs]
+        return tuple(sorted([series for series, _ in both])), sorted([said for _, said in both])
 
 
 def with_work(
-    samples: Samples, engine: EngineVersion, known: Summed | None = None
+    samples: Samples, engine: EngineVersion, known: Sums | None = None
 ) -> dict[str, tuple[SeriesDefinition, Sample]]:
     """The samples of a run, and each of its counters, summed over a configuration, as samples more.
 
@@ -94,14 +112,15 @@ def with_work(
             place = (definition.test, definition.configuration, FAMILIES[definition.kind])
             grouped.setdefault(place, []).append(pair)
     found = dict(samples)
+    known = known or Sums()
     for (test, configuration, family), members in grouped.items():
-        group = engine.compiler, engine.flags, test, configuration, family, *map(id, members)
-        if known is not None and group in known:
-            found.update((pair[0].key, pair) for pair in known[group])
+        group = engine.compiler, engine.flags, test, configuration, family, tuple(map(id, members))
+        if group in known.groups:
+            found.update((pair[0].key, pair) for pair in known.groups[group])
             continue
-        sums: list[tuple[SeriesDefinition, Sample]] = []
-        facts = tuple(sorted([f"{d.key} {d.test_version}" for d, _ in members]))
-        answers = _hash(*sorted([f"{d.key} {s.value!r} {s.state_hash}" for d, s in members]))
+        sums = known.groups[group] = []
+        facts, said = known.texts(members)
+        answers = _hash(*said)
         tolerance = max(d.iteration_tolerance for d, _ in members)
         roles = dict(chain.from_iterable(d.counter_roles.items() for d, _ in members))
         done: dict[str, int] = {}
@@ -121,8 +140,6 @@ def with_work(
                 state_hash=answers,
             )  # fmt: skip
             sums.append((definition, sample))
-        if known is not None:
-            known[group] = sums
         found.update((pair[0].key, pair) for pair in sums)
     return found
 

@@ -16,7 +16,7 @@ from spook_tracker.tracker.document.kept import Kept
 from spook_tracker.tracker.document.run_document import OutcomeClass
 from spook_tracker.tracker.store.reader import Row
 
-Told = tuple[
+SampleRow = tuple[
     int, float | None, str | None, OutcomeClass, bool | int, bool | int
 ]  # a row of `sample` without its run and its series
 
@@ -61,7 +61,7 @@ class Column:
 
 class _Stored(msgspec.Struct, frozen=True, array_like=True):
     runs: list[tuple[int, str]]
-    told: list[Told]
+    told: list[SampleRow]
     series: dict[int, tuple[bytes, bytes, bytes]]
 
 
@@ -70,7 +70,7 @@ class Lane:
 
     def __init__(self, name: str, runs: Sequence[tuple[int, str]], kept: Kept) -> None:
         self.name, self.runs = name, runs
-        self.told: dict[Told, int] = {}
+        self.told: dict[SampleRow, int] = {}
         self.series: dict[int, Column] = {}
         self.known = 0  # runs that need not be read
         if (stored := kept.get(f"values/{name}", _Stored)) is not None:

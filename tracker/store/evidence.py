@@ -13,14 +13,14 @@ from spook_tracker.tracker.store.lanes import Definitions
 from spook_tracker.tracker.store.reader import Row
 from spook_tracker.tracker.store.sample_rows import sample_of
 
-Told = tuple[
+EvidenceRow = tuple[
     int, int, float | None, str | None, OutcomeClass, bool | int, bool | int, str | None, str | None, str | None
 ]  # fmt: skip
 Pair = tuple[SeriesDefinition, Sample]
 
 
 class _Stored(msgspec.Struct, frozen=True, array_like=True):
-    told: list[Told]
+    told: list[EvidenceRow]
     runs: dict[int, tuple[str, bytes]]
 
 
@@ -31,7 +31,7 @@ class Behind:
         self.name = name
         stored = kept.get(f"evidence/{name}", _Stored) or _Stored([], {})
         self._known = stored.runs
-        self._told: dict[Told, int] = {told: code for code, told in enumerate(stored.told)}
+        self._told: dict[EvidenceRow, int] = {told: code for code, told in enumerate(stored.told)}
         self._runs: dict[int, tuple[str, bytes]] = {}
         self._taken: dict[str, array[int]] = {}
 

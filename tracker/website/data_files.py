@@ -180,28 +180,13 @@ class NightTexts:
     """What files say of a night, written once: thousands of lines name the same."""
 
     def __init__(self, nights: Sequence[Night]) -> None:
-        self._nights = nights
-        self._cells: dict[int, str] = {}
-        self._fields: dict[int, tuple[str, msgspec.Raw]] = {}
-
-    def cells(self, index: int) -> str:
-        """The last cells of a line of a CSV file."""
-        found = self._cells.get(index)
-        if found is None:
-            night = self._nights[index]
-            found = self._cells[index] = _written(night.started, night.engine.version, night.engine.git_hash)
-        return found
-
-    def fields(self, index: int) -> tuple[str, msgspec.Raw]:
-        """Id and fields in JSON."""
-        found = self._fields.get(index)
-        if found is None:
-            night = self._nights[index]
-            fields = {
-                "started": night.started, "version": night.engine.version, "git_hash": night.engine.git_hash,
-            }  # fmt: skip
-            found = self._fields[index] = night.id, msgspec.Raw(encode(fields))
-        return found
+        self.cells: list[str] = []  # the last cells of a line of a CSV file, with its end
+        self.fields: list[tuple[str, msgspec.Raw]] = []  # id, and fields in JSON
+        for night in nights:
+            version, commit = night.engine.version, night.engine.git_hash
+            self.cells.append(f"{_written(night.started, version, commit)}\r\n")
+            fields = {"started": night.started, "version": version, "git_hash": commit}
+            self.fields.append((night.id, msgspec.Raw(encode(fields))))
 
 
 def _written(*cells: Cell) -> str:
@@ -219,8 +204,14 @@ def _changes(trend: Trend, texts: NightTexts) -> Iterable[str]:
         d.test, d.configuration, d.metric, d.time_step, parameters, d.role, d.kind, d.unit, low, high,
         *(d.set_point or (None, None)),
     )  # fmt: skip
+    cells = texts.cells
+    known: dict[int, str] = {}  # what samples say, which come again and again
     for i, sample in trend.changes:
-        yield f"{first},{sample.value!r},{sample.outcome},{sample.set_point_held},{texts.cells(nights[i])}\r\n"
+        said = known.get(id(sample))
+        if said is None:
+            said = known[id(sample)] = f"{first},{sample.value!r},{sample.outcome},{sample.set_point_held},"
+        yield said
+        yield cells[nights[i]]
 
 
 def run_times(book: Book) -> Iterator[tuple[str, bytes, Callable[[], bytes]]]:
@@ -320,10 +311,14 @@ def _series(
     shared = encode({name: value for name, value in said.items() if name not in WHOLE}).decode()
     changes = []
     nights, fields = trend.nights, texts.fields
+    known: dict[int, tuple[float | str, str]] = {}  # what samples say, which come again and again
     for i, sample in trend.changes:
-        night, told = fields(nights[i])
+        night, told = fields[nights[i]]
         used[night] = told
-        changes.append((night, boxed(sample.value), sample.outcome))
+        now = known.get(id(sample))
+        if now is None:
+            now = known[id(sample)] = boxed(sample.value), sample.outcome
+        changes.append((night, *now))
     newest = {"state_hash": trend.latest.state_hash, "failure": trend.latest.failure} if trend.latest else {}
     return {
         **own,

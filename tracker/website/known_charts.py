@@ -39,7 +39,9 @@ class KnownCharts:
         self._events: dict[str, list[Event]] = {}
         for event in events:
             self._events.setdefault(event.definition.key, []).append(event)
-        self._of_night: dict[int, bytes] = {}
+        self._of_night = [
+            _short(f"{night.index} {night.label}".encode("utf-8", "replace")) for night in nights
+        ]
         self._of_said: dict[int, bytes] = {}
 
     def view(self, trend: Trend, title: str = "") -> View:
@@ -77,22 +79,16 @@ class KnownCharts:
         last = count - (said.ends[-2] if len(said.ends) > 1 else 0)  # how many nights it has stood still
         first = first_drawn(count)
         whole = trend.definition, title, goes_on, last == 1, first, nights[0], list(map(repr, events))
-        parts = [encode(whole), self._night(nights[first])]
+        of_night = self._of_night
+        parts = [encode(whole), of_night[nights[first]]]
         for start, end, (sample, *_) in said.from_place(0):
             one = self._of_said.get(id(sample))
             if one is None:
                 told = f"{sample.value!r} {sample.outcome}".encode("utf-8", "replace")
                 one = self._of_said[id(sample)] = _short(told)
             closed = end < count or not goes_on
-            parts += (one, self._night(nights[start]), self._night(nights[end - 1]) if closed else b"")
+            parts += (one, of_night[nights[start]], of_night[nights[end - 1]] if closed else b"")
         return hashlib.blake2b(b"".join(parts), digest_size=16).digest()
-
-    def _night(self, index: int) -> bytes:
-        found = self._of_night.get(index)
-        if found is None:
-            told = f"{index} {self._nights[index].label}".encode("utf-8", "replace")
-            found = self._of_night[index] = _short(told)
-        return found
 
 
 def _short(told: bytes) -> bytes:

@@ -149,8 +149,11 @@ class Trend:
         found: list[tuple[int, Sample]] = []
         told = ("", "", False)
         following = 0
+        known: dict[int, tuple[str, str, bool]] = {}  # what samples say, which come again and again
         for start, end, (sample, *_) in self.said.from_place(0):
-            now = repr(sample.value), sample.outcome, sample.set_point_held
+            now = known.get(id(sample))
+            if now is None:
+                now = known[id(sample)] = repr(sample.value), sample.outcome, sample.set_point_held
             if now != told:
                 found.append((start, sample))
                 told = now

@@ -6,14 +6,15 @@ import math
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import astuple
 from itertools import groupby
 from typing import TypedDict
 
-from spook_tracker.tracker.document.run_document import Point, SeriesDefinition
+from spook_tracker.tracker.document.points import columns
 from spook_tracker.tracker.document.wording import clean, day, quantity, short_hash, version
 from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.maps import ToldMap
-from spook_tracker.tracker.judge.standing import Count, count_points, expected, worst
+from spook_tracker.tracker.judge.standing import Count, count, count_points, expected, worst
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, WORSE_THAN_EXPECTED, Class
 from spook_tracker.tracker.website.causes import ToldCause, damage_of, lasting, told
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory, Trend
@@ -141,16 +142,19 @@ def _red_maps(book: Book) -> list[ToldMap]:
 
 def counts_by_night(book: Book, most: int) -> dict[int, Count]:
     """Limits and set points of so many nights, the newest, by the index of the night."""
-    pairs: dict[int, list[tuple[SeriesDefinition, Point]]] = {
-        night.index: [] for night in book.nights[-most:]
-    }
+    counts: dict[int, list[tuple[int, ...]]] = {night.index: [] for night in book.nights[-most:]}
     for test in book.tests:
         for trend in test.trends:
-            if expected(trend.definition):
-                for night, point in zip(trend.nights[-most:], trend.told.points[-most:], strict=True):
-                    if night in pairs:
-                        pairs[night].append((trend.definition, point))
-    return {night: count_points(found) for night, found in pairs.items()}
+            if not expected(trend.definition):
+                continue
+            points = trend.told.points
+            for start, end, (sample, _, recorded) in columns(points).stretches(max(0, len(points) - most)):
+                if recorded:
+                    counted = astuple(count([(trend.definition, sample)]))
+                    for night in trend.nights[start:end]:
+                        if night in counts:
+                            counts[night].append(counted)
+    return {night: Count(*map(sum, zip(*found, strict=True))) for night, found in counts.items()}
 
 
 def _headline(state: Class, found: Count, fresh: Sequence[Trend], maps: Sequence[ToldMap]) -> str:
