@@ -32,11 +32,16 @@ TAKEN = Accepted(series="t/*", low=0.2, high=0.4, who="Ada Example", why="a trad
 
 @pytest.fixture(autouse=True)
 def small_histories(monkeypatch: pytest.MonkeyPatch) -> None:
-    """What is kept of long histories is kept of these: checkpoints two nights back, one night in two read closely."""
+    """What is kept of long histories is kept of these: checkpoints two nights back, one night in two read closely,
+    charts whose beginning moves."""
     monkeypatch.setattr("spook_tracker.tracker.judge.lane.RECENT", 2)
     monkeypatch.setattr("spook_tracker.tracker.judge.lane.SPARSE", 2)
     monkeypatch.setattr("spook_tracker.tracker.judge.checkpoints.LATE", 3)
     monkeypatch.setattr("spook_tracker.tracker.judge.checkpoints.STEP", 1)
+    monkeypatch.setattr(
+        "spook_tracker.tracker.website.diagrams.MOST_NIGHTS", 1
+    )  # charts of four nights, and no more
+    monkeypatch.setattr("spook_tracker.tracker.website.diagrams.MOVES", 2)
 
 
 def other_engine(number: int) -> RunDocument:
