@@ -99,6 +99,11 @@ class Run:
         self._read: Result | None = None
         self._settings: dict[tuple[str, str], tuple[Any, ...]] = {}
         self._bodies = {body.name: index for index, body in enumerate(scene.bodies)}
+        self._loads = {force.name: force for force in scene.forces if isinstance(force, Load)}
+        self._loads_of: dict[str, list[Load]] = {}  # on each body, those that can be set
+        for load in self._loads.values():
+            if load.factor is None:
+                self._loads_of.setdefault(load.body, []).append(load)
         self._native.start(state)
 
     # --- going on -----------------------------------------------------------------------------------------
@@ -163,13 +168,8 @@ class Run:
 
     def set_load(self, name: str, *, force: Vector | None = None, torque: Vector | None = None) -> None:
         """What a Load of the scene is from now on [N, N m]; what is not given stays."""
-        load = next((f for f in self.scene.forces if f.name == name), None)
-        if not isinstance(load, Load):
-            raise SceneError(
-                f"set_load: the scene has no Load named {name!r}; give it one, of zero if need be"
-            )
         owner = f"set_load {name!r}"
-        _not_in_time(owner, load.factor)
+        load = self._load(owner, name)
         before = self._settings.get(("load", name), (load.force, load.torque))
         new = (
             before[0] if force is None else check.vector(owner, "force", force),
@@ -178,6 +178,26 @@ class Run:
         if any(new[1]) and not isinstance(self.scene.body(load.body), RigidBody):
             raise SceneError(f"{owner}: {load.body!r} is a particle and cannot take a torque")
         self._set("load", name, new)
+
+    def set_loads(self, forces: Mapping[str, Vector]) -> None:
+        """The forces of several Loads from now on [N], as set_load sets each; their torques stay."""
+        loads = [self._load(f"set_loads {name!r}", name) for name in forces]
+        new = [check.vector(f"set_loads {name!r}", "force", force) for name, force in forces.items()]
+        with self._held():
+            self._read = None
+            for load, force in zip(loads, new, strict=True):
+                torque = self._settings.get(("load", load.name), (force, load.torque))[1]
+                self._settings["load", load.name] = (force, torque)
+            for body in dict.fromkeys(load.body for load in loads):
+                self._apply_loads(body)
+
+    def _load(self, owner: str, name: str) -> Load:
+        """A Load that can be set."""
+        load = self._loads.get(name)
+        if load is None:
+            raise SceneError(f"{owner}: the scene has no such Load; give it one, of zero if need be")
+        _not_in_time(owner, load.factor)
+        return load
 
     def set_motor(
         self,
@@ -254,19 +274,21 @@ class Run:
 
     def _apply(self, kind: str, name: str) -> None:
         if kind == "load":
-            body = next(f.body for f in self.scene.forces if f.name == name and isinstance(f, Load))
-            total = np.zeros(6)
-            for force in self.scene.forces:
-                if isinstance(force, Load) and force.body == body and force.factor is None:
-                    now = self._settings.get(("load", force.name), (force.force, force.torque))
-                    total += (*now[0], *now[1])
-            self._native.set_load(self._bodies[body], tuple(total[:3]), tuple(total[3:]))
+            self._apply_loads(self._loads[name].body)
         elif kind == "velocity":
             self._native.set_velocity(self._bodies[name], *self._settings[kind, name])
         else:
             index = [constraint.name for constraint in self.scene.constraints].index(name)
             set_drive = self._native.set_motor if kind == "motor" else self._native.set_rest
             set_drive(index, *self._settings[kind, name])
+
+    def _apply_loads(self, body: str) -> None:
+        """The sum of those on one body."""
+        sums = [0.0] * 6
+        for load in self._loads_of[body]:
+            force, torque = self._settings.get(("load", load.name), (load.force, load.torque))
+            sums = [total + one for total, one in zip(sums, (*force, *torque), strict=True)]
+        self._native.set_load(self._bodies[body], tuple(sums[:3]), tuple(sums[3:]))
 
     # --- going back ---------------------------------------------------------------------------------------
 
@@ -296,7 +318,7 @@ class Run:
     def _start_of(self, kind: str, name: str) -> tuple[Any, ...]:
         """What the scene says of something that was set."""
         if kind == "load":
-            load = next(f for f in self.scene.forces if f.name == name and isinstance(f, Load))
+            load = self._loads[name]
             return (load.force, load.torque)
         if kind == "velocity":
             body = self.scene.body(name)

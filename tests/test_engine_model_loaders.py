@@ -103,6 +103,20 @@ def test_a_broken_mesh_is_one_sentence_and_nothing_is_loaded(
     assert capfd.readouterr() == ("", "")
 
 
+def test_dart_says_that_it_would_weld_what_is_free(tmp_path: Path) -> None:
+    try:
+        simulate = find("dart").simulate
+    except EngineMissing as missing:
+        pytest.skip(str(missing))
+    text = '<mujoco model="m"><worldbody><body name="ball">{}<geom type="sphere" size=".1"/></body></worldbody></mujoco>'
+    free, named = _model(tmp_path, text.format('<joint type="free"/>')), tmp_path / "named"
+    fallen = simulate(ModelRun(model=free, samples=(1.0,)), time_step=0.001, duration=1.0)["position"][-1]
+
+    assert fallen[0, 2] == pytest.approx(-0.5 * 9.81, abs=0.01)
+    with pytest.raises(NotSupported, match="freejoint"):
+        simulate(ModelRun(model=_model(named, text.format("<freejoint/>"))), time_step=0.001, duration=0.1)
+
+
 def test_a_shape_that_drake_asserts_on_is_refused(tmp_path: Path) -> None:
     try:
         simulate = find("drake").simulate

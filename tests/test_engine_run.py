@@ -217,6 +217,32 @@ def test_a_load_of_zero_in_the_scene_can_be_set(kind: type) -> None:
     assert "apply_loads" not in {c.stage for c in explain(scene, time_step=0.5) if c.kept}
 
 
+def test_several_loads_are_set_as_each_by_itself() -> None:
+    bodies = tuple(
+        RigidBody(name=name, mass=4.0, inertia=(1.0, 1.0, 1.0), position=(x, 0.0, 0.0)) for name, x in (("a", 0.0), ("b", 3.0))
+    )  # fmt: skip
+    loads = tuple(Load(name=name, body=body) for name, body in (("push", "a"), ("pull", "a"), ("lift", "b")))
+    forces = {"push": (8.0, 0.0, 0.0), "pull": (-2.0, 4.0, 0.0), "lift": (0.0, 0.0, 2.0)}
+    ends = []
+    for together in (False, True):
+        with start(Scene(bodies=bodies, forces=loads), time_step=0.5) as run:
+            run.set_load("pull", torque=(0.0, 0.0, 1.0))
+            before = run.save()
+            if together:
+                run.set_loads(forces)
+            else:
+                for name, force in forces.items():
+                    run.set_load(name, force=force)
+            run.step(2)
+            ends.append(run.result().state_hash)
+
+            assert run.state["a"][7:].tolist() == [1.5, 1.0, 0.0, 0.0, 0.0, 1.0]
+            run.restore(before)
+            run.step()
+            assert run.state["a"][7:10].tolist() == [0.0, 0.0, 0.0]
+    assert ends[0] == ends[1]
+
+
 def test_targets_of_drives_follow_what_is_set_and_go_back_with_a_snapshot() -> None:
     with start(slider(motor=Motor(speed=0.0)), time_step=0.1) as run:
         saved = run.save()
@@ -346,6 +372,11 @@ def hostile() -> dict[str, tuple[Any, type, str]]:
             "13 numbers",
         ),
         "no such load": (on(driven, lambda run: run.set_load("pull")), SceneError, "'pull'"),
+        "no such load among several": (
+            on(driven, lambda run: run.set_loads({"pull": (0.0, 0.0, 0.0)})),
+            SceneError,
+            "'pull'",
+        ),
         "load of NaN": (
             on(driven, lambda run: run.set_load("push", force=(math.nan, 0, 0))),
             SceneError,

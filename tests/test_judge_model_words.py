@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from spook_tracker.tracker.judge.model_words import Moved, severity, words
+from spook_tracker.tracker.judge.model_words import Moved, first_look, severity, words
 
 
 def moved(metric: str, before: float, after: float, much: str = "", unit: str = "m") -> Moved:
@@ -24,6 +24,18 @@ def test_a_rest_is_told_by_body_as_higher_aside_and_turned() -> None:
         "bowl rests 0.087 m lower and 0.005 m aside and turned by 0.1 rad more (40 times what halving the time step changes)"
     )
     assert found[1] == "ramekin rests 0.001 m higher"
+
+
+def test_a_first_look_says_how_it_ends_how_long_it_is_known_and_what_it_costs() -> None:
+    values = {"settled": 1.84, "predictable_time": 5.0, "step_time": 2.5e-5, "real_time_factor": 400.0}
+
+    assert first_look(values) == (
+        "rests from 1.84 s on; can be predicted for 5 s; 25 µs a step, 400 times real time"
+    )
+    assert first_look({"predictable_time": 0.3}, "still moves at 2 m/s after 10 s") == (
+        "still moves at 2 m/s after 10 s; can be predicted for 0.3 s"
+    )
+    assert first_look({}) == ""
 
 
 def test_a_motion_is_told_from_when_on_and_how_far_it_went() -> None:

@@ -1,5 +1,6 @@
 """`tracker report`: one HTML file that needs no other, a PDF where a browser is, a sentence where none is."""
 
+import math
 import os
 import re
 import time
@@ -244,3 +245,29 @@ def test_the_short_table_has_a_line_a_test_and_one_for_every_broken_limit() -> N
     assert sorted(shown) == ["near", "one", "two"]
     assert "not shown: 2 further limits, 1 stability map; --all prints them" in lines
     assert lines[-1] == "✗ red: 2 of 5 limits broken"
+
+
+def test_a_model_file_is_told_in_a_line_and_what_broke_off_too() -> None:
+    """It has one limit, that it repeats its bits: without the line a first look showed nothing of the model."""
+    from spook_tracker.tracker.cli.report_table import model_looks
+    from tests.run_documents import definition, run, sample
+
+    metrics = {
+        "settled": ("rest", {"value": 10.0, "outcome": "unsettled", "failure": "still moves at 2 m/s after 10 s"}),
+        "predictable_time": ("motion", {"value": 0.3}),
+        "energy_drift": ("books", {"value": math.nan, "outcome": "diverged", "failure": "no number before 1 s"}),
+    }  # fmt: skip
+    document = run(
+        series=tuple(
+            definition(
+                name, test="bowl", metric=name, configuration=of, role="reported", limit=None, set_point=None
+            )
+            for name, (of, _) in metrics.items()
+        ),
+        samples=tuple(sample(name, **facts) for name, (_, facts) in metrics.items()),
+    )
+
+    assert model_looks(document) == [
+        "bowl: still moves at 2 m/s after 10 s; can be predicted for 0.3 s; books diverged: no number before 1 s"
+    ]
+    assert model_looks(run()) == []

@@ -60,6 +60,10 @@ def _loaded(run: ModelRun) -> Any:
 
 
 def _read(run: ModelRun, path: Path) -> Any:
+    if run.model.format == "MJCF" and "<freejoint" in path.read_text(encoding="utf-8", errors="replace"):
+        raise NotSupported(
+            f'dart welds what hangs by a <freejoint> of {path.name}; it reads <joint type="free">'
+        )
     try:
         if run.model.format == "URDF":
             loader = dart.utils.DartLoader()

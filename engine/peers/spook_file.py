@@ -93,13 +93,17 @@ class _Simulation(LoadedModel):
         )
         self.watched = [self.made.bodies[body] for body in watched]
         self.freedom = 3 * len(self.made.moving)
+        self.pushed = [f"push on {name}" for name in self.made.moving]
+        self.masses = np.array([*self.made.moving.values()])[:, None]  # kg
         self.held = self._started(method)
         self.read()
 
     def _started(self, method: Method) -> Run:
         scene = self.made.scene
         if self.is_pushed:
-            loads = (Load(name=f"push on {name}", body=name) for name in self.made.moving)
+            loads = (
+                Load(name=load, body=body) for load, body in zip(self.pushed, self.made.moving, strict=True)
+            )
             scene = replace(scene, forces=(*scene.forces, *loads))
         refused: MethodError | None = None
         for one in ACCURATE if self.run.accurate else (method,):
@@ -135,9 +139,8 @@ class _Simulation(LoadedModel):
 
     def push(self, change: Array) -> None:
         """As forces on what moves, for one step."""
-        for name, speed in zip(self.made.moving, change.reshape(-1, 3), strict=True):
-            force = speed * self.made.moving[name] / self.step
-            self.held.set_load(f"push on {name}", force=tuple(force))
+        forces = change.reshape(-1, 3) * self.masses / self.step
+        self.held.set_loads(dict(zip(self.pushed, forces.tolist(), strict=True)))
 
     def control(self) -> None:
         if not self.varies:

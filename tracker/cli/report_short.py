@@ -14,6 +14,7 @@ from spook_tracker.tracker.cli.report_table import (
     limit,
     margin,
     measured,
+    model_looks,
     pairs,
     title,
     verdict,
@@ -43,7 +44,7 @@ def short_table(run: RunDocument, room: int | None = None) -> str:
     lines = [title(run), ""]
     if shown:
         lines += table(COLUMNS, [_row(pair) for pair in shown], room or width(), verdict_styles(4))
-    missing = failures(run)
+    missing = [*model_looks(run), *failures(run)]
     lines += ["", *missing] if missing else []
     lines += ["", *_more(run, by_test, len(shown)), verdict(run)]
     return "\n".join(lines)

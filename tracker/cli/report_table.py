@@ -18,6 +18,7 @@ from spook_tracker.tracker.document.run_document import (
     SeriesDefinition,
 )
 from spook_tracker.tracker.document.wording import clock
+from spook_tracker.tracker.judge.model_words import first_look
 from spook_tracker.tracker.judge.standing import FOLLOWED, HAVE_VALUES, against_limit, count, is_red, standing
 from spook_tracker.tracker.judge.verdict import cell_rank
 from spook_tracker.tracker.judge.vocabulary import CLASSES
@@ -131,8 +132,31 @@ def pass_table(run: RunDocument, everything: bool = False, room: int | None = No
         lines += ["", click.style("Stability", bold=True)]
         lines += _scalars(points, room or width()) if points else []
         lines += [_map_line(found) for found in run.maps]
-    lines += ["", *failures(run), verdict(run)]
+    lines += ["", *model_looks(run), *failures(run), verdict(run)]
     return "\n".join(lines)
+
+
+def model_looks(run: RunDocument) -> list[str]:
+    """Of each model file a line: how it ends, how long it can be predicted, what it costs, what broke off."""
+    of_models = {one.test for one in run.series if one.metric == "predictable_time"}
+    found: dict[str, list[Pair]] = {}
+    for pair in pairs(run):
+        if pair[0].test in of_models and (pair[0].kind == "scalar" or _asked_alone(pair[0])):
+            found.setdefault(pair[0].test, []).append(pair)
+    return [f"{test}: {said}" for test, of_test in found.items() if (said := _look(of_test))]
+
+
+def _look(of_test: Sequence[Pair]) -> str:
+    values = {one.metric: sample.value for one, sample in of_test if sample.outcome in HAVE_VALUES}
+    moving = next(
+        (s.failure for one, s in of_test if one.metric == "settled" and s.outcome == "unsettled"), ""
+    )
+    broken = {
+        f"{one.configuration} {sample.outcome.replace('_', ' ')}: {sample.failure}": None
+        for one, sample in of_test
+        if sample.outcome not in (*HAVE_VALUES, "not_supported") and one.role in FOLLOWED
+    }
+    return clean("; ".join([*filter(None, [first_look(values, moving)]), *broken]))
 
 
 def _asked_alone(definition: SeriesDefinition) -> bool:

@@ -37,6 +37,20 @@ class Moved:
     became: str = ""  # in words, where the outcome is another one: "value became diverged"
 
 
+def first_look(values: Mapping[str, float], moving: str = "") -> str:
+    """What one run says of a model by itself: how it ends (`moving`: in what words it does not rest), how long it can be
+    predicted, what a step takes."""
+    found = [moving] if moving else []
+    if not moving and "settled" in values:
+        found.append(f"rests from {values['settled']:.3g} s on")
+    if "predictable_time" in values:
+        found.append(f"can be predicted for {values['predictable_time']:.3g} s")
+    if {"step_time", "real_time_factor"} <= {*values}:
+        fast = values["real_time_factor"]
+        found.append(f"{1e6 * values['step_time']:.3g} µs a step, {fast:.3g} times real time")
+    return "; ".join(found)
+
+
 def severity(sentence: str) -> str:
     """What a judge's sentence says after the distance."""
     return sentence.partition(": ")[2]
