@@ -8,7 +8,8 @@ changed, which takes a tenth of the time and leaves the same rows. Each measure 
 it, start included, the less of two goes; times are of the processor, on PostgreSQL the server's beside the client's.
 What is there beyond the smallest size grows with a power of the samples: its exponent is taken between the two largest
 sizes, and carried on to a hundred million, on paper. Ten million are 27 years of these nights. Exit code 1 where an exponent is above GROWS,
-or one night in costs more than NIGHT times what it costs in the smallest history.
+one night in costs more than NIGHT times what it costs in the smallest history, or one more night of the website more than
+MORE seconds (on another machine as much more as Python takes there) or MOST_MEMORY.
 """
 
 from __future__ import annotations
@@ -33,6 +34,7 @@ from sqlalchemy.orm import Session
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from bench.bench_storage import CHANGED, SERIES, definitions, night
+from bench.floors import here
 from spook_tracker.tracker.document.run_document import RunDocument, SeriesDefinition
 from spook_tracker.tracker.store import models, rows
 from spook_tracker.tracker.store.database import open_database
@@ -42,11 +44,14 @@ from spook_tracker.tracker.store.transfer import write_document
 
 RECORDED = 100  # nights that go the usual way before others are copied
 AT_ONCE = 500  # nights in one statement
+LOOKS = 0.02  # s between two looks at a command's memory
 NOISE = 0.1  # of a measure: a smaller difference between two sizes is none
 GROWS = 1.3  # exponent; 1.17 at most when it was set
 NIGHT = 1.5  # × one night in, of the smallest size; less than 1 when it was set
+MORE = 5.0  # s of the processor for one more night of a website, of whatever size
+MOST_MEMORY = 0.6  # GB, the same
 PLANNED = 100_000_000  # samples, on paper
-MEASURES = ("one night in", "one series", "one comparison", "the website")
+MEASURES = ("one night in", "one series", "one comparison", "the website", "one more night of it")
 CHANCE = {"sqlite": f"abs(random() % {round(1 / CHANGED)}) = 0", "postgresql": f"random() < {CHANGED}"}
 
 
@@ -133,16 +138,30 @@ def command(place: Place, *words: str) -> tuple[float, float]:
     process = subprocess.Popen(
         [sys.executable, "-m", "spook_tracker", *words, "--db", place.url], stdout=subprocess.DEVNULL
     )
-    _, status, used = os.wait4(process.pid, 0)
+    largest = 0.0
+    while (ended := os.wait4(process.pid, os.WNOHANG))[0] == 0:
+        largest = max(largest, largest_so_far(process.pid))
+        time.sleep(LOOKS)
+    _, status, used = ended
     process.returncode = os.waitstatus_to_exitcode(status)
     if process.returncode not in (0, 1):
         raise SystemExit(f"tracker {' '.join(words)} ended with {process.returncode}")
     time.sleep(0.2)  # the server notices a little later that a connection has ended
-    return used.ru_utime + used.ru_stime + place.busy() - before, used.ru_maxrss * 1024 / 1e9
+    return used.ru_utime + used.ru_stime + place.busy() - before, largest
+
+
+def largest_so_far(process: int) -> float:
+    """GB at its largest of what the process runs; what the system tells of an ended one counts its parent's, too."""
+    try:
+        told = Path(f"/proc/{process}/status").read_text()
+    except OSError:
+        return 0.0
+    found = [line.split()[1] for line in told.splitlines() if line.startswith("VmHWM:")]
+    return int(found[0]) * 1024 / 1e9 if found else 0.0
 
 
 def measure(place: Place, engine: Engine, number: int, folder: Path, without_website: bool) -> Measured:
-    """What people wait for in a history of that many nights; it has two more afterwards."""
+    """What people wait for in a history of that many nights; it has three more afterwards."""
     series, chance = definitions(), random.Random(number)
     if engine.dialect.name == "postgresql":
         with engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
@@ -151,17 +170,20 @@ def measure(place: Place, engine: Engine, number: int, folder: Path, without_web
     else:
         size = Path(str(engine.url.database)).stat().st_size
     found = Measured(number * SERIES, int(size or 0))
-    for further in (number, number + 1):
+    for further in (number, number + 1, number + 2):
         write_document(night(further, series, chance), folder / f"{further}.json")
     asked: dict[str, list[tuple[str, ...]]] = {
         "one night in": [("import", str(folder / f"{n}.json")) for n in (number, number + 1)],
         "one series": [("trend", "test7", "metric7")] * 2,
         "one comparison": [("compare", "previous", "latest")] * 2,
         "the website": [("publish", "--out", str(folder / "public"))],
+        "one more night of it": [("publish", "--out", str(folder / "public"))],
     }
     for name in MEASURES:
-        if name == "the website" and without_website:
+        if without_website and name in MEASURES[3:]:
             continue
+        if name == "one more night of it":
+            command(place, "import", str(folder / f"{number + 2}.json"))
         taken = [command(place, *words) for words in asked[name]]
         found.seconds[name], found.memory[name] = (
             min(seconds for seconds, _ in taken),
@@ -169,7 +191,8 @@ def measure(place: Place, engine: Engine, number: int, folder: Path, without_web
         )
         print(f"  {found.samples:>11,} samples, {name}: {found.seconds[name]:.2f} s, "
               f"{found.memory[name]:.2f} GB", flush=True)  # fmt: skip
-        shutil.rmtree(folder / "public", ignore_errors=True)
+    shutil.rmtree(folder / "public", ignore_errors=True)
+    (folder / ".public.kept").unlink(missing_ok=True)
     return found
 
 
@@ -181,8 +204,9 @@ def table(kind: str, found: list[Measured]) -> Iterator[str]:
         yield line(
             name, [(at.samples, at.seconds[name]) for at in found if name in at.seconds], "s", len(found)
         )
-    memory = [(at.samples, at.memory["the website"]) for at in found if "the website" in at.memory]
-    yield line("the website, memory", memory, "GB", len(found))
+    for name in MEASURES[3:]:
+        memory = [(at.samples, at.memory[name]) for at in found if name in at.memory]
+        yield line(f"{name}, memory", memory, "GB", len(found))
     yield line("the database", [(at.samples, at.size / 1e9) for at in found], "GB", len(found))
 
 
@@ -222,7 +246,8 @@ def missed(kind: str, found: list[Measured]) -> list[str]:
     """What grows too much, a sentence each."""
     over = []
     measures = {
-        name: [(at.samples, at.seconds[name]) for at in found if name in at.seconds] for name in MEASURES
+        name: [(at.samples, at.seconds[name]) for at in found if name in at.seconds]
+        for name in MEASURES[:4]  # the last has a limit of its own
     }
     measures["memory"] = [
         (at.samples, at.memory["the website"]) for at in found if "the website" in at.memory
@@ -232,6 +257,14 @@ def missed(kind: str, found: list[Measured]) -> list[str]:
         power = exponent(values)
         if power is not None and power > GROWS:
             over.append(f"{kind}: {name} grows with the power {power:.2f} (limit {GROWS:g})")
+    for at in found:
+        name = "one more night of it"
+        if kind == "SQLite" and at.seconds.get(name, 0.0) > here(MORE, "interpreter"):
+            over.append(
+                f"{kind}: {name} takes {at.seconds[name]:.1f} s (limit {here(MORE, 'interpreter'):.1f})"
+            )
+        if at.memory.get(name, 0.0) > MOST_MEMORY:
+            over.append(f"{kind}: {name} takes {at.memory[name]:.2f} GB (limit {MOST_MEMORY:g})")
     nights = measures["one night in"]
     if nights and nights[-1][1] > NIGHT * nights[0][1]:
         over.append(f"{kind}: one night in takes {nights[-1][1] / nights[0][1]:.1f} × (limit {NIGHT:g})")
@@ -275,7 +308,7 @@ def main() -> int:
                       flush=True)  # fmt: skip
                 engine.dispose()
                 found.append(measure(place, engine, nights, Path(name), given.without_website))
-                there = nights + 2
+                there = nights + 3
             engine.dispose()
         name_of_kind = {"sqlite": "SQLite", "postgresql": "PostgreSQL"}[kind]
         print("\n".join(table(name_of_kind, found)), flush=True)

@@ -137,13 +137,13 @@ class Checkpoints:
         known = self._said
         found = hashlib.blake2b(encode((series.definition, repr(series.accepted))), digest_size=16)
         found.update(self._indices_of(points.runs)[:place].tobytes())
-        parts: list[bytes] = []
-        for _, end, said in points.said.from_place(0, place):
-            one = known.get(id(said))
-            if one is None:
-                one = known[id(said)] = _said_digest(said)
-            parts += (one, end.to_bytes(4, "little"))
-        found.update(b"".join(parts))
+        count = bisect_left(points.said.ends, place) + 1  # stretches, the last of them perhaps in part
+        each, ends = points.said.each[:count], array("i", points.said.ends[:count])
+        ends[-1] = place
+        for said in {id(said): said for said in each if id(said) not in known}.values():
+            known[id(said)] = _said_digest(said)
+        found.update(b"".join([known[id(said)] for said in each]))
+        found.update(ends.tobytes())
         return found.digest()
 
     def _indices_of(self, runs: Runs) -> array[int]:

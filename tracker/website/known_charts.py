@@ -81,13 +81,13 @@ class KnownCharts:
         whole = trend.definition, title, goes_on, last == 1, first, nights[0], list(map(repr, events))
         of_night = self._of_night
         parts = [encode(whole), of_night[nights[first]]]
-        for start, end, (sample, *_) in said.from_place(0):
-            one = self._of_said.get(id(sample))
-            if one is None:
-                told = f"{sample.value!r} {sample.outcome}".encode("utf-8", "replace")
-                one = self._of_said[id(sample)] = _short(told)
-            closed = end < count or not goes_on
-            parts += (one, of_night[nights[start]], of_night[nights[end - 1]] if closed else b"")
+        known = self._of_said
+        for one in {id(one): one for one in said.each if id(one) not in known}.values():
+            told = one[0]
+            known[id(one)] = _short(f"{told.value!r} {told.outcome}".encode("utf-8", "replace"))
+        parts += [known[id(one)] for one in said.each]
+        parts += [of_night[nights[end - 1]] for end in said.ends[: -1 if goes_on else None]]
+        parts += [of_night[nights[end]] for end in (0, *said.ends[:-1])]
         return hashlib.blake2b(b"".join(parts), digest_size=16).digest()
 
 

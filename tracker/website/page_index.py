@@ -6,8 +6,9 @@ import math
 from bisect import bisect_left
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import astuple
+from dataclasses import fields
 from itertools import groupby
+from operator import attrgetter
 from typing import TypedDict
 
 from spook_tracker.tracker.document.points import columns
@@ -140,6 +141,9 @@ def _red_maps(book: Book) -> list[ToldMap]:
     return [told for test in book.tests for told in test.red_maps]
 
 
+NUMBERS = attrgetter(*(field.name for field in fields(Count)))
+
+
 def counts_by_night(book: Book, most: int) -> dict[int, Count]:
     """Limits and set points of so many nights, the newest, by the index of the night."""
     counts: dict[int, list[tuple[int, ...]]] = {night.index: [] for night in book.nights[-most:]}
@@ -147,10 +151,10 @@ def counts_by_night(book: Book, most: int) -> dict[int, Count]:
         for trend in test.trends:
             if not expected(trend.definition):
                 continue
-            points = trend.told.points
-            for start, end, (sample, _, recorded) in columns(points).stretches(max(0, len(points) - most)):
+            said = columns(trend.told.points).said
+            for start, end, (sample, _, recorded) in said.from_place(max(0, len(said) - most)):
                 if recorded:
-                    counted = astuple(count([(trend.definition, sample)]))
+                    counted = NUMBERS(count([(trend.definition, sample)]))
                     for night in trend.nights[start:end]:
                         if night in counts:
                             counts[night].append(counted)
