@@ -37,6 +37,7 @@ KEPT = ("nkey", "nuserdata")  # of <size>: rows of numbers
 ROW = 100  # numbers in one, at least
 SHORTEST = 1e-6  # s, of a time step: with less a second takes hours
 COPYING = ("replicate", "composite", "flexcomp")  # elements with a count, or a product of counts
+ENTITIES = "declares XML entities, which no model needs; write out what they stand for"
 POINTER = b"version https://git-lfs"  # what a clone without Git LFS has in place of a file
 MOST_WATCHED = 8
 TIME_STEP = 0.002  # s, of MJCF that names none; also what MuJoCo gives a URDF
@@ -139,6 +140,8 @@ class _Reader:
                 raise ModelError(
                     f"{path} is a pointer of Git LFS in place of the file itself; fetch it with: git lfs pull"
                 )
+        if found.suffix.lower() == ".dae" and b"<!ENTITY" in found.read_bytes():
+            raise ModelError(f"{path} {ENTITIES}")
         self.files.setdefault(found)
         if len(self.files) > MOST_FILES:
             raise ModelError(f"{self.path} consists of more than {MOST_FILES} files")
@@ -154,9 +157,7 @@ class _Reader:
         if "\0" in text:  # a parser would take them for UTF-16, in which nothing below is found
             raise ModelError(f"{path} is no text in UTF-8, which engines read; save it in that encoding")
         if "<!ENTITY" in text:
-            raise ModelError(
-                f"{path} declares XML entities, which no model needs; write out what they stand for"
-            )
+            raise ModelError(f"{path} {ENTITIES}")
         try:
             root = ElementTree.fromstring(text)
         except (ElementTree.ParseError, ValueError, LookupError) as error:

@@ -141,6 +141,7 @@ BOMB = '<!DOCTYPE m [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><mujoco><worldbody
         ('<sdf><include><uri>../secret.xml</uri></include></sdf>', "lies outside"),
         ('<sdf><include><uri>model://parts</uri></include></sdf>', "secret.stl, which lies outside"),
         ('<sdf><include><uri>robot.xml</uri></include></sdf>', "which includes it"),
+        ('<sdf><model><link><mesh><uri>parts/bomb.dae</uri></mesh></link></model></sdf>', "bomb.dae declares XML entities"),
         ('<sdf><model><link><mesh><uri>http://a/b.stl</uri></mesh></link></model></sdf>', "b.stl, which is no file"),
     ],
 )  # fmt: skip
@@ -155,6 +156,7 @@ def test_what_cannot_be_read_is_one_sentence_that_names_the_file(
     (tmp_path / "models/parts/model.sdf").write_text(
         "<sdf><model><mesh><uri>../../secret.stl</uri></mesh></model></sdf>"
     )
+    (tmp_path / "models/parts/bomb.dae").write_text(BOMB)
     file = tmp_path / "models/robot.xml"
     file.write_text(text)
 
@@ -162,7 +164,7 @@ def test_what_cannot_be_read_is_one_sentence_that_names_the_file(
         read(file)
 
     assert "\n" not in str(raised.value)
-    assert "robot.xml" in str(raised.value) or "model.sdf" in str(raised.value)
+    assert any(name in str(raised.value) for name in ("robot.xml", "model.sdf", "bomb.dae"))
 
 
 @pytest.mark.parametrize(

@@ -62,6 +62,16 @@ def test_an_edited_model_is_another_one_and_did_not_change() -> None:
     assert alike(changes) == {}
 
 
+def test_a_model_that_one_of_both_was_not_asked_about_is_not_called_the_same() -> None:
+    """It was told as rounding in all of its values."""
+    asked = {"t/c/m": (series(better="inside", role="reported", sensitivity=KNOWN), sample(0.1))}
+    sides = [ComparedRun(side=_side(str(side)), samples=asked if side else {}) for side in (0, 1)]
+
+    for runs in (sides, sides[::-1]):
+        assert alike(compare(*runs).changes) == {}
+    assert alike(compare(sides[1], sides[1]).changes) == {"t": (1, 0)}
+
+
 def test_models_stand_apart_from_other_tests() -> None:
     (rest,) = without_models([STEP])
 

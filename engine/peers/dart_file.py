@@ -25,7 +25,7 @@ from spook_tracker.engine.peers.model_loop import (
     resident,
     said,
 )
-from spook_tracker.engine.peers.stepped import overheard
+from spook_tracker.engine.peers.stepped import overheard, quiet
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result
 
@@ -45,7 +45,8 @@ def run_model(run: ModelRun, time_step: float, duration: float, time_limit: floa
     simulation = _Simulation(run, world, time_step, time_limit)
     load = time.perf_counter() - began
     simulation.megabytes = resident() - before
-    return simulation.result(duration, load)
+    with quiet():  # it warns of numbers that are not finite, which the run tells
+        return simulation.result(duration, load)
 
 
 def _loaded(run: ModelRun) -> Any:

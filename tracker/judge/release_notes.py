@@ -173,10 +173,11 @@ def told(changes: Iterable[Change]) -> list[str]:
 
 
 def alike(changes: Iterable[Change]) -> dict[str, tuple[int, int]]:
-    """Of each model, how many values have the same bits and how many differ by rounding."""
+    """Of each model that both were asked about, how many values have the same bits and how many differ by rounding."""
     found: dict[str, tuple[int, int]] = {}
     for change in changes:
-        if change.rounding is not None and change.word != "not_comparable":
+        asked = change.before is not None and change.after is not None
+        if asked and change.rounding is not None and change.word != "not_comparable":
             same, rounded = found.get(change.test, (0, 0))
             here = change.before == change.after
             found[change.test] = same + here, rounded + (not here and not visible(change))
