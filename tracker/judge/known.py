@@ -92,10 +92,12 @@ def _lies_after(series: Told, night: Point, before: Judged | None) -> bool:
     """Whether a night comes later in the history than the earlier run; yes where that did not measure it."""
     if before is None:
         return True
-    for judged in series.nights:
-        if judged.night.run.id == before.night.run.id:
+    nights = series.nights
+    runs = nights.points.runs if isinstance(nights, Nights) else (judged.night.run for judged in nights)
+    for run in runs:
+        if run.id == before.night.run.id:
             return True
-        if judged.night.run.id == night.run.id:
+        if run.id == night.run.id:
             return False
     return True
 
