@@ -15,6 +15,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import msgspec
@@ -26,6 +27,12 @@ from spook_tracker.tracker.store.transfer import write_document
 from tests.synthetic_history import decade
 
 MOST = 0.01  # s of the processor a night
+EARLIER = timedelta(days=3650)
+
+
+def long_ago(moment: str) -> str:
+    """The moment as many days earlier: a thousand nights from today on would be ahead of the clock, and refused."""
+    return (datetime.fromisoformat(moment) - EARLIER).isoformat()
 
 
 def main() -> int:
@@ -36,7 +43,10 @@ def main() -> int:
         folder = Path(place) / "runs"
         folder.mkdir()
         for run in decade(nights).documents.values():
-            write_document(msgspec.structs.replace(run, idempotency_key=run.id), folder / f"{run.id}.json")
+            whole = msgspec.structs.replace(
+                run, idempotency_key=run.id, started=long_ago(run.started), finished=long_ago(run.finished)
+            )
+            write_document(whole, folder / f"{run.id}.json")
         start = time.process_time()
         for file in sorted(folder.iterdir()):
             msgspec.json.decode(file.read_bytes())
