@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
+from typing import TYPE_CHECKING
 
 import msgspec
 from msgspec.structs import replace
@@ -27,7 +28,6 @@ from spook_tracker.tracker.document.run_document import (
 )
 from spook_tracker.tracker.judge.accepted import Accepted, acceptance
 from spook_tracker.tracker.judge.calibration import engines_own, taken_again, unquiet
-from spook_tracker.tracker.judge.checkpoints import Checkpoints
 from spook_tracker.tracker.judge.exact_values import (
     KnownValue,
     Series,
@@ -48,6 +48,9 @@ from spook_tracker.tracker.judge.standing import NOT_SUPPORTED, standing
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import Class, with_recoveries
 from spook_tracker.tracker.judge.work import is_read_off
+
+if TYPE_CHECKING:
+    from spook_tracker.tracker.judge.checkpoints import Checkpoints
 
 NOISY_NIGHTS = 400  # how far back run times are judged again night by night
 

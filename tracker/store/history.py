@@ -35,11 +35,8 @@ from spook_tracker.tracker.document.run_document import (
 )
 from spook_tracker.tracker.store import git, rows
 from spook_tracker.tracker.store.ancestry import commit_order, lineages
-from spook_tracker.tracker.store.columns import Lane
 from spook_tracker.tracker.store.damage import told_of_damage
-from spook_tracker.tracker.store.evidence import Behind, Pair
 from spook_tracker.tracker.store.identity import identity
-from spook_tracker.tracker.store.lanes import histories_of, newest_definitions, read_lanes
 from spook_tracker.tracker.store.reader import (
     CHUNK,
     Reader,
@@ -63,6 +60,9 @@ from spook_tracker.tracker.store.versions import RunInfo, resolve
 if TYPE_CHECKING:
     import pandas
     from sqlalchemy.orm import Session
+
+    from spook_tracker.tracker.store.columns import Lane
+    from spook_tracker.tracker.store.evidence import Pair
 
 __all__ = ["History", "Point", "RunInfo", "SeriesHistory"]
 
@@ -190,6 +190,8 @@ class History:
 
     def _whole(self, run_ids: Sequence[str]) -> dict[str, dict[str, Pair]]:
         """`samples` of each: what is equal is one object, and what is kept of them is not read again."""
+        from spook_tracker.tracker.store.evidence import Behind
+
         behind = Behind(self.run(run_ids[0]).engine.name if run_ids else "", self.kept)
         found: dict[str, dict[str, Pair]] = {}
         for run_id in run_ids:
@@ -227,6 +229,8 @@ class History:
 
         As `series` gives them: the definition is that of the newest run that has the series, whichever engine's it is.
         """
+        from spook_tracker.tracker.store.lanes import histories_of, newest_definitions, read_lanes
+
         with no_collection():
             if not self._lanes:
                 engines = dict.fromkeys(run.engine.name for run in self._runs)
