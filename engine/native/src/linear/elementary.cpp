@@ -162,11 +162,10 @@ Twin first_octant(double y, double x) noexcept {
 
 }  // namespace
 
-SineCosine sine_cosine(double angle) noexcept {
+SineCosine sine_cosine_beyond(double angle) noexcept {
     constexpr double none = std::numeric_limits<double>::quiet_NaN();
     const double size = std::abs(angle);
     if (!(size <= std::numeric_limits<double>::max())) return {none, none};
-    if (size < 0x1p-30) return {angle, 1.0};
     if (size <= 0.25 * std::numbers::pi) return near_zero({angle, 0.0});
     const Reduced reduced = reduce(size);
     const SineCosine r = near_zero(reduced.rest);

@@ -330,7 +330,9 @@ bool PlaneTree::stage(double tau, LargeArray<BodyState>& bodies, double* increme
                 continue;
             }
             m.angle += step;
-            m.moved = half_turn(m.angle);
+            const double e = 0.5 * step;
+            if (std::fabs(e) < 0x1p-27) m.moved = HalfTurn{1.0, e} * m.moved;  // e² is below rounding
+            else m.moved = half_turn(m.angle);
             moved = std::max(moved, m.moved.sine * m.moved.sine);
         }
         for (const Closing& loop : closings_)

@@ -264,8 +264,7 @@ void RigidSystem::read_composition() {
     if (solver_ != RigidSolver::block || live_.lost >= 0) return;
     const std::size_t rows = static_cast<std::size_t>(rows_);
     const auto blocks = joints_.blocks();
-    const auto solve = [&] {  // multiplier_ from the rows' right sides
-        if (!factor_and_solve()) live_.not_solved = constrained_.front();
+    const auto take = [&] {
         for (std::size_t row = 0; row < rows; ++row) multiplier_[row] = -solution_[row];
     };
     assemble_blocks();
@@ -274,7 +273,8 @@ void RigidSystem::read_composition() {
     std::size_t row = 0;
     for (int k = 0; k < static_cast<int>(blocks.size()); ++k)
         for (int i = 0; i < blocks[k].size; ++i, ++row) right_[row] = -row_speed(k, i, false);
-    solve();
+    if (!factor_and_solve()) live_.not_solved = constrained_.front();
+    take();
     push(multiplier_.data());
     for (int i : constrained_)
         if (!constants_[i].particle) refresh(constants_[i], live_.bodies[i]);
@@ -286,7 +286,8 @@ void RigidSystem::read_composition() {
         for (int k = 0; k < 3; ++k) *right++ = p[k];
         for (int k = 0; k < 3 && !constants_[i].particle; ++k) *right++ = l[k];
     }
-    solve();
+    solve_again();
+    take();
     const double* multiplier = multiplier_.data();
     for (const JointBlock& block : blocks) {
         std::copy_n(multiplier, block.size, joints_.states[block.joint].multiplier.data());

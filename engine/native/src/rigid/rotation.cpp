@@ -31,6 +31,12 @@ Quat restored(int first, Quat q) noexcept {
     return first == 0 ? q : first == 1 ? Quat{q.w, q.z, q.x, q.y} : Quat{q.w, q.y, q.z, q.x};
 }
 
+/// To rounding.
+bool is_about_one_axis(Vec3 v) noexcept {
+    const double xx = v.x * v.x, yy = v.y * v.y, zz = v.z * v.z;
+    return std::fmin(std::fmin(xx + yy, yy + zz), zz + xx) <= STEADY * (xx + yy + zz);
+}
+
 /// s(t) for A t², B t² up to PART²/4: the series of sn, to the ninth power.
 double pace(double a, double b, double t) noexcept {
     const double p = (a + b) * t * t, q = a * t * (b * t) * t * t, pp = p * p;
@@ -87,8 +93,10 @@ Quat FreeRotor::mean_turn(double h, Vec3 p) const noexcept {
 }
 
 Quat FreeRotor::triaxial_turn(double h, Vec3 p) const noexcept {
-    const double squared = dot(p, p), energy = dot(p, times(over_, p));  // twice that
+    const Vec3 w = times(over_, p);
+    const double squared = dot(p, p), energy = dot(p, w);  // twice that
     if (squared == 0.0) return {};
+    if (is_about_one_axis(p) && is_about_one_axis(w)) return mean_turn(h, p);  // as what a hinge holds
     // The fastest spin on the path: where it lies in the plane of the outer axes.
     const double angle = std::fabs(h) * std::sqrt(energy * (over_.x + over_.z) - squared * over_.x * over_.z);
     if (angle <= STRETCH) return short_turn(h, angle, p);
@@ -101,11 +109,13 @@ Quat FreeRotor::triaxial_turn(double h, Vec3 p) const noexcept {
 }
 
 Quat FreeRotor::short_turn(double h, double angle, Vec3 p) const noexcept {
-    constexpr double squares[] = {
+    // Squares of Gauss and Legendre's nodes on 0 … 1, and of four the weight of the outer ones.
+    constexpr double gauss2[] = {0.21132486540518712 * 0.21132486540518712,
+                                 0.7886751345948129 * 0.7886751345948129};
+    constexpr double gauss4[] = {
         0.06943184420297371 * 0.06943184420297371, 0.33000947820757187 * 0.33000947820757187,
         0.6699905217924281 * 0.6699905217924281, 0.9305681557970262 * 0.9305681557970262};
-    constexpr double weights[] = {0.17392742256872692, 0.32607257743127307, 0.32607257743127307,
-                                  0.17392742256872692};  // Gauss and Legendre's on 0 … 1
+    constexpr double outer = 0.17392742256872692;
     const Vec3 j = over_;
     const double a = narrow_, b = wide_, share = a / b;
     const double p1 = p.x * p.x + share * p.y * p.y, p3 = p.z * p.z + (1.0 - share) * p.y * p.y;  // P²
@@ -119,13 +129,19 @@ Quat FreeRotor::short_turn(double h, double angle, Vec3 p) const noexcept {
     // Moser and Veselov's turn over t about that moment is along (c d, s j p), p between the two ends.
     const double own = s * cd / (c2 * d2 + ss * (w1 * c2 + w3 * d2));
     // What the true turn is ahead of it, about the momentum: ∫ (2E − its own rate), by s instead of the time.
-    double behind = 0.0;
-    for (int k = 0; k < 4; ++k) {
-        const double y = ss * squares[k], c = 1.0 / (1.0 - pace_a * y), d = 1.0 / (1.0 - pace_b * y);
-        const double along = e1 * d + e3 * c, across = w1 * d + w3 * c;
-        const double along_slope = e1 * d * d + e3 * c * c, across_slope = w1 * d * d + w3 * c * c;
-        behind += weights[k] *
-                  (energy - (along_slope - y * along * across_slope / (1.0 + y * across)) / std::sqrt(c * d));
+    const auto rate = [&](double y) {
+        const double c = 1.0 - pace_a * y, d = 1.0 - pace_b * y, cd = c * d, over = 1.0 / cd;
+        const double along = e1 * c + e3 * d, across = w1 * c + w3 * d;
+        const double along_slope = e1 * c * c + e3 * d * d, across_slope = w1 * c * c + w3 * d * d;
+        return (along_slope - y * along * across_slope / (cd + y * across)) * (over * over) * std::sqrt(cd);
+    };
+    double behind;
+    if (angle <= SHORT) {
+        behind = energy - 0.5 * (rate(ss * gauss2[0]) + rate(ss * gauss2[1]));
+    } else {
+        double rates[4];
+        for (int k = 0; k < 4; ++k) rates[k] = rate(ss * gauss4[k]);
+        behind = energy - (outer * (rates[0] + rates[3]) + (0.5 - outer) * (rates[1] + rates[2]));
     }
     const double ahead = parts * (energy * (t - 2.0 * s) + 2.0 * s * behind) / dot(p, p);
 
