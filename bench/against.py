@@ -143,7 +143,10 @@ class Side:
 
     def __init__(self, python: Path, room: str) -> None:
         self._process = subprocess.Popen(
-            [str(python), __file__, "--serve", "--room", room], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+            [str(python), __file__, "--serve", "--room", room],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
         )
 
     def run(self, name: str, steps: int) -> tuple[float, str]:

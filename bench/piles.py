@@ -37,7 +37,7 @@ SWEPT: tuple[Rung, ...] = tuple(
     for sweeps, substeps in ((5, 1), (5, 2), (5, 4), (10, 1), (10, 4), (20, 1), (50, 1), (200, 1), (1000, 1))
 )
 RUNGS: dict[int, tuple[Rung, ...]] = {
-    1000: (*SWEPT, ("direct", 1, 1), ("direct", 1, 2), ("hybrid", 1, 1)),
+    1000: (*SWEPT, ("direct", 1, 1), ("direct", 1, 2)),
     10_000: SWEPT,  # directly, many a step of its fall takes more than 5 s: more than a job can bear
 }
 

@@ -194,7 +194,7 @@ def slides(count: int) -> None:
         )  # fmt: skip
         tiles = floor(chance.choice((0.0, 0.0, 1e-6)), chance.choice((0.0, 0.5)), chance.uniform(0.3, 1.0))
         method = Method(
-            solver=chance.choice(("direct", "iterative", "iterative", "hybrid")),
+            solver=chance.choice(("direct", "iterative", "iterative")),
             iterations=chance.choice((10, 50, 200)),
         )
         scene = Scene(bodies=(*(loose(tiles, 0.5) if number % 12 == 0 else tiles), body), gravity=GRAVITY)

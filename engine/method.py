@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import sys
+import warnings
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,6 +16,8 @@ STAGES_THAT_CAN_BE_FORCED = {  # as it is asked for: the stage that comes
     "solve_block": "solve_block",
     "rotation": "integrate_rotations",
 }
+FORMER_SOLVER = "hybrid"  # friction by iterations, the rest directly: never the best of the three
+FORMER = 'method: solver="hybrid" is gone, and solved as "direct", which is faster and nearer to the law everywhere'
 _NUMBERS = (
     "correction_cap",
     "residual_tolerance",
@@ -46,7 +49,7 @@ class Method:
                        compliance, damping and corrections play no part; forces are those at the sample's time.
                        Small trees of rigid joints on the world are solved in joint coordinates, the rest by rows. Steps that are
                        too long for the tension of light bodies are taken in parts
-    solver             direct; iterative (projected Gauss-Seidel); hybrid (friction iterative, rest direct); an impact
+    solver             direct; iterative (projected Gauss-Seidel); an impact
                        among up to 24 contacts that iterations do not settle is solved directly, since what it leaves stays;
                        so are up to 24 joints (and their contacts) that they do not settle
     iterations, residual_tolerance   when an iterative solve stops; where rows are still off by more than
@@ -86,7 +89,7 @@ class Method:
     string_stiffness: bool = False
     substeps: int = 1
     composition: Literal["none", "order4", "order6", "order8"] = "none"
-    solver: Literal["direct", "iterative", "hybrid"] = "direct"
+    solver: Literal["direct", "iterative"] = "direct"
     iterations: int = 50
     residual_tolerance: float = 1e-10
     friction: Literal["cone", "box", "scaled_box"] = "cone"
@@ -123,8 +126,11 @@ class Method:
             refuse("substeps", "a whole number from 1")
         if not one_of(self.composition, ("none", "order4", "order6", "order8")):
             refuse("composition", "none, order4, order6 or order8")
-        if not one_of(self.solver, ("direct", "iterative", "hybrid")):
-            refuse("solver", "direct, iterative or hybrid")
+        if self.solver == FORMER_SOLVER:
+            warnings.warn(FORMER, DeprecationWarning, stacklevel=3)
+            object.__setattr__(self, "solver", "direct")
+        if not one_of(self.solver, ("direct", "iterative")):
+            refuse("solver", "direct or iterative")
         if not one_of(self.impacts, ("simultaneous", "successive")):
             refuse("impacts", "simultaneous or successive")
         if not self.unsettled_residual > 0.0:

@@ -358,7 +358,7 @@ TEST = ScalarTest(
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 480, 1920)),
             configurations=(
                 Configuration(name="direct", method=PLAIN, expected_order=1.0),
-                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=1.0),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
             ),
             error=ladder_error,
             run=ladder_run,

@@ -253,7 +253,6 @@ TEST = ScalarTest(
             time_steps=(1.0 / 30.0, 1.0 / 60.0),
             configurations=(
                 Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=None),
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
             ),
             error=ladder_error,

@@ -145,7 +145,6 @@ TEST = ScalarTest(
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
             configurations=(
                 Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=None),
                 Configuration(
                     name="iterative, 50 sweeps", method=Method(solver="iterative"), expected_order=None
                 ),

@@ -141,7 +141,6 @@ TEST = ScalarTest(
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 500)),
             configurations=(
                 Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=None),
                 Configuration(
                     name="iterative, 50 sweeps", method=Method(solver="iterative"), expected_order=None
                 ),

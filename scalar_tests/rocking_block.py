@@ -364,7 +364,7 @@ TEST = ScalarTest(
             time_steps=tuple(quarter(START) / (n + 0.5) for n in (64, 128, 256, 512, 1024)),
             configurations=(
                 Configuration(name="direct", method=PLAIN, expected_order=1.0),
-                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=1.0),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
             ),
             error=ladder_error,
             run=run,

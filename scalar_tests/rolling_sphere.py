@@ -213,7 +213,6 @@ TEST = ScalarTest(
             time_steps=tuple(1.0 / n for n in (15, 30, 60, 120, 240, 480, 960)),
             configurations=(
                 Configuration(name="direct", method=PLAIN, expected_order=1.0),
-                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=1.0),
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
                 Configuration(  # exact, for constant forces
                     name="half-step velocities", method=Method(half_step_velocities=True), expected_order=None

@@ -367,7 +367,6 @@ TEST = ScalarTest(
             time_steps=tuple(1.0 / n for n in (20, 40, 80, 160, 320)),
             configurations=(
                 Configuration(name="direct", method=PLAIN, expected_order=1.0),
-                Configuration(name="hybrid", method=Method(solver="hybrid"), expected_order=1.0),
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
             ),
             error=ladder_error,

@@ -197,7 +197,7 @@ def scenes(content: bytes) -> None:
         bodies=bodies, constraints=constraints, forces=tuple(forces), contacts=said.below(4) != 0,
         gravity=said.vector() if said.below(2) else (0.0, 0.0, -10.0),
     )  # fmt: skip
-    solver = said.among(("direct", "iterative", "hybrid"), "none")
+    solver = said.among(("direct", "iterative"), "none")
     composition = said.among(("none", "none", "none", "order4"), 4)
     method = spook.Method(
         solver=solver, composition=composition, corrections=said.among((0, 0, 1, 2), 3), substeps=1 + said.below(2),

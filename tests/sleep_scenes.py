@@ -24,7 +24,7 @@ FALLEN = 240  # steps, within which all that is dropped here lies and sleeps
 ROUGH = Material(friction=0.5)
 SMOOTH = Material()
 FLOOR = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=ROUGH)
-SOLVERS = ("direct", "iterative", "hybrid")
+SOLVERS = ("direct", "iterative")
 
 
 def sleepy(solver: str = "direct", **options: Any) -> Method:

@@ -34,7 +34,7 @@ from spook_tracker.engine import (
 
 GRAVITY = 9.81  # m/s²
 HEIGHT = 2.0  # m
-SOLVERS = [Method(), Method(solver="iterative"), Method(solver="hybrid"), Method(impacts="successive")]
+SOLVERS = [Method(), Method(solver="iterative"), Method(impacts="successive")]
 HALF = Method(half_step_velocities=True)
 STEPS = [1 / 60, 1 / 97, 1 / 240]
 

@@ -158,10 +158,9 @@ def test_the_box_lags_a_step_behind_a_changing_load() -> None:
     assert abs(force[hit + 1, 0]) > 0.7 * force[hit + 1, 2]  # still bounded by the blow
 
 
-@pytest.mark.parametrize("solver", ["iterative", "hybrid"])
 @pytest.mark.parametrize("tangent", [0.3, 0.6])
-def test_other_solvers_reach_the_direct_answer(solver: str, tangent: float) -> None:
-    method = Method(solver=solver, iterations=2000, residual_tolerance=1e-13)  # type: ignore[arg-type]
+def test_iterations_reach_the_direct_answer(tangent: float) -> None:
+    method = Method(solver="iterative", iterations=2000, residual_tolerance=1e-13)
     direct = simulate(slope(tangent, 0.3), time_step=TIME_STEP, duration=1.0, observe=OBSERVE)
     other = simulate(slope(tangent, 0.3), time_step=TIME_STEP, duration=1.0, observe=OBSERVE, method=method)
 

@@ -37,7 +37,7 @@ from spook_tracker.engine import (
 GRAVITY = 9.81  # m/s²
 ELASTIC = Material(restitution=1.0)
 RADIUS = 0.2  # m
-SOLVERS = ("direct", "iterative", "hybrid")
+SOLVERS = ("direct", "iterative")
 Impacts = Literal["simultaneous", "successive"]
 IMPACTS: tuple[Impacts, ...] = ("simultaneous", "successive")
 H = 1 / 60  # s

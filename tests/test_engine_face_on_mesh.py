@@ -10,7 +10,6 @@ from spook_tracker.engine import (
     Box,
     ContactPoints,
     Energy,
-    Method,
     RigidBody,
     Scene,
     start,
@@ -41,9 +40,8 @@ HEAP = (  # mass, place, turn, velocity, angular velocity of three boxes that co
 )
 
 
-@pytest.mark.parametrize("solver", ["direct", "hybrid"])
 @pytest.mark.parametrize("seed", range(24))
-def test_a_face_on_a_mesh_neither_gains_energy_nor_is_pulled(seed: int, solver: str) -> None:
+def test_a_face_on_a_mesh_neither_gains_energy_nor_is_pulled(seed: int) -> None:
     """Places that differ by 1e-5 m, without friction. Where a search for what pushes took long, its end was not looked at once
     more: impulses of +1e9 and -1e9 N s passed for an answer of residual 1e-7 m/s, and four of 24 heaps exploded."""
     rng = np.random.default_rng(seed)
@@ -62,7 +60,7 @@ def test_a_face_on_a_mesh_neither_gains_energy_nor_is_pulled(seed: int, solver: 
         )
     built = Scene(bodies=tuple(bodies), gravity=(0.0, 0.0, -9.81))
     watch = {"energy": Energy(), "points": ContactPoints(40)}
-    with start(built, time_step=1.0 / 60.0, method=Method(solver=solver), observe=watch) as run:  # type: ignore[arg-type]
+    with start(built, time_step=1.0 / 60.0, observe=watch) as run:
         before = float(run["energy"])
         for _ in range(6):
             run.step()

@@ -102,7 +102,7 @@ def test_t11_a_slip_compliance_creeps_by_gamma_times_force() -> None:
     )  # gammas of both surfaces add
 
 
-@pytest.mark.parametrize("solver", ["direct", "hybrid", "iterative"])
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
 @pytest.mark.parametrize("viscosity", [0.5, 20.0])
 def test_viscous_friction_is_a_force_as_large_as_the_slip(solver: Any, viscosity: float) -> None:
     """F = c v of each of four points, 1/c both surfaces' together, under a friction that is never reached; a step takes it at
@@ -157,8 +157,8 @@ def test_the_box_models_hold_more_across_the_diagonal(model: Model) -> None:
     assert np.abs(cone[-1]).max() > 0.5
 
 
-@pytest.mark.parametrize("solver", ["direct", "hybrid", "iterative"])
-def test_all_solvers_find_coulombs_law(solver: Literal["direct", "hybrid", "iterative"]) -> None:
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
+def test_all_solvers_find_coulombs_law(solver: Literal["direct", "iterative"]) -> None:
     method = Method(solver=solver, iterations=2000, residual_tolerance=1e-13)
     v, force = slide(slope(0.6, 0.4, Material(friction=MU)), method=method)
     angle = math.atan(0.6)
@@ -233,3 +233,9 @@ def test_the_box_never_gives_more_than_its_corners(edge: tuple[float, float, flo
     )["f"][1:]
 
     assert np.all(np.hypot(force[:, 0], force[:, 1]) <= math.sqrt(2.0) * mu * force[:, 2] * (1.0 + 1e-9))
+
+
+def test_the_former_solver_is_solved_directly_and_says_so() -> None:
+    """Friction by iterations between direct solves of the rest was the slowest of three at the same error."""
+    with pytest.warns(DeprecationWarning, match='"hybrid" is gone, and solved as "direct"'):
+        assert Method(solver="hybrid") == Method()  # type: ignore[arg-type]

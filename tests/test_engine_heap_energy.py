@@ -29,7 +29,7 @@ GRAVITY = (0.0, 0.0, -9.81)
 ROUGH = Material(friction=0.5)
 GROUND = RigidBody(name="ground", motion="static", shape=Plane(), position=(0, 0, 0), material=ROUGH)
 SHAPES = (Box((0.4, 0.3, 0.5)), Cylinder(0.2, 0.5), Cone(0.3, 0.5))
-SOLVERS = ("direct", "iterative", "hybrid")
+SOLVERS = ("direct", "iterative")
 
 
 def stack(count: int) -> Scene:

@@ -59,7 +59,7 @@ def spun(scene: Scene, steps: int = 100, **more: Any) -> np.ndarray:
     return np.asarray(simulate(scene, time_step=H, steps=steps, observe=observe, **more)["w"])[:, 2]
 
 
-@pytest.mark.parametrize("solver", ["direct", "iterative", "hybrid"])
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
 def test_a_motor_of_given_force_speeds_up_by_it_whatever_the_speed(solver: Any) -> None:
     w = spun(wheel(speed=-1.0, motor=Motor(force=3.0)), method=Method(solver=solver))
     np.testing.assert_allclose(w, -1.0 + 3.0 / INERTIA * H * np.arange(101), rtol=0.0, atol=1e-12)

@@ -26,7 +26,7 @@ from spook_tracker.engine import (
 )
 
 TIME_STEP = 1.0 / 60.0  # s
-SOLVERS = ("direct", "hybrid", "iterative")
+SOLVERS = ("direct", "iterative")
 
 
 def after_a_step(bodies: tuple[RigidBody, ...], solver: str) -> np.ndarray:

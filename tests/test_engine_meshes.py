@@ -398,7 +398,7 @@ def test_a_mesh_is_fixed_and_no_part_of_a_compound() -> None:
         Compound((Part(shape=flat()),))
 
 
-@pytest.mark.parametrize("solver", ["direct", "iterative", "hybrid"])
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
 @pytest.mark.parametrize("facets", [12, 20, 34])
 @pytest.mark.parametrize("speed", [3.0, 7.0])
 def test_a_smooth_ball_in_a_gutter_goes_on_along_it(speed: float, facets: int, solver: str) -> None:

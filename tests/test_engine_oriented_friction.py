@@ -36,7 +36,7 @@ H = 1.0 / 60.0
 GRAVITY = 10.0
 ALONG, ACROSS = 0.5, 0.2  # of the pair
 GRAIN = 0.3  # rad from x
-SOLVERS = ("direct", "iterative", "hybrid")
+SOLVERS = ("direct", "iterative")
 ONE = Material(friction=1.0)
 
 

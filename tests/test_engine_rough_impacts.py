@@ -37,7 +37,7 @@ from spook_tracker.engine import (
 H = 1 / 60  # s
 GRAVITY = (0.0, 0.0, -9.81)
 STEPS = [1 / 60, 1 / 240, 1e-3]
-SOLVERS = ["direct", "iterative", "hybrid"]
+SOLVERS = ["direct", "iterative"]
 
 
 def floor(material: Material) -> RigidBody:

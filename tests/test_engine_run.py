@@ -98,7 +98,6 @@ SCENES: dict[str, tuple[Scene, Method]] = {
     "rigid, sweeps": (rigid_scenes.everything(rng()), Method(solver="iterative")),
     "contacts": (tumble(), Method()),
     "contacts, sweeps": (tumble(), Method(solver="iterative", iterations=30)),
-    "contacts, hybrid": (tumble(), Method(solver="hybrid")),
     "contacts, box": (tumble(), Method(friction="box")),
 }
 

@@ -84,7 +84,7 @@ def heap(bodies: int = 12) -> Scene:
 
 @pytest.mark.parametrize(
     "method",
-    [Method(), Method(solver="iterative"), Method(solver="hybrid"), Method(sleep_speed=0.05)],
+    [Method(), Method(solver="iterative"), Method(sleep_speed=0.05)],
     ids=lambda method: f"{method.solver}-{method.sleep_speed}",
 )
 def test_the_times_of_stages_are_the_step_of_a_heap(method: Method) -> None:

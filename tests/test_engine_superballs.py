@@ -28,7 +28,7 @@ from spook_tracker.engine import (
 from spook_tracker.engine.errors import SceneError
 
 RADIUS = 0.1  # m
-SOLVERS = ["direct", "iterative", "hybrid"]
+SOLVERS = ["direct", "iterative"]
 SHAPES = (Sphere(0.2), Box((0.3, 0.4, 0.5)), Capsule(0.1, 0.4), Cylinder(0.15, 0.4))
 
 

@@ -63,7 +63,7 @@ SWEPT = {
     ),
     "rebounding": (
         heap(600, Sphere(0.25), material=Material(friction=0.3, restitution=0.5)),
-        Method(solver="hybrid"),
+        Method(solver="iterative", iterations=30),
         15,
     ),
     "successive": (heap(300, Sphere(0.25)), Method(impacts="successive"), 10),

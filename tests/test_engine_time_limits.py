@@ -126,7 +126,6 @@ def landscape(side: int) -> Made:
 
 SCENES: dict[str, Callable[[], Made]] = {
     "exact friction": lambda: wedged(600, Method()),
-    "pivoting": lambda: wedged(600, Method(solver="hybrid")),
     "a million sweeps": lambda: wedged(
         300, Method(solver="iterative", iterations=10**6, residual_tolerance=0.0)
     ),

@@ -176,7 +176,7 @@ def walls_that_close_in() -> Scene:
 
 def test_walls_that_close_in_cost_a_bounded_search() -> None:
     """Pivoting for one had no end."""
-    method = Method(solver="hybrid")
+    method = Method()
     result = simulate(walls_that_close_in(), time_step=1 / 60, steps=3, method=method)
 
     assert result.status == "unsettled"
@@ -187,7 +187,7 @@ def test_walls_that_close_in_cost_a_bounded_search() -> None:
 @pytest.mark.parametrize("threads", [1, 2])
 def test_a_search_that_was_given_up_is_given_up_again_after_going_back(threads: int) -> None:
     """What failed is not asked again for some solves, and a run that goes back has to know for how many."""
-    method = Method(solver="hybrid", threads=threads)
+    method = Method(threads=threads)
     with start(walls_that_close_in(), time_step=1 / 60, method=method) as run:
         snapshots = []
         for _ in range(3):

@@ -159,8 +159,8 @@ CASES = [
     (planetarium, {"method": "order 8", "rate": 20, "speed": 1.1}),
     (beam, {"rate": 60, "boxes": 12, "compliance": -4}),
     (pile, {"friction": "cone", "solver": "direct", "rate": 60, "count": 3, "mu": 0.4, "restitution": 0.1}),
-    (pile, {"friction": "scaled_box", "solver": "hybrid", "rate": 120, "count": 7, "mu": 0.6, "restitution": 0.0}),
-    (pile, {"friction": "cone", "solver": "hybrid", "rate": 60, "count": 10, "mu": 0.4, "restitution": 0.1}),
+    (pile, {"friction": "scaled_box", "solver": "iterative", "rate": 120, "count": 7, "mu": 0.6, "restitution": 0.0}),
+    (pile, {"friction": "cone", "solver": "iterative", "rate": 60, "count": 10, "mu": 0.4, "restitution": 0.1}),
     (pile, {"friction": "cone", "solver": "iterative", "rate": 60, "count": 10, "mu": 0.4, "restitution": 0.5}),
 ]  # fmt: skip
 

@@ -311,7 +311,6 @@ TEST = ScalarTest(
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
             configurations=(
                 Configuration(name="cone", method=CONE, expected_order=None),
-                Configuration(name="cone, hybrid", method=Method(solver="hybrid"), expected_order=None),
                 Configuration(name="cone, iterative", method=Method(solver="iterative"), expected_order=None),
                 Configuration(name="box", method=BOX, expected_order=None),
                 Configuration(name="scaled box", method=SCALED_BOX, expected_order=None),

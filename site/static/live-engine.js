@@ -2,7 +2,7 @@
 // file in Node and compare every bit with the native engine.
 "use strict";
 
-const SOLVERS = ["direct", "iterative", "hybrid"];
+const SOLVERS = ["direct", "iterative"];
 const FRICTIONS = ["cone", "box", "scaled_box"];
 const STATUS = ["completed", "diverged", "not finite", "timed out", "unsettled"];
 const METHODS = {  // of particle scenes: what the step is asked for

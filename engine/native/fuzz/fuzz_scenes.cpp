@@ -137,8 +137,8 @@ RigidMethod method(Bytes& bytes, bool smooth) {
     RigidMethod chosen;
     chosen.time_step = steps[bytes.below(4)];
     chosen.substeps = 1 + bytes.below(2);
-    chosen.solver = static_cast<SolverKind>(bytes.below(3));
-    chosen.friction = static_cast<FrictionModel>(bytes.below(3));
+    chosen.solver = static_cast<SolverKind>(bytes.below(2));
+    chosen.friction = static_cast<FrictionModel>(bytes.below(2));
     chosen.impacts = static_cast<ImpactOrder>(bytes.below(2));
     chosen.iterations = 1 + bytes.below(50);
     chosen.refinements = bytes.below(3);

@@ -112,15 +112,11 @@ void all_solvers_agree() {
     for (const double slope : {0.3, 0.6}) {
         ContactWorld direct = tilted_box(slope, 0.3, options());
         ContactWorld iterative = tilted_box(slope, 0.3, options(FrictionModel::cone, SolverKind::iterative));
-        ContactWorld hybrid = tilted_box(slope, 0.3, options(FrictionModel::cone, SolverKind::hybrid));
-        for (int step = 0; step < 60; ++step) direct.step(), iterative.step(), hybrid.step();
+        for (int step = 0; step < 60; ++step) direct.step(), iterative.step();
         EXPECT_NEAR(norm(iterative.bodies[1].velocity - direct.bodies[1].velocity), 0.0, 1e-8);
-        EXPECT_NEAR(norm(hybrid.bodies[1].velocity - direct.bodies[1].velocity), 0.0, 1e-8);
         EXPECT_NEAR(ratio(iterative), std::min(slope, 0.5), 1e-8);
-        EXPECT_NEAR(ratio(hybrid), std::min(slope, 0.5), 1e-8);
-        std::printf("slope %.1f: PGS iterations iterative %llu, hybrid %llu; direct rounds %llu\n", slope,
+        std::printf("slope %.1f: PGS iterations iterative %llu; direct rounds %llu\n", slope,
                     static_cast<unsigned long long>(iterative.stage.counters().pgs_iterations),
-                    static_cast<unsigned long long>(hybrid.stage.counters().pgs_iterations),
                     static_cast<unsigned long long>(direct.stage.counters().friction_rounds));
     }
 }

@@ -39,7 +39,7 @@ using namespace spook;
 
 namespace {
 
-constexpr SolverKind every[] = {SolverKind::direct, SolverKind::iterative, SolverKind::hybrid};
+constexpr SolverKind every[] = {SolverKind::direct, SolverKind::iterative};
 const char* name(SolverKind solver) { return to_text(solver).c_str(); }
 
 RigidScene ground(SolverKind solver) {

@@ -15,7 +15,7 @@ RigidScene scene(int kind) {
     RigidScene s;
     s.gravity = {0, 0, -10};
     s.method.time_step = 1.0 / 60.0;
-    s.method.solver = static_cast<SolverKind>(kind % 3);
+    s.method.solver = static_cast<SolverKind>(kind % 2);
     const SurfaceMaterial rough{0.5, 0.1 * (kind % 2), 0.0, 0.075, 0.0};
     RigidBodySpec floor;
     floor.motion = Motion::fixed;

@@ -7,7 +7,7 @@ extern "C" {
 /// Forget everything and begin a scene of particles (0) or with rigid bodies (1).
 void live_begin(int rigid);
 void live_gravity(double x, double y, double z);  // m/s²
-/// Time step in s; solver: 0 direct, 1 iterative, 2 hybrid; friction: 0 cone, 1 box, 2 scaled box;
+/// Time step in s; solver: 0 direct, 1 iterative; friction: 0 cone, 1 box, 2 scaled box;
 /// composition: order 2, 4, 6 or 8.
 void live_method(double time_step, int substeps, int corrections, int composition, int half_step_velocities,
                  int solver, int friction, int iterations, double residual_tolerance);

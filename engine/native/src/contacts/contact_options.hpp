@@ -8,7 +8,7 @@
 
 namespace spook {
 
-SPOOK_NAMED_ENUM(SolverKind, direct, iterative, hybrid)
+SPOOK_NAMED_ENUM(SolverKind, direct, iterative)
 
 /// What bodies that touch but do not approach each other do while an impact passes. simultaneous: they take part in
 /// it. successive: only points that are approached take part, again and again until none is: an impact runs through a

@@ -74,15 +74,15 @@ public:
                 push(block, rows_[block.row + i], rows_[block.row + i].multiplier);
     }
 
-    /// One iteration; the largest change of a row, as a velocity. With `friction_only` all but tangents is held.
-    double iterate(std::vector<FrictionPoint>& points, bool friction_only) noexcept {
+    /// One iteration; the largest change of a row, as a velocity.
+    double iterate(std::vector<FrictionPoint>& points) noexcept {
         double change = 0.0;
         for (const PgsBlock& block : blocks_) {
             if (block.kind == PgsBlock::Kind::contact) {
-                if (!friction_only) change = larger(change, update_row(block, rows_[block.row]));
+                change = larger(change, update_row(block, rows_[block.row]));
                 for (int k = block.point; k < block.end; ++k)
                     change = larger(change, update_rubbing(block, points[k], block.step[k - block.point]));
-            } else if (!friction_only) {
+            } else {
                 change = larger(change, update_joint(block));
             }
         }

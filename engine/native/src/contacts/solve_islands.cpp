@@ -11,14 +11,6 @@ namespace spook {
 
 namespace {
 
-FrictionReport iterate(const ContactOptions& o, FrictionModel model, MixedSystem& island,
-                       std::vector<FrictionPoint>& points, DirectSolver& solver) {
-    return o.solver == SolverKind::iterative
-               ? solve_iterative(island, points, model, o.iterations, o.residual_tolerance)
-               : solve_hybrid(island, points, model, solver.pivot, solver.backoff, o.iterations,
-                              o.residual_tolerance);
-}
-
 /// Whether an answer is one: an island on which next to nothing acts may have none to rounding.
 bool is_finite(const MixedSystem& system) {
     const auto finite = [](double x) { return std::isfinite(x); };
@@ -42,7 +34,7 @@ FrictionReport pgs_or_direct(const ContactOptions& o, FrictionModel model, doubl
     static thread_local MixedSystem start;  // their memory outlives a solve
     static thread_local std::vector<FrictionPoint> fresh;
     start = island, fresh = points;
-    FrictionReport report = iterate(o, model, island, points, solver);
+    FrictionReport report = solve_iterative(island, points, model, o.iterations, o.residual_tolerance);
     if (!report.finite || report.converged) return report;
     const double left = rows_residual(island, points, model).residual;
     if (!(left > enough)) return report;
@@ -72,7 +64,9 @@ FrictionReport solve_islands(MixedSystem& system, std::vector<FrictionPoint>& po
                                                 DirectSolver& solver) {
         solver.warm_started = rules.warm_started;
         if (island.rows.size() <= most) return solve_friction_direct(island, own, rules.friction, solver);
-        if (island.rows.size() > few_rows) return iterate(options, rules.friction, island, own, solver);
+        if (island.rows.size() > few_rows)
+            return solve_iterative(island, own, rules.friction, options.iterations,
+                                   options.residual_tolerance);
         return pgs_or_direct(options, rules.friction, rules.enough, island, own, solver);
     };
     const FrictionReport report = islands.run(system, points, std::cref(solve), answered);

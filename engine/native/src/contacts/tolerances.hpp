@@ -142,11 +142,6 @@ inline constexpr int turning_turns = 4;                         // the same with
 inline constexpr int pgs_turns = 1, iterations_per_turn = 100;  // where Newton's path ends without an answer
 }  // namespace tolerances::friction_direct
 
-// friction_pgs.cpp
-namespace tolerances::friction_pgs {
-inline constexpr int search_rounds = 200;  // of pivoting: searches that end take fewer
-}
-
 // impact_search.cpp
 namespace tolerances::impact_search {
 inline constexpr double same_side = 1.0 - 1e-9;  // cosine of normals

@@ -19,11 +19,10 @@ inline SineCosine sine_cosine(double angle) noexcept {
     const double x = angle, z = x * x, zz = z * z;
     if (!(std::fabs(x) <= 0.25)) return sine_cosine_beyond(x);
     if (std::fabs(x) < 0x1p-30) return {x, 1.0};
-    const double sine = (-1.0 / 6 + z * (1.0 / 120)) +
-                        zz * ((-1.0 / 5040 + z * (1.0 / 362880)) +
-                              zz * (-1.0 / 39916800 + z * (1.0 / 6227020800)));
-    const double cosine = (1.0 / 24 - z * (1.0 / 720)) +
-                          zz * ((1.0 / 40320 - z * (1.0 / 3628800)) + zz * (1.0 / 479001600));
+    const double sine = (-1.0 / 6 + z * (1.0 / 120)) + zz * ((-1.0 / 5040 + z * (1.0 / 362880)) +
+                                                             zz * (-1.0 / 39916800 + z * (1.0 / 6227020800)));
+    const double cosine =
+        (1.0 / 24 - z * (1.0 / 720)) + zz * ((1.0 / 40320 - z * (1.0 / 3628800)) + zz * (1.0 / 479001600));
     return {x + x * (z * sine), 1.0 - (0.5 * z - zz * cosine)};
 }
 

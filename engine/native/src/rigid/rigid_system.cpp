@@ -108,9 +108,8 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
             if (!stages_.runs(Stage::move_surfaces)) materials.back().surface_velocity = {};
             if (!stages_.runs(Stage::roll)) materials.back().rolling = materials.back().torsional = 0.0;
         }
-        const SolverKind solver = stages_.runs(Stage::solve_iterative)   ? SolverKind::iterative
-                                  : method_.solver == SolverKind::hybrid ? SolverKind::hybrid
-                                                                         : SolverKind::direct;
+        const SolverKind solver =
+            stages_.runs(Stage::solve_iterative) ? SolverKind::iterative : SolverKind::direct;
         fresh_contacts_.emplace(Detection(scene.colliders, dynamic, scene.no_contact), materials,
                                 solver_index_,
                                 ContactOptions{h_, method_.friction, solver, method_.iterations,

@@ -110,11 +110,11 @@ inline constexpr double TOLD = 1e-3;  // of the largest share: a joint that is n
 
 // rotation.cpp
 namespace tolerances::rotation {
-inline constexpr double PART = 0x1p-4;   // rad: up to here series and quadrature are exact to rounding
+inline constexpr double PART = 0x1p-4;    // rad: up to here series and quadrature are exact to rounding
 inline constexpr double SHORT = 0x1p-10;  // rad: up to here with two nodes
 inline constexpr double STRETCH =
     4.0;  // rad: what its start's invariants serve for; rounding leaves them slowly
-inline constexpr double FAR = 1000.0;  // rad
+inline constexpr double FAR = 1000.0;       // rad
 inline constexpr double STEADY = 0x1p-106;  // square of the rounding of a direction
 }  // namespace tolerances::rotation
 
