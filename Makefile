@@ -7,7 +7,7 @@ WORKERS ?= auto  # of the tests in Python: as many as there are cores
 BIN    := $(VENV)/bin
 export PIP_BUILD_CONSTRAINT ?= $(CURDIR)/.ci/build-constraints.txt
 
-.PHONY: help lint tools tidy tidy-deep engines engine-releases recorded wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-smooth bench-replay pictures looks heaps campaign campaign-wide mechanisms mutants mutants-tonight past mutation tolerances detectors pairs aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-threads sanitize-python FORCE
+.PHONY: help lint tools tidy tidy-deep engines engine-releases recorded wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-smooth bench-replay pictures looks heaps campaign campaign-wide mechanisms mutants mutants-tonight past mutation tolerances detectors pairs aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-python FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
@@ -15,7 +15,6 @@ help:
 	@echo "make tidy-deep the core read along every path by clang's analyser: weekly"
 	@echo "make bench     our kernels against hand-written loops, side by side in one run"
 	@echo "make sanitize  the C++ tests with every access and every overflow watched"
-	@echo "make sanitize-threads  the same with what threads share watched"
 	@echo "make sanitize-python   the Python tests of the engine on a module whose every access is watched"
 	@echo "make fuzz MINUTES=10   each fuzz target, guided by what it reaches: shapes, scenes, documents, settings"
 	@echo "make fuzz-keep         the least of what they have reached goes into the tree"
@@ -228,11 +227,9 @@ native-tests: develop
 	$(BIN)/cmake --build build/cpp-tests
 	$(BIN)/ctest --test-dir build/cpp-tests --output-on-failure
 
-sanitize: WATCHED = address,undefined
-sanitize-threads: WATCHED = thread
-sanitize sanitize-threads: develop
+sanitize: develop
 	$(BIN)/cmake -S engine/native -B build/$@ $(NINJA) -DCMAKE_BUILD_TYPE=None -DCMAKE_CXX_FLAGS="-O1 -g1" \
-	    -DSPOOK_PYTHON=OFF -DSPOOK_TESTS=ON -DSPOOK_SANITIZE=$(WATCHED)
+	    -DSPOOK_PYTHON=OFF -DSPOOK_TESTS=ON -DSPOOK_SANITIZE=address,undefined
 	$(BIN)/cmake --build build/$@
 	$(BIN)/ctest --test-dir build/$@ --output-on-failure
 

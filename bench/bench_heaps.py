@@ -12,10 +12,8 @@ from __future__ import annotations
 
 import argparse
 import math
-import os
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -60,7 +58,6 @@ KNOCKED_MEAN = 30.0  # the same in the mean over KNOCKS: 12 to 20 when it was se
 BALL = Sphere(0.25)
 MIXED = 9.0  # × the median step by 50 sweeps: 64 mixed bodies, solved directly; 4.5 when it was set
 WORST = 10.0  # × the median of the direct steps, in any step
-TWO = 0.85  # × the wall time on one thread; .7 when it was set
 OVERLAP = 1e-3  # m, what heaps of spheres are compared at
 PARTED = 1e-6  # m, what one parting a step leaves them in; by ten sweeps in the median of STARTS, which are chaotic
 STARTS = range(1, 16)  # seeds
@@ -251,35 +248,6 @@ def growth(largest: int, steps: int) -> bool:
     return kept
 
 
-def threaded(count: int, steps: int) -> bool:
-    """The wall time of two threads against one, where there are two cores: a heap by sweeps, towers of boxes directly."""
-    print(f"two threads: at most {TWO} × the wall time of one, the same bits")
-    kept = True
-    scenes = (
-        ("by 50 sweeps", heap(count), Method(solver="iterative")),
-        ("boxes, directly", heap(1000, Box((0.5, 0.5, 0.5))), Method()),
-    )
-    for title, scene, method in scenes:
-        programs = [
-            compile(scene, time_step=TIME_STEP, method=replace(method, threads=threads)) for threads in (1, 2)
-        ]
-        walls = [math.inf, math.inf]
-        ends: list[dict[str, bytes]] = [{}, {}]
-        for _ in range(6):  # side by side: what slows the machine down for a while slows both
-            for k, program in enumerate(programs):
-                begin = time.perf_counter()
-                result = program.run(steps)
-                walls[k] = min(walls[k], (time.perf_counter() - begin) / steps)
-                ends[k] = {name: end.tobytes() for name, end in result.final_state.items()}
-        share = walls[1] / walls[0]
-        print(
-            f"  {title:<18}{1e3 * walls[0]:>8.2f} and {1e3 * walls[1]:.2f} ms a step, {share:.2f} ×",
-            flush=True,
-        )
-        kept = kept and ends[0] == ends[1] and (share <= TWO or (os.cpu_count() or 1) < 2)
-    return kept
-
-
 def huge(count: int, steps: int) -> bool:
     """A heap that is out of reach of a night: the whole fall by ten sweeps a step, settled and within OVERLAP."""
     print(
@@ -451,7 +419,6 @@ def main() -> int:
         "1000 spheres exactly": exactly(given.steps),
         "spheres packed in a bin": packed(given.steps),
         "cost per contact grows little": growth(given.largest, given.steps),
-        "two threads are faster than one": threaded(given.largest, max(20, given.steps // 4)),
         "rest is cheap, and linear": direct_at_rest(),
         "a sleeping body costs next to nothing": asleep(1000),
         "bodies of every shape are solved directly": unlike_bodies(given.steps),

@@ -149,7 +149,6 @@ def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> 
             "unsettled_residual": method.unsettled_residual,
             "sleep_speed": method.sleep_speed,
             "sleep_after": method.sleep_after,
-            "threads": method.threads,
             "iterations": method.iterations,
             "residual_tolerance": method.residual_tolerance,
             "composition": method.composition,

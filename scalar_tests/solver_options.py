@@ -45,9 +45,7 @@ GRAVITY = 9.81  # m/s²
 TIME_STEP = 1.0 / 60.0  # s
 EDGE = 0.5  # m, of boxes of the heap
 HEAPED, FEW = 30, 8
-MANY, SIDE = 216, 6  # so many that threads share them: more than 512 contacts
 FALLING = 0.25  # s: while the heap falls together
-THREADS = (2, 4)
 BEND = GRAVITY * TIME_STEP**2 / LENGTH  # of its length, by which the pendulum bends in a step at its fastest
 CAPS = (0.03, 0.1, 1.0)  # beside the default
 DRAWN = (1e-4, 3e-4, 1e-3, 2e-3, 2.5e-3, 3e-3, 1e-2, 1e-1)
@@ -83,21 +81,6 @@ def heap(count: int = HEAPED, side: int = 2) -> Scene:
         for k in range(count)
     )
     return Scene(bodies=(FLOOR, *boxes), gravity=(0.0, 0.0, -GRAVITY))
-
-
-def _threads(simulate: Simulate) -> dict[str, float]:
-    def fallen(threads: int) -> np.ndarray:
-        result = simulate(
-            heap(MANY, SIDE),
-            time_step=TIME_STEP,
-            duration=FALLING,
-            method=Method(solver="iterative", iterations=20, threads=threads),
-            observe={"x": Final(quantity=Position()), "v": Final(quantity=Velocity())},
-        )
-        return np.hstack((result.partial["x"], result.partial["v"]))
-
-    alone = fallen(1)
-    return {"bits_of_threads": float(sum((fallen(threads) != alone).sum() for threads in THREADS))}
 
 
 def _reported(simulate: Simulate) -> dict[str, float]:
@@ -232,10 +215,9 @@ def _none(name: str, description: str, unit: str, source: str) -> Metric:
 TEST = ScalarTest(
     title="Options of the solver",
     question="Do options that shall only save work, or only report, leave the answer alone?",
-    why="Threads, sleeping and guards are set once and trusted. One that changes an answer a little is never suspected.",
+    why="Sleeping and guards are set once and trusted. One that changes an answer a little is never suspected.",
     model="A heap of boxes, a stack, a thrown ball, a pendulum and a door, with one option turned at a time.",
     parameters=(
-        ("threads", "1 against 2 and 4: 216 boxes fall together, more than 512 contacts, 20 sweeps"),
         ("unsettled_residual", "0.3 to 0.01 m/s, 30 boxes fall together, 10 sweeps"),
         ("correction_cap", "0.03 to 1, a pendulum that bends 0.003 a step"),
         (
@@ -246,7 +228,7 @@ TEST = ScalarTest(
         ("time step", "1/60 s"),
     ),
     theory=(
-        "Work shared among threads is the same work. A cap that nothing reaches caps nothing: a pendulum let go level departs "
+        "A cap that nothing reaches caps nothing: a pendulum let go level departs "
         "from its chord by (v h)²/(2 l), g h² where it is fastest.",
         "What falls freely is not at rest at the top. On a smooth slope it is slower than s for 2 s/(g sin α): with s below half "
         "of g sin α times sleep_after it does not sleep.",
@@ -257,20 +239,6 @@ TEST = ScalarTest(
     source="ours",
     lacks={"ladder": "exact at every step"},
     measurements=(
-        ask(
-            _threads,
-            (
-                _none(
-                    "bits_of_threads",
-                    "numbers of places and velocities that differ from one thread's",
-                    "1",
-                    "the same sums in the same order",
-                ),
-            ),
-            "A heap falls together.",
-            TIME_STEP,
-            "threads",
-        ),
         ask(
             _reported,
             (

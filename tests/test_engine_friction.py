@@ -233,9 +233,3 @@ def test_the_box_never_gives_more_than_its_corners(edge: tuple[float, float, flo
     )["f"][1:]
 
     assert np.all(np.hypot(force[:, 0], force[:, 1]) <= math.sqrt(2.0) * mu * force[:, 2] * (1.0 + 1e-9))
-
-
-def test_the_former_solver_is_solved_directly_and_says_so() -> None:
-    """Friction by iterations between direct solves of the rest was the slowest of three at the same error."""
-    with pytest.warns(DeprecationWarning, match='"hybrid" is gone, and solved as "direct"'):
-        assert Method(solver="hybrid") == Method()  # type: ignore[arg-type]

@@ -220,6 +220,8 @@ METHODS: list[dict[str, Any]] = [
     {"substeps": True},
     {"iterations": True},
     {"refinements": False},
+    {"threads": 0},
+    {"threads": 1.5},
 ]
 
 
@@ -274,3 +276,15 @@ def test_a_range_of_samples_must_be_one() -> None:
     ):
         with pytest.raises(MethodError, match="observe"):
             make()
+
+
+@pytest.mark.parametrize(
+    ("former", "words"),
+    [
+        ({"solver": "hybrid"}, '"hybrid" is gone, and solved as "direct"'),
+        ({"threads": 2}, "one thread does the work"),
+    ],
+)
+def test_a_former_option_does_what_is_done_now_and_says_so(former: dict[str, Any], words: str) -> None:
+    with pytest.warns(DeprecationWarning, match=words):
+        assert Method(**former) == Method()

@@ -41,8 +41,8 @@ def corpus() -> dict[str, Made]:
     for kind, scenes in (("particles", particle_scenes), ("rigid", rigid_scenes)):
         made[f"{kind}, halved"] = (stiff(scenes.tree(rng())), 0.15, Method(composition="order4"))
     made["a lock that breaks"] = (coupling_scenes.hung(strength=22.0), 0.01, Method())
-    scene, method = islands((12, 9), Method(threads=2))
-    made["overlaps on two threads"] = (scene, 0.01, method)
+    scene, method = islands((12, 9), Method())
+    made["overlaps in two islands"] = (scene, 0.01, method)
     for name in ("slider_crank", "taut_rope", "leaning_cards", "stone_bridge", "loose_bearing"):
         example = CATALOGUE[name].example()
         made[name] = (example.scene, example.time_step, example.method)

@@ -133,8 +133,7 @@ SCENES: dict[str, Callable[[], Made]] = {
     "rows to spare": lambda: sheet(30),
     "a mesh": lambda: landscape(60),
     "contacts before the first step": lambda: wedged(400, Method(half_step_velocities=True)),
-    "another thread's island": lambda: islands((20, 600), Method(threads=2)),
-    "an island beside another thread's": lambda: islands((600, 20), Method(threads=2)),
+    "the second of two islands": lambda: islands((20, 600), Method()),
 }
 
 
@@ -240,9 +239,7 @@ def test_the_keyboard_interrupts_a_step() -> None:
     assert time.monotonic() - began < 10.0  # not the minute it would run; how soon is asked below
 
 
-PROMPT = (
-    3.0 * LATE
-)  # s of processor time: asked at most ten times a second, and of two threads each has its own
+PROMPT = 3.0 * LATE  # s of processor time: asked at most ten times a second
 
 
 def interrupted_after(seconds: float, work: Callable[[], object]) -> float | None:

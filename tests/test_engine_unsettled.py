@@ -184,10 +184,9 @@ def test_walls_that_close_in_cost_a_bounded_search() -> None:
     assert result.counters["factorisations"] < 2500
 
 
-@pytest.mark.parametrize("threads", [1, 2])
-def test_a_search_that_was_given_up_is_given_up_again_after_going_back(threads: int) -> None:
+def test_a_search_that_was_given_up_is_given_up_again_after_going_back() -> None:
     """What failed is not asked again for some solves, and a run that goes back has to know for how many."""
-    method = Method(threads=threads)
+    method = Method()
     with start(walls_that_close_in(), time_step=1 / 60, method=method) as run:
         snapshots = []
         for _ in range(3):

@@ -33,7 +33,6 @@ def eager(scene: Any, **options: Any) -> Any:
     ("configuration", "engine"),
     [
         ("sleeping", taking(lambda method: replace(method, sleep_speed=0.0))),
-        ("threads", taking(lambda method: replace(method, threads=1), 1e-15)),
         ("thresholds", taking(lambda method: replace(method, unsettled_residual=1e9))),
         ("thresholds", eager),
         ("caps", taking(lambda m: replace(m, correction_cap=1e-4) if m.correction_cap < 0.3 else m)),
@@ -61,7 +60,7 @@ def test_the_cap_bites_where_the_pendulum_bends_as_much(wider: float, held: bool
 def test_every_guard_users_rely_on_is_asked() -> None:
     asked = {name for name, _ in TEST.parameters}
 
-    assert {"threads", "sleep_speed", "unsettled_residual", "correction_cap", "floor"} <= asked
+    assert {"sleep_speed", "unsettled_residual", "correction_cap", "floor"} <= asked
     assert asked - {"time step"} <= set(Method.__dataclass_fields__)
 
 

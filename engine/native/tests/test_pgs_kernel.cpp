@@ -1,4 +1,4 @@
-// Four contacts solved side by side get the bits they get one after the other; and so does a heap on several threads.
+// Four contacts solved side by side get the bits they get one after the other; and so does a heap.
 #include <cmath>
 #include <cstring>
 #include <limits>
@@ -120,7 +120,7 @@ PgsContact between(int first, int second, std::mt19937& random) {
 }
 
 /// Velocities and counts after iterations over a large random heap, in which some contacts come late.
-std::vector<double> heap(int threads, bool portable, FrictionModel model) {
+std::vector<double> heap(bool portable, FrictionModel model) {
     constexpr int count = 3000, all = 9000, late = 200;
     std::mt19937 random(5);
     MixedSystem system;
@@ -131,9 +131,7 @@ std::vector<double> heap(int threads, bool portable, FrictionModel model) {
     for (Vec6& p : system.momentum)
         for (double& x : p) x = 1e-3 * static_cast<double>(random() % 2001) - 1.0;
     use_portable_pgs(portable);
-    Team team(threads);
     PgsSolver solver;
-    if (threads > 1) solver.help(&team);
     solver.start(system, model);
     const auto add = [&] {
         const int first = static_cast<int>(random() % count);
@@ -176,9 +174,7 @@ int main() {
         EXPECT(vectors.equals(portable));
     }
     for (const FrictionModel model : {FrictionModel::cone, FrictionModel::box}) {
-        const std::vector<double> alone = heap(1, true, model);
-        EXPECT(heap(1, false, model) == alone);
-        for (const int threads : {2, 3, 5}) EXPECT(heap(threads, false, model) == alone);
+        EXPECT(heap(false, model) == heap(true, model));
     }
     return report();
 }

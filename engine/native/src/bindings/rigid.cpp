@@ -342,7 +342,6 @@ RigidMethod to_method(const nb::dict& method) {
     options.read("unsettled_residual", out.unsettled_residual);
     options.read("sleep_speed", out.sleep_speed);
     options.read("sleep_after", out.sleep_after);
-    options.read("threads", out.threads);
     Composition composition{};
     options.read_kind("composition", composition);
     out.composition = order_of(composition);

@@ -164,15 +164,10 @@ void BroadPhase::search(int i, std::vector<IndexPair>& found) const {
 /// Into `out` by first index and then by second: a counting sort, and short insertions.
 void BroadPhase::sort_pairs(std::size_t count, std::vector<IndexPair>& out) {
     fill_.assign(count + 1, 0);
-    std::size_t all = 0;
-    for (const auto& found : found_) {
-        all += found.size();
-        for (const auto& [i, j] : found) ++fill_[i + 1];
-    }
+    for (const IndexPair& pair : found_) ++fill_[pair.first + 1];
     for (std::size_t k = 1; k <= count; ++k) fill_[k] += fill_[k - 1];
-    out.resize(all);
-    for (const auto& found : found_)
-        for (const auto& pair : found) out[fill_[pair.first]++] = pair;
+    out.resize(found_.size());
+    for (const IndexPair& pair : found_) out[fill_[pair.first]++] = pair;
     for (std::size_t i = 0, from = 0; i < count; ++i) {
         const auto to = static_cast<std::size_t>(fill_[i]);
         std::sort(out.begin() + static_cast<std::ptrdiff_t>(from),
@@ -231,7 +226,7 @@ void BroadPhase::find_partners(int i, std::vector<IndexPair>& found) const {
 }
 
 /// Brings the pairs up to date where few have escaped; false if all are to be searched for.
-bool BroadPhase::follow(Team* team) {
+bool BroadPhase::follow() {
     bool moved = false;
     has_escaped_.assign(fat_.size(), 0);
     for (const int i : escaped_) {
@@ -245,10 +240,8 @@ bool BroadPhase::follow(Team* team) {
     if (moved) fill_cells();
     const auto coarse = [this](int i) { return rows_below(i) > most_rows; };
     if (std::count_if(escaped_.begin(), escaped_.end(), coarse) > most_coarse) return false;
-    for (auto& found : found_) found.clear();
-    share_out(team, escaped_.size(), many, [&](int part, std::size_t begin, std::size_t end) {
-        for (std::size_t k = begin; k < end; ++k) find_partners(escaped_[k], found_[part]);
-    });
+    found_.clear();
+    for (const int i : escaped_) find_partners(i, found_);
     sort_pairs(fat_.size(), new_pairs_);
     std::erase_if(pairs_, [this](const IndexPair& pair) {
         return has_escaped_[pair.first] != 0 || has_escaped_[pair.second] != 0;
@@ -260,7 +253,7 @@ bool BroadPhase::follow(Team* team) {
 }
 
 /// Searches for all pairs.
-void BroadPhase::rebuild(Team* team) {
+void BroadPhase::rebuild() {
     const int count = static_cast<int>(fat_.size());
     size_ = choose_size();
     everywhere_.clear();
@@ -268,20 +261,17 @@ void BroadPhase::rebuild(Team* team) {
     for (int i = 0; i < count; ++i)
         if (place(static_cast<std::size_t>(i)) > most_levels) everywhere_.push_back(i);
     fill_cells();
-    for (auto& found : found_) found.clear();
-    share_out(team, fat_.size(), many, [&](int part, std::size_t begin, std::size_t end) {
-        for (std::size_t i = begin; i < end; ++i)
-            if (cells_[i].level >= 0) search(static_cast<int>(i), found_[part]);
-    });
+    found_.clear();
+    for (int i = 0; i < count; ++i)
+        if (cells_[i].level >= 0) search(i, found_);
     for (const int i : everywhere_)
         for (int j = 0; j < count; ++j)
             if (j != i && (j > i || cells_[j].level >= 0) && overlap(fat_[i], fat_[j]))
-                found_[0].emplace_back(std::min(i, j), std::max(i, j));
+                found_.emplace_back(std::min(i, j), std::max(i, j));
     sort_pairs(fat_.size(), pairs_);
 }
 
-void BroadPhase::overlapping_pairs(const std::vector<Bounds>& bounds, std::vector<IndexPair>& out,
-                                   Team* team) {
+void BroadPhase::overlapping_pairs(const std::vector<Bounds>& bounds, std::vector<IndexPair>& out) {
     out.clear();
     const int count = static_cast<int>(bounds.size());
     if (bounds.size() <= few) {
@@ -290,7 +280,6 @@ void BroadPhase::overlapping_pairs(const std::vector<Bounds>& bounds, std::vecto
                 if (overlap(bounds[i], bounds[j])) out.emplace_back(i, j);
         return;
     }
-    found_.resize(team != nullptr ? static_cast<std::size_t>(team->size()) : 1);
     const bool known = fat_.size() == bounds.size();
     if (known) {
         find_escaped(bounds);
@@ -299,8 +288,7 @@ void BroadPhase::overlapping_pairs(const std::vector<Bounds>& bounds, std::vecto
         size_ = choose_size();
         for (std::size_t i = 0; i < bounds.size(); ++i) fatten(i, bounds[i], 0.0);
     }
-    if (!known || escaped_.size() > bounds.size() / few_of || (!escaped_.empty() && !follow(team)))
-        rebuild(team);
+    if (!known || escaped_.size() > bounds.size() / few_of || (!escaped_.empty() && !follow())) rebuild();
     for (const IndexPair& pair : pairs_)
         if (overlap(bounds[pair.first], bounds[pair.second])) out.push_back(pair);
 }

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "collision/bounds.hpp"
-#include "run/team.hpp"
 
 namespace spook {
 
@@ -23,9 +22,8 @@ using IndexPair = std::pair<int, int>;
 class BroadPhase {
 public:
     /// Replaces `out` by all pairs (i, j), i < j, of overlapping bounds, in ascending order. Bounds with a coordinate
-    /// that is not a number overlap nothing. With a `team` many are searched for on all its threads.
-    void overlapping_pairs(const std::vector<Bounds>& bounds, std::vector<IndexPair>& out,
-                           Team* team = nullptr);
+    /// that is not a number overlap nothing.
+    void overlapping_pairs(const std::vector<Bounds>& bounds, std::vector<IndexPair>& out);
 
 private:
     struct Cell {
@@ -38,8 +36,8 @@ private:
     };
     void find_escaped(const std::vector<Bounds>& bounds);
     void fatten(std::size_t i, const Bounds& bounds, double out);
-    bool follow(Team* team);
-    void rebuild(Team* team);
+    bool follow();
+    void rebuild();
     double choose_size();
     static int level_of(double extent, double size) noexcept;
     Cell cell_at(const Bounds& b, int level) const noexcept;
@@ -62,11 +60,11 @@ private:
     double size_ = 1.0;                                  // of the cells of level 0, m
     std::uint32_t levels_ = 0;                           // those that hold something, a bit each
     std::vector<double> sorted_;
-    std::vector<int> everywhere_;                // those too large for any cell
-    std::vector<Cell> cells_;                    // of each
-    std::vector<Entry> entries_;                 // by bucket
-    std::vector<int> begin_, fill_;              // of buckets in entries_; of first indices in the result
-    std::vector<std::vector<IndexPair>> found_;  // by each thread
+    std::vector<int> everywhere_;    // those too large for any cell
+    std::vector<Cell> cells_;        // of each
+    std::vector<Entry> entries_;     // by bucket
+    std::vector<int> begin_, fill_;  // of buckets in entries_; of first indices in the result
+    std::vector<IndexPair> found_;
 };
 
 }  // namespace spook

@@ -106,7 +106,7 @@ const std::vector<IndexPair>& Detection::near(const std::vector<Pose>& bodies,
         const Collider::View c = collider(bounded_[k]);
         bounds_[k] = bounds(c.shape, poses_[bounded_[k]], margin[c.body]);
     }
-    broad_phase_.overlapping_pairs(bounds_, pairs_, team_);
+    broad_phase_.overlapping_pairs(bounds_, pairs_);
     std::size_t kept = 0;
     for (auto [p, q] : pairs_)
         if (may_touch(bounded_[p], bounded_[q])) pairs_[kept++] = {bounded_[p], bounded_[q]};

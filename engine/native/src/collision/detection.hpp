@@ -50,9 +50,6 @@ public:
     Detection(std::vector<Collider> colliders, const std::vector<char>& dynamic,
               const std::vector<IndexPair>& excluded);
 
-    /// From now on near() searches on all threads of a team: the pairs are the same. null: on one.
-    void help(Team* team) noexcept { team_ = team; }
-
     /// Whether any pair of colliders could ever touch; if not, the stage can be left out.
     bool possible() const noexcept { return possible_; }
 
@@ -121,7 +118,6 @@ private:
     std::vector<double> arms_;
     std::vector<Bounds> bounds_;
     BroadPhase broad_phase_;
-    Team* team_ = nullptr;
     std::vector<IndexPair> pairs_, on_planes_, near_;
 };
 

@@ -9,9 +9,8 @@ namespace spook {
 
 // broad_phase.cpp
 namespace tolerances::broad_phase {
-inline constexpr int most_levels = 31;    // what is larger than the cells of the last is compared with all
-inline constexpr std::size_t many = 512;  // worth several threads
-inline constexpr double furthest = 1e9;   // cells from the origin; what lies further counts as there
+inline constexpr int most_levels = 31;   // what is larger than the cells of the last is compared with all
+inline constexpr double furthest = 1e9;  // cells from the origin; what lies further counts as there
 inline constexpr double fatness =
     0.1;                             // of the cells of level 0: by so much bounds are enlarged on every side,
 inline constexpr double fast = 1.0;  //   but for those that got further out than this part of it in one call

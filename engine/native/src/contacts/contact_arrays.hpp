@@ -118,13 +118,13 @@ struct ContactArrays {
     ImpactArrays impact;
     // Of a solve:
     std::vector<FrictionPoint> friction;
-    std::vector<char> answered;                   // per row: the round before found it an answer
-    std::vector<char> pushes;                     // see shorten_unsettled()
-    std::vector<double> share;                    // per moving body
-    std::vector<EnergySums> sums;                 // by island
-    std::vector<Vec6> free_velocity;              // per moving body
-    std::vector<IndexPair> grazing;               // pairs, see skip_grazing()
-    std::vector<std::vector<std::size_t>> asked;  // open pairs to be judged, by each thread
+    std::vector<char> answered;       // per row: the round before found it an answer
+    std::vector<char> pushes;         // see shorten_unsettled()
+    std::vector<double> share;        // per moving body
+    std::vector<EnergySums> sums;     // by island
+    std::vector<Vec6> free_velocity;  // per moving body
+    std::vector<IndexPair> grazing;   // pairs, see skip_grazing()
+    std::vector<std::size_t> asked;   // open pairs to be judged
     // Which bodies are connected by rows of joints and points; where a solve is shortened.
     IslandFinder connected, shortened;
 };

@@ -60,7 +60,6 @@ bool ContactStage::reachable(const Contact& contact) const {
 bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6>& velocity,
                           const std::vector<Vec6>& free_velocity) {
     const std::size_t bodies = bodies_->count();
-    if (team_) team_->refresh();
     poses_ = poses;
     velocity_ = velocity;
     dv_ext_.resize(bodies);
@@ -149,17 +148,6 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
     const auto unmet = static_cast<std::ptrdiff_t>(open_.pairs.size());
     for (const Point& point : points_) known_.push_back(point.contact.key >> feature_bits);
     std::sort(known_.begin(), known_.end());
-    const auto separation_of = [this](const IndexPair& pair) {
-        return separation(detection_.collider(pair.first).shape, detection_.pose(pair.first),
-                          detection_.collider(pair.second).shape, detection_.pose(pair.second));
-    };
-    const bool shared = team_ && near.size() >= many_pairs;
-    if (shared) {
-        apart_.resize(near.size());
-        share_out(team_.get(), near.size(), many_pairs, [&](int, std::size_t begin, std::size_t end) {
-            for (std::size_t k = begin; k < end; ++k) apart_[k] = separation_of(near[k]);
-        });
-    }
     for (std::size_t k = 0; k < near.size(); ++k) {
         const IndexPair& pair = near[k];
         if (k + ahead < near.size()) {
@@ -171,7 +159,8 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
         const Collider::View first = detection_.collider(pair.first),
                              second = detection_.collider(pair.second);
         const double reach = margins_.search()[first.body] + margins_.search()[second.body];
-        const OpenPair open = opened(pair, shared ? apart_[k] : separation_of(pair));
+        const OpenPair open = opened(pair, separation(first.shape, detection_.pose(pair.first), second.shape,
+                                                      detection_.pose(pair.second)));
         const double size = std::max(bodies_->radius[first.body], bodies_->radius[second.body]);
         if (round_or_plane(first.shape) && round_or_plane(second.shape) && open.apart.gap > 1e-6 * size) {
             if (open.apart.gap <= reach)

@@ -1,57 +1,9 @@
 #include "contacts/contact_islands.hpp"
 
 #include <algorithm>
-#include <atomic>
-#include <optional>
 #include <span>
 
-#include "contacts/tolerances.hpp"
-#include "run/watch.hpp"
-
 namespace spook {
-
-namespace {
-
-using namespace tolerances::contact_islands;
-
-}  // namespace
-
-/// Islands one after the other; on several threads each takes the next one that no thread has.
-void IslandSolver::solve_all(const Solve& solve) {
-    const std::vector<Own*>& parts = open_parts_;
-    std::size_t rows = 0;
-    for (const Own* part : parts) rows += part->system.rows.size();
-    if (team == nullptr || parts.size() == 1 || rows < few_blocks) {
-        for (Own* part : parts) part->report = solve(part->system, part->points, part->solver);
-        return;
-    }
-    std::atomic<std::size_t> next{0};
-    std::atomic<bool> ended{false};
-    std::vector<std::exception_ptr>& thrown = thrown_;
-    thrown.assign(static_cast<std::size_t>(team->size()) + 1, nullptr);
-    const auto guarded = [&](std::size_t worker, const auto& work) noexcept {
-        try {
-            work();
-        } catch (...) {
-            if (!thrown[worker]) thrown[worker] = std::current_exception();
-            ended = true;
-        }
-    };
-    team->each(
-        [&](int index) {
-            guarded(static_cast<std::size_t>(index), [&] {
-                std::optional<Watch::Helper> helper;
-                if (index > 0) helper.emplace(ended);
-                for (std::size_t k = next++; k < parts.size() && !ended; k = next++)
-                    parts[k]->report = solve(parts[k]->system, parts[k]->points, parts[k]->solver);
-            });
-        },
-        [&] {
-            if (!ended) guarded(static_cast<std::size_t>(team->size()), [] { Watch::look(); });
-        });
-    for (const std::exception_ptr& what : thrown)
-        if (what) std::rethrow_exception(what);
-}
 
 IslandSolver::Own& IslandSolver::own_of(int first_body) {
     Own& own = own_[first_body];
@@ -161,7 +113,7 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
         if (!(*answered)[k])
             open_[islands.of_body[std::max(system.rows[k].first, system.rows[k].second)]] = 1;
     take_apart(system, islands, points);
-    solve_all(solve);
+    for (Own* part : open_parts_) part->report = solve(part->system, part->points, part->solver);
     FrictionReport sum;
     for (const Own* part : open_parts_) {
         const FrictionReport& report = part->report;

@@ -10,19 +10,17 @@
 #include "contacts/friction_direct.hpp"
 #include "contacts/islands.hpp"
 #include "contacts/tolerances.hpp"
-#include "run/team.hpp"
 
 namespace spook {
 
 /// Splits a system into its islands and solves each with a solver and arrays of its own, which are kept from solve to
-/// solve, and the solver's analysis as long as the island does not change. Equal input gives equal bits, on however many threads islands are shared out.
+/// solve, and the solver's analysis as long as the island does not change. Equal input gives equal bits.
 class IslandSolver {
 public:
     using Solve = std::function<FrictionReport(MixedSystem&, std::vector<FrictionPoint>&, DirectSolver&)>;
 
     double floor = 1e-12;
     int refinements = 1;
-    Team* team = nullptr;  // what else solves islands; `solve` must then be good for several at once
 
     /// Fills velocity, multipliers and points of `system`; the report sums rounds, pivots and iterations and takes the
     /// largest residual.
@@ -50,7 +48,6 @@ private:
     void take_apart(MixedSystem& system, const Islands& islands, std::vector<FrictionPoint>& points);
     void copy_rows(Own& own) const;
     void put_together(MixedSystem& system, const Islands& islands, std::vector<FrictionPoint>& points);
-    void solve_all(const Solve& solve);
 
     std::map<int, Own> own_;  // by the island's first body
     IslandFinder finder_;
@@ -59,7 +56,6 @@ private:
     std::vector<Own*> parts_, open_parts_;             // of each island, null where it is not; of those alone
     std::vector<int> place_, row_island_, row_place_;  // of bodies and rows in their island's part
     std::vector<std::size_t> next_;
-    std::vector<std::exception_ptr> thrown_;
 };
 
 }  // namespace spook

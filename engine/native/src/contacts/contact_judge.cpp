@@ -190,10 +190,8 @@ void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints, co
     }
     std::vector<Vec6>& free = arrays_.free_velocity;
     free = system.momentum;
-    share_out(team_.get(), bodies, many_bodies, [&](int, std::size_t begin, std::size_t end) {
-        for (std::size_t u = begin; u < end; ++u)
-            if (islands.of_body[u] >= 0) solve_six(factor_six(system.mass[u]), free[u]);
-    });
+    for (std::size_t u = 0; u < bodies; ++u)
+        if (islands.of_body[u] >= 0) solve_six(factor_six(system.mass[u]), free[u]);
     for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b) {
         const int u = bodies_->solver_index[b];
         if (u < 0 || islands.of_body[u] < 0) continue;

@@ -25,7 +25,6 @@ struct ContactOptions {
     int refinements = 1;
     ImpactOrder impacts = ImpactOrder::simultaneous;
     double unsettled_residual = 0.1;  // m/s; a solve that leaves more has no answer
-    int threads = 1;
 };
 
 struct ContactCounters {  // exact, equal on every machine

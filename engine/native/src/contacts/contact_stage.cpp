@@ -23,15 +23,10 @@ ContactStage::ContactStage(Detection detection, const std::vector<SurfaceMateria
       surfaces_(std::make_shared<ContactSurfaces>(materials)),
       options_(options),
       projector_(bodies_, surfaces_, options, std::move(yielding)) {
-    if (options.threads > 1) team_ = std::make_shared<Team>(options.threads);
     for (IslandSolver* solver : {&resting_solver_, &impact_solver_}) {
         solver->floor = options.floor;
         solver->refinements = options.refinements;
-        solver->team = team_.get();
     }
-    detection_.help(team_.get());
-    pgs_.help(team_.get());
-    projector_.help(team_.get());
     const std::size_t bodies = bodies_->count();
     depth_.assign(bodies, 0.0);
     predicted_sinking_.assign(bodies, 0.0);

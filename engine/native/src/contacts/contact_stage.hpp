@@ -63,7 +63,6 @@
 #include "contacts/step_contact.hpp"
 #include "contacts/supported_bodies.hpp"
 #include "linear/large_array.hpp"
-#include "run/team.hpp"
 
 namespace spook {
 
@@ -298,7 +297,6 @@ private:
 
     State state_;
     Detection detection_;
-    std::shared_ptr<Team> team_;  // of several threads, or none
     std::shared_ptr<ContactBodies> bodies_;
     std::shared_ptr<ContactSurfaces> surfaces_;
     ContactOptions options_;
@@ -322,12 +320,11 @@ private:
     SupportedBodies supported_;
     PointsOfBodies points_of_;
     ContactExtrasOf extras_;
-    std::vector<Separation> apart_;               // of pairs, found on several threads
-    std::vector<std::vector<Meeting>> meetings_;  // found by each thread
-    std::vector<MeetingOf> meetings_of_;          // by body and time
-    std::vector<IndexPair> near_;                 // where the search was widened
-    std::vector<double> depth_;                   // of a body's closed contacts, m
-    std::vector<double> predicted_sinking_;       // what unsettled iterations would add to it in the step, m
+    std::vector<Meeting> meetings_;
+    std::vector<MeetingOf> meetings_of_;     // by body and time
+    std::vector<IndexPair> near_;            // where the search was widened
+    std::vector<double> depth_;              // of a body's closed contacts, m
+    std::vector<double> predicted_sinking_;  // what unsettled iterations would add to it in the step, m
     std::vector<Contact> scratch_;
     DisjointSets connected_;  // bodies, by contacts and joints
     std::vector<std::uint64_t> known_;

@@ -56,50 +56,42 @@ Mover ContactStage::mover(int collider, const Pose& pose, const std::vector<Vec6
 /// Casts the open pairs along `velocity`; those that meet get points. Late impacts, after the solve, come too late
 /// for an impact: if they need one, late_impact_ tells so, see needs_plastic_impact().
 int ContactStage::find_impacts(const std::vector<Vec6>& velocity, bool late) {
-    meetings_.resize(team_ ? static_cast<std::size_t>(team_->size()) : 1);
-    for (auto& meetings : meetings_) meetings.clear();
+    meetings_.clear();
     if (bodies_->swings && !open_.pairs.empty()) points_of_.find(points_, *bodies_);
     open_.drop_met(most_met);
-    arrays_.asked.resize(meetings_.size());
-    share_out(team_.get(), open_.pairs.size(), many_pairs, [&](int part, std::size_t begin, std::size_t end) {
-        std::vector<std::size_t>& asked = arrays_.asked[part];
-        asked.resize(end - begin + 1);
-        std::size_t count = 0;
-        for (std::size_t k = begin; k < end; ++k) {  // the others were judged before
-            asked[count] = k;
-            count += !late || (changed_[open_.bodies[k].first] | changed_[open_.bodies[k].second]) != 0;
+    std::vector<std::size_t>& asked = arrays_.asked;
+    asked.resize(open_.pairs.size() + 1);
+    std::size_t count = 0;
+    for (std::size_t k = 0; k < open_.pairs.size(); ++k) {  // the others were judged before
+        asked[count] = k;
+        count += !late || (changed_[open_.bodies[k].first] | changed_[open_.bodies[k].second]) != 0;
+    }
+    const std::size_t all = std::exchange(count, 0);
+    for (std::size_t at = 0; at < all; ++at) {  // nearly all pass: the others are gathered first
+        asked[count] = asked[at];
+        const OpenPair& open = open_.pairs[asked[at]];
+        count += !open.has_met() && !passes(open, velocity);
+    }
+    for (std::size_t at = 0; at < count; ++at) {
+        if (at + ahead < count) {
+            const OpenPair& later = open_.pairs[asked[at + ahead]];
+            for (const int body : {later.first, later.second})
+                prefetch(poses_[body]), prefetch(dv_ext_[body]);
         }
-        const std::size_t all = std::exchange(count, 0);
-        for (std::size_t at = 0; at < all; ++at) {  // nearly all pass: the others are gathered first
-            asked[count] = asked[at];
-            const OpenPair& open = open_.pairs[asked[at]];
-            count += !open.has_met() && !passes(open, velocity);
-        }
-        for (std::size_t at = 0; at < count; ++at) {
-            if (at + ahead < count) {
-                const OpenPair& later = open_.pairs[asked[at + ahead]];
-                for (const int body : {later.first, later.second})
-                    prefetch(poses_[body]), prefetch(dv_ext_[body]);
-            }
-            if (end - begin == open_.pairs.size() && (at + 1) % pairs_a_look == 0)
-                Watch::look();  // on one thread
-            if (const double time = meeting(open_.pairs[asked[at]], velocity, late); !(time < 0.0))
-                meetings_[part].push_back({asked[at], time});
-        }
-    });
-    std::vector<Meeting>& all = meetings_[0];
-    for (std::size_t part = 1; part < meetings_.size(); ++part)
-        all.insert(all.end(), meetings_[part].begin(), meetings_[part].end());
-    remove_occluded(all, velocity);
+        if ((at + 1) % pairs_a_look == 0) Watch::look();
+        if (const double time = meeting(open_.pairs[asked[at]], velocity, late); !(time < 0.0))
+            meetings_.push_back({asked[at], time});
+    }
+    remove_occluded(meetings_, velocity);
     int found = 0;
-    for (std::size_t at = 0; at < all.size(); ++at) {
-        if (at + ahead < all.size()) {
-            const OpenPair& later = open_.pairs[all[at + ahead].open];
+    for (std::size_t at = 0; at < meetings_.size(); ++at) {
+        if (at + ahead < meetings_.size()) {
+            const OpenPair& later = open_.pairs[meetings_[at + ahead].open];
             prefetch(detection_.pose(later.pair.first)), prefetch(detection_.pose(later.pair.second));
             for (const int body : {later.first, later.second})
                 prefetch(poses_[body]), prefetch(velocity[body]);
         }
-        const auto& [k, time] = all[at];
+        const auto& [k, time] = meetings_[at];
         OpenPair& open = open_.pairs[k];
         if (late && add_toi_point_at_start(open, time, velocity)) {
             open_.meet(open);

@@ -76,13 +76,10 @@ void PgsSolver::begin(MixedSystem& system, FrictionModel model) {
     active_.assign(bodies_ + 1, 0);
     limit_reached_.assign(bodies_ + 1, 0);
     last_change_.assign(bodies_ + 1, 0.0);
-    parts_.resize(team_ != nullptr ? static_cast<std::size_t>(team_->size()) : 1);
-    for (Part& part : parts_) {
-        part.change.assign(bodies_ + 1, 0.0);
-        part.touched.clear();
-        part.touched.reserve(bodies_);
-        part.none.first = part.none.second = bodies_;
-    }
+    change_.assign(bodies_ + 1, 0.0);
+    moved_.clear();
+    moved_.reserve(bodies_);
+    none_.first = none_.second = bodies_;
     bodies_of_.clear();
     roots_.clear();
     known_.assign(bodies_ + 1, 0);
@@ -135,8 +132,8 @@ int PgsSolver::add(const PgsContact& given) {
         add_slip(given, place);
     if (c.impulse[0] != 0.0 || c.impulse[1] != 0.0 || c.impulse[2] != 0.0) push(c, impulse);
     activate(c.first, c.second);
-    touch(parts_[0], c.first);
-    touch(parts_[0], c.second);
+    touch(c.first);
+    touch(c.second);
     return contact;
 }
 

@@ -77,7 +77,7 @@ void PgsSolver::fetch(const Scheduled& later, const Scheduled& soon) const noexc
 }
 
 void PgsSolver::activate(int first, int second) noexcept {
-    if (marked_ && !marking_) marked_ = false;  // threads only read it
+    if (!marking_) marked_ = false;
     for (const int body : {first, second}) {
         if (body == bodies_ || (active_bodies_[body] & active_now) != 0) continue;
         active_bodies_[body] |= active_now;
@@ -85,25 +85,25 @@ void PgsSolver::activate(int first, int second) noexcept {
     }
 }
 
-void PgsSolver::touch(Part& part, int body) noexcept {
+void PgsSolver::touch(int body) noexcept {
     if (body == bodies_ || touched_[body] != 0) return;
     touched_[body] = 1;
-    part.touched.push_back(body);  // has room for all
+    moved_.push_back(body);  // has room for all
 }
 
-void PgsSolver::note(Part& part, const Scheduled& scheduled, double change, double focus) noexcept {
-    part.change[scheduled.island] = larger(part.change[scheduled.island], change);
+void PgsSolver::note(const Scheduled& scheduled, double change, double focus) noexcept {
+    change_[scheduled.island] = larger(change_[scheduled.island], change);
     if (!limit_reached_[scheduled.island] || change == 0.0) return;
-    touch(part, scheduled.first);
-    touch(part, scheduled.second);
+    touch(scheduled.first);
+    touch(scheduled.second);
     if (!(change <= focus)) activate(scheduled.first, scheduled.second);
 }
 
 /// Up to four contacts that share no moving body.
-void PgsSolver::solve(Part& part, const Scheduled* const group[4], int size, double focus) noexcept {
+void PgsSolver::solve(const Scheduled* const group[4], int size, double focus) noexcept {
     const auto contact = [&](int k) { return static_cast<std::size_t>(group[k]->item - joint_count_); };
     if (size > 1 && boxes_.empty()) {
-        PackedContact* four[4] = {&part.none, &part.none, &part.none, &part.none};
+        PackedContact* four[4] = {&none_, &none_, &none_, &none_};
         const PackedFriction* slips[4] = {&no_slip_, &no_slip_, &no_slip_, &no_slip_};
         const PackedExtras* extras[4] = {&no_extras_, &no_extras_, &no_extras_, &no_extras_};
         double change[4];
@@ -114,14 +114,14 @@ void PgsSolver::solve(Part& part, const Scheduled* const group[4], int size, dou
         }
         solve_four()({four, slips_.empty() ? nullptr : slips, extras_.empty() ? nullptr : extras,
                       joints_.bodies().data(), round_ ? nullptr : inertia_.data(), bodies_, change});
-        for (int k = 0; k < size; ++k) note(part, *group[k], change[k], focus);
+        for (int k = 0; k < size; ++k) note(*group[k], change[k], focus);
     } else {
-        for (int k = 0; k < size; ++k) note(part, *group[k], update(contact(k)), focus);
+        for (int k = 0; k < size; ++k) note(*group[k], update(contact(k)), focus);
     }
 }
 
 /// A piece of a level whose contacts are all due.
-void PgsSolver::solve_all(Part& part, std::size_t begin, std::size_t end, double focus) noexcept {
+void PgsSolver::solve_all(std::size_t begin, std::size_t end, double focus) noexcept {
     const std::size_t last = scheduled().size();
     for (std::size_t place = begin; place < end; place += 4) {
         const int size = static_cast<int>(std::min<std::size_t>(4, end - place));
@@ -131,14 +131,14 @@ void PgsSolver::solve_all(Part& part, std::size_t begin, std::size_t end, double
             if (place + k + contacts_ahead < last)
                 fetch(scheduled()[place + k + contacts_ahead], scheduled()[place + k + bodies_ahead]);
         }
-        solve(part, group, size, focus);
+        solve(group, size, focus);
     }
-    part.updated += end - begin;
+    counts_.updated += end - begin;
 }
 
 /// A piece of a level some of whose contacts are scheduled: those of active islands, of those at their limit those of active bodies.
-void PgsSolver::solve_scheduled(Part& part, std::size_t begin, std::size_t end, double focus) noexcept {
-    part.picked.resize(end - begin + 1);
+void PgsSolver::solve_scheduled(std::size_t begin, std::size_t end, double focus) noexcept {
+    picked_.resize(end - begin + 1);
     std::size_t picked = 0;
     for (std::size_t place = begin; place < end; ++place) {
         const Scheduled& scheduled = this->scheduled()[place];
@@ -147,25 +147,24 @@ void PgsSolver::solve_scheduled(Part& part, std::size_t begin, std::size_t end, 
         const bool asked =
             active &&
             (!limit_reached || (active_bodies_[scheduled.first] | active_bodies_[scheduled.second]) != 0);
-        part.picked[picked] = &scheduled;
+        picked_[picked] = &scheduled;
         picked += asked;
-        part.seen += active && limit_reached;
-        part.active_done += asked && limit_reached;
-        part.updated += asked && !limit_reached;
+        counts_.seen += active && limit_reached;
+        counts_.active_done += asked && limit_reached;
+        counts_.updated += asked && !limit_reached;
     }
-    solve_picked(part, picked, focus);
+    solve_picked(picked, focus);
 }
 
 /// Those that were picked from a level, four at once.
-void PgsSolver::solve_picked(Part& part, std::size_t picked, double focus) noexcept {
-    for (std::size_t k = 0; k < std::min(picked, contacts_ahead); ++k)
-        fetch(*part.picked[k], *part.picked[k]);
+void PgsSolver::solve_picked(std::size_t picked, double focus) noexcept {
+    for (std::size_t k = 0; k < std::min(picked, contacts_ahead); ++k) fetch(*picked_[k], *picked_[k]);
     for (std::size_t k = 0; k < picked; k += 4) {
         const std::size_t size = std::min<std::size_t>(4, picked - k);
         for (std::size_t ahead = k + contacts_ahead; ahead < std::min(picked, k + contacts_ahead + 4);
              ++ahead)
-            fetch(*part.picked[ahead], *part.picked[ahead]);
-        solve(part, &part.picked[k], static_cast<int>(size), focus);
+            fetch(*picked_[ahead], *picked_[ahead]);
+        solve(&picked_[k], static_cast<int>(size), focus);
     }
 }
 
@@ -173,12 +172,11 @@ void PgsSolver::solve_picked(Part& part, std::size_t picked, double focus) noexc
 void PgsSolver::iterate_active(double focus) {
     if (!marked_) mark_active();
     else marked_now_.swap(marked_next_), std::fill(marked_next_.begin(), marked_next_.end(), 0);
-    Part& part = parts_[0];
-    for (const int island : roots_) part.seen += active_[island] ? size_[island] : 0;
+    for (const int island : roots_) counts_.seen += active_[island] ? size_[island] : 0;
     marking_ = true;
     std::size_t begin = 0;
     for (const std::size_t end : level_end_) {
-        part.picked.resize(end - begin + 1);
+        picked_.resize(end - begin + 1);
         std::size_t picked = 0;
         for (std::size_t word = begin / 64; 64 * word < end; ++word) {
             std::uint64_t bits = marked_now_[word];
@@ -187,12 +185,12 @@ void PgsSolver::iterate_active(double focus) {
             for (; bits != 0; bits &= bits - 1) {
                 const Scheduled& scheduled =
                     order_[64 * word + static_cast<std::size_t>(std::countr_zero(bits))];
-                part.picked[picked] = &scheduled;
+                picked_[picked] = &scheduled;
                 picked += active_[scheduled.island] != 0;
             }
         }
-        part.active_done += picked;
-        solve_picked(part, picked, focus);
+        counts_.active_done += picked;
+        solve_picked(picked, focus);
         begin = end;
     }
     marking_ = false;
@@ -206,19 +204,16 @@ void PgsSolver::iterate(double focus) noexcept {
         all = all && active_[island];
         any_at_limit = any_at_limit || (active_[island] && limit_reached_[island]);
     }
-    for (Part& part : parts_) {
-        part.updated = part.seen = part.active_done = 0;
-        for (const int island : roots_) part.change[island] = 0.0;
-    }
+    counts_ = {};
+    for (const int island : roots_) change_[island] = 0.0;
     for (int item = 0; item < joint_count_; ++item) {
         const auto [first, second] = bodies_of_[item];
         if (std::min(first, second) == bodies_) continue;
         const int island = root(std::min(first, second));
         if (!active_[island]) continue;
-        ++(limit_reached_[island] ? parts_[0].seen : parts_[0].updated);
-        parts_[0].active_done += limit_reached_[island] != 0;
-        note(parts_[0], {item, first, second, island}, joints_.update_joint(static_cast<std::size_t>(item)),
-             focus);
+        ++(limit_reached_[island] ? counts_.seen : counts_.updated);
+        counts_.active_done += limit_reached_[island] != 0;
+        note({item, first, second, island}, joints_.update_joint(static_cast<std::size_t>(item)), focus);
     }
     const bool plain = all && !any_at_limit;
     const bool all_at_limit = std::all_of(roots_.begin(), roots_.end(), [this](int island) {
@@ -226,36 +221,18 @@ void PgsSolver::iterate(double focus) noexcept {
     });
     for (const int island : roots_)
         all_touched_ = all_touched_ || (active_[island] && !limit_reached_[island]);
-    const auto piece = [&](Part& part, std::size_t begin, std::size_t end) {
-        if (plain) solve_all(part, begin, end, focus);
-        else solve_scheduled(part, begin, end, focus);
-    };
-    const std::size_t wide = parts_.size() * (any_at_limit ? narrow_scheduled : narrow);
-    const bool worth = parts_.size() > 1 && scheduled().size() > 2 * wide * scheduled_end().size() / 3;
-    if (!worth && all_at_limit) {
+    if (all_at_limit) {
         iterate_active(focus);
-    } else if (!worth) {
-        marked_ = false;
-        std::size_t place = 0;
-        for (const std::size_t end : scheduled_end()) piece(parts_[0], std::exchange(place, end), end);
     } else {
         marked_ = false;
-        // Narrow levels are the first thread's; the others wait for it where a wide one comes next.
-        team_->each([&](int index) {
-            Part& part = parts_[index];
-            const std::vector<std::size_t>& ends = scheduled_end();
-            for (std::size_t level = 0; level < ends.size(); ++level) {
-                const std::size_t begin = level == 0 ? 0 : ends[level - 1], end = ends[level];
-                const bool shared = end - begin >= wide;
-                const auto [from, to] = shared ? team_->share(index, begin, end, 4) : std::pair{begin, end};
-                if (shared || index == 0) piece(part, from, to);
-                if (shared || (level + 1 < ends.size() && ends[level + 1] - end >= wide)) team_->meet();
-            }
-        });
+        std::size_t begin = 0;
+        for (const std::size_t end : scheduled_end()) {
+            if (plain) solve_all(begin, end, focus);
+            else solve_scheduled(begin, end, focus);
+            begin = end;
+        }
     }
-    std::size_t updated = 0, seen = 0, active_done = 0;
-    for (const Part& part : parts_)
-        updated += part.updated, seen += part.seen, active_done += part.active_done;
+    const auto [updated, seen, active_done] = counts_;
     done_ += static_cast<double>(updated + active_done) + skip_cost * static_cast<double>(seen - active_done);
     // Lists of what has settled are not read for long.
     if (static_cast<double>(updated + seen) < few_left * static_cast<double>(scheduled().size())) select();
@@ -279,8 +256,7 @@ FrictionReport PgsSolver::run(int iterations, double tolerance, double focus,
         for (const int island : roots_) {
             if (!active_[island]) continue;
             const bool limit_reached = limit_reached_[island] != 0;
-            double change = 0.0;
-            for (const Part& part : parts_) change = larger(change, part.change[island]);
+            const double change = change_[island];
             last_change_[island] = limit_reached ? larger(last_change_[island], change) : change;
             ++report.pgs_iterations;
             active_[island] = !(change <= (limit_reached ? focus : tolerance));
@@ -323,10 +299,8 @@ RowsResidual PgsSolver::worst(double focus, double allowed) {
     done_ += residual_cost * static_cast<double>(bodies_of_.size());
     all_touched_ = all_touched_ || joint_count_ > 0;  // whose rows may have moved others
     find_residuals();
-    for (Part& part : parts_) {
-        for (const int body : part.touched) touched_[body] = 0;
-        part.touched.clear();
-    }
+    for (const int body : moved_) touched_[body] = 0;
+    moved_.clear();
     all_touched_ = false;
     RowsResidual worst{0.0, -1};
     off_.clear();
@@ -359,18 +333,13 @@ RowsResidual PgsSolver::worst(double focus, double allowed) {
 void PgsSolver::find_residuals() {
     residual_.resize(contacts_.size());
     if (all_touched_) {
-        share_out(team_, contacts_.size(), worth_threads, [this](int, std::size_t begin, std::size_t end) {
-            for (std::size_t k = begin; k < end; ++k) residual_[k] = residual_of(k);
-        });
+        for (std::size_t k = 0; k < contacts_.size(); ++k) residual_[k] = residual_of(k);
     } else {
-        share_out(team_, order_.size(), worth_threads, [this](int, std::size_t begin, std::size_t end) {
-            for (std::size_t k = begin; k < end; ++k) {
-                const Scheduled& scheduled = order_[k];
-                const auto contact = static_cast<std::size_t>(scheduled.item - joint_count_);
-                if (touched_[scheduled.first] != 0 || touched_[scheduled.second] != 0)
-                    residual_[contact] = residual_of(contact);
-            }
-        });
+        for (const Scheduled& scheduled : order_) {
+            const auto contact = static_cast<std::size_t>(scheduled.item - joint_count_);
+            if (touched_[scheduled.first] != 0 || touched_[scheduled.second] != 0)
+                residual_[contact] = residual_of(contact);
+        }
     }
 }
 

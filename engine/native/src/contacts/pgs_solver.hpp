@@ -12,7 +12,6 @@
 #include "linear/disjoint_sets.hpp"
 #include "linear/large_array.hpp"
 #include "linear/vec.hpp"
-#include "run/team.hpp"
 
 namespace spook {
 
@@ -35,13 +34,10 @@ struct PgsContact {
 /// serves all three rows, their own 3×3 part of C M⁻¹ Cᵀ carries the normal's change over to the tangents.
 /// Islands are updated until they have settled, each for itself. Contacts may be added between iterations, so that a pair
 /// that meets only because of this step's impulses has its rows in the same solve; islands then grow together.
-/// Rows are updated in the order they were given, or in an equivalent order with the same bits: four at once, and on several
-/// threads, where they share no body. Equal input gives equal bits, whatever the number of threads. Memory is kept.
+/// Rows are updated in the order they were given, or in an equivalent order with the same bits: four at once, where they share
+/// no body. Equal input gives equal bits. Memory is kept.
 class PgsSolver {
 public:
-    /// From now on contacts that share no body are updated on as many threads: the bits are the same. null: on one.
-    void help(Team* team) noexcept { team_ = team; }
-
     /// Takes mass, momentum and the rows of joints; no contacts yet. Masses are blocks: m·1 and the inertia.
     void start(MixedSystem& system, FrictionModel model);
     /// The same, with the masses that `other` was started with; each change of a normal impulse is `relaxation` times what
@@ -74,8 +70,7 @@ public:
         if (all_touched_ || joint_count_ > 0)
             for (int body = 0; body < bodies_; ++body) visit(body);
         else
-            for (const Part& part : parts_)
-                for (const int body : part.touched) visit(body);
+            for (const int body : moved_) visit(body);
     }
     const double* impulse(int contact) const noexcept { return contacts_[place_[contact]].impulse; }
     /// Multipliers of joints, and all velocities.
@@ -116,29 +111,26 @@ private:
     void mark(int body) noexcept;
     void mark_active();
     void iterate_active(double focus);
-    /// What one thread counts and keeps while it iterates.
-    struct alignas(64) Part {
-        std::size_t updated = 0, seen = 0,
-                    active_done =
-                        0;  // of fresh islands; of those at their limit; those of them that were updated
-        std::vector<double> change;  // by root
-        std::vector<const Scheduled*> picked;
-        std::vector<int> touched;  // bodies, see touched_
-        PackedContact none{};      // fills a group
-    };
-    void touch(Part& part, int body) noexcept;
-    void note(Part& part, const Scheduled& scheduled, double change, double focus) noexcept;
-    void solve(Part& part, const Scheduled* const group[4], int size, double focus) noexcept;
-    void solve_all(Part& part, std::size_t begin, std::size_t end, double focus) noexcept;
-    void solve_scheduled(Part& part, std::size_t begin, std::size_t end, double focus) noexcept;
-    void solve_picked(Part& part, std::size_t picked, double focus) noexcept;
+    void touch(int body) noexcept;
+    void note(const Scheduled& scheduled, double change, double focus) noexcept;
+    void solve(const Scheduled* const group[4], int size, double focus) noexcept;
+    void solve_all(std::size_t begin, std::size_t end, double focus) noexcept;
+    void solve_scheduled(std::size_t begin, std::size_t end, double focus) noexcept;
+    void solve_picked(std::size_t picked, double focus) noexcept;
     void iterate(double focus) noexcept;
     void relax_no_more();
     void find_residuals();
     double residual_of(std::size_t contact) const noexcept;
 
-    Team* team_ = nullptr;
-    std::vector<Part> parts_;
+    struct
+        Counts {  // of an iteration: items updated of fresh islands; of those at their limit seen, and updated
+        std::size_t updated = 0, seen = 0, active_done = 0;
+    };
+    Counts counts_;
+    std::vector<double> change_;  // by root
+    std::vector<const Scheduled*> picked_;
+    std::vector<int> moved_;  // bodies, see touched_
+    PackedContact none_{};    // fills a group
     FrictionModel model_ = FrictionModel::cone;
     PgsRows joints_;
     int joint_count_ = 0, bodies_ = 0;

@@ -27,11 +27,6 @@ PositionProjector::PositionProjector(std::shared_ptr<const ContactBodies> bodies
     solver_.refinements = options.refinements;
 }
 
-void PositionProjector::help(Team* team) noexcept {
-    solver_.team = team;
-    pgs_.help(team);
-}
-
 void PositionProjector::begin_step() {
     for (std::vector<char>* flags : {&projection_.grounded, &projection_.externally_driven, &far_islands_})
         flags->reserve(bodies_->count());

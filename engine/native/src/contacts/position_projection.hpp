@@ -31,7 +31,6 @@ public:
     PositionProjector(std::shared_ptr<const ContactBodies> bodies,
                       std::shared_ptr<const ContactSurfaces> surfaces, const ContactOptions& options,
                       std::vector<char> yielding);
-    void help(Team* team) noexcept;
     /// Makes room, or there would be none in a copy: there may be as many islands as bodies, however late in a run.
     void begin_step();
 

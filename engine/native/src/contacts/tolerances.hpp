@@ -49,9 +49,7 @@ inline constexpr double vanishing = 1e-8;  // a direction so steep on the surfac
 
 // Read by several parts
 inline constexpr double closed = 1e-9;  // gaps up to this part of the larger body's radius count as closed
-inline constexpr unsigned pairs_a_look = 256;    // of shapes, between two looks at the clock
-inline constexpr std::size_t many_pairs = 512;   // of them: worth several threads
-inline constexpr std::size_t many_bodies = 512;  // the same
+inline constexpr unsigned pairs_a_look = 256;  // of shapes, between two looks at the clock
 
 // contact_impact.cpp
 namespace tolerances::contact_impact {
@@ -66,11 +64,6 @@ inline constexpr double left = 1e-16;      // of the fastest row: a give that is
 inline constexpr double broken = 1e-6;     // of the fastest row: what a row may be short of
 inline constexpr double tolerated = 1e-9;  // of the fastest row: a give that need not be told
 }  // namespace tolerances::contact_impact
-
-// contact_islands.cpp
-namespace tolerances::contact_islands {
-inline constexpr std::size_t few_blocks = 48;  // blocks in all: not worth other threads
-}
 
 // Read by several parts
 inline constexpr std::size_t few_rows = 24;  // blocks: so many are solved directly at little cost
@@ -187,10 +180,6 @@ inline constexpr int late_rounds = 3;            // of iterations for contacts f
 inline constexpr double skip_cost = 1.0 / 16.0;  // of what iterating a contact costs: to see that it is cold
 inline constexpr double residual_cost = 0.5;     // the same: to see how far off it is
 inline constexpr std::size_t bodies_ahead = 6, contacts_ahead = 12;  // asked for while others are updated
-inline constexpr std::size_t narrow =
-    32;  // contacts of a level for each thread: fewer are not worth to wait for
-inline constexpr std::size_t narrow_scheduled = 96;  // the same where only some of them are scheduled
-inline constexpr std::size_t worth_threads = 512;    // contacts, where nothing is waited for
 inline constexpr double few_off =
     1.0 / 16.0;                           // of the contacts are further off than the next iterations care for
 inline constexpr double nearly = 0.9;     // of what is allowed: then they care for what is that far off

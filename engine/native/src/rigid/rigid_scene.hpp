@@ -150,7 +150,6 @@ struct RigidMethod {
     ImpactOrder impacts = ImpactOrder::simultaneous;
     double unsettled_residual = 0.1;              // m/s
     double sleep_speed = 0.0, sleep_after = 0.5;  // m/s, s: what is slower for so long sleeps; 0: none
-    int threads = 1;                              // of the contact stage
     int composition = 2;                // order; above 2 a symmetric composition of constrained steps
     bool string_stiffness = false;      // the geometric stiffness of loaded joints, implicitly
     bool half_step_velocities = false;  // velocities live at mid-step

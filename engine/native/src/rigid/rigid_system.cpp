@@ -110,12 +110,11 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
         }
         const SolverKind solver =
             stages_.runs(Stage::solve_iterative) ? SolverKind::iterative : SolverKind::direct;
-        fresh_contacts_.emplace(Detection(scene.colliders, dynamic, scene.no_contact), materials,
-                                solver_index_,
-                                ContactOptions{h_, method_.friction, solver, method_.iterations,
-                                               method_.residual_tolerance, method_.floor, method_.refinements,
-                                               method_.impacts, method_.unsettled_residual, method_.threads},
-                                joint_pairs, yielding);
+        fresh_contacts_.emplace(
+            Detection(scene.colliders, dynamic, scene.no_contact), materials, solver_index_,
+            ContactOptions{h_, method_.friction, solver, method_.iterations, method_.residual_tolerance,
+                           method_.floor, method_.refinements, method_.impacts, method_.unsettled_residual},
+            joint_pairs, yielding);
         for (const JointBlock& block : joints_.blocks())
             for (const int body : {block.first, block.second})
                 if (body >= 0 && joints_.may_stop(block)) fresh_contacts_->leave_at_start(body);

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <ctime>
 
@@ -62,27 +61,7 @@ public:
 
     static void look() {
         if (current_ != nullptr && current_->over()) throw Stopped{};
-        if (Helper::ended_ != nullptr && Helper::ended_->load(std::memory_order_relaxed)) throw Stopped{};
     }
-
-    /// While it lives, look() in this thread, which helps another one's run, ends with that run's work.
-    class Helper {
-    public:
-        explicit Helper(const std::atomic<bool>& ended) noexcept {
-            ended_ = &ended;
-            between_pieces = look;
-        }
-        ~Helper() {
-            ended_ = nullptr;
-            between_pieces = nullptr;
-        }
-        Helper(const Helper&) = delete;
-        Helper& operator=(const Helper&) = delete;
-
-    private:
-        friend class Watch;
-        static inline thread_local const std::atomic<bool>* ended_ = nullptr;
-    };
 
 private:
     using Clock = std::chrono::steady_clock;
