@@ -80,8 +80,7 @@ class Wire:
 
     With `friction` µ, one number or one for each point between the ends, it rubs where it bends: the pulls before and
     behind differ by at most e^(µφ), φ the angle of the bend and of `turns` whole turns more, as on a bollard. Then the
-    tension is that of its first part. Where surfaces touch, or the solver is iterative, friction follows the pull of
-    the step before.
+    tension is that of its first part. Where surfaces touch, friction follows the pull of the step before.
 
     `wound` are drums at its last end, each a hinge and a radius [m]: a radian of the hinge winds in the radius, less
     than zero lets out. A motor of the hinge makes it a winch.

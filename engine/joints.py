@@ -203,7 +203,7 @@ class AxialJoint(Joint):
 
     `friction` [N or N m] holds the coordinate at rest as far as it reaches, and brakes it where it moves, beside whatever
     drives it. `load_friction` adds its product with the force [N] that the joint's own rows hold: µ of a slide, µ times
-    the radius of an axle. Where surfaces touch, or the solver is iterative, that part follows the load of the step before.
+    the radius of an axle. Where surfaces touch, that part follows the load of the step before.
     """
 
     axis: Vector = (0.0, 0.0, 1.0)

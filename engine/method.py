@@ -129,7 +129,7 @@ class Method:
             refuse("substeps", "a whole number from 1")
         if not one_of(self.composition, ("none", "order4", "order6", "order8")):
             refuse("composition", "none, order4, order6 or order8")
-        if self.solver == FORMER_SOLVER:
+        if isinstance(self.solver, str) and self.solver == FORMER_SOLVER:
             warnings.warn(FORMER, DeprecationWarning, stacklevel=3)
             object.__setattr__(self, "solver", "direct")
         if not one_of(self.solver, ("direct", "iterative")):

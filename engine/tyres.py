@@ -25,8 +25,8 @@ class Tyre:
         sliding   (F_x/µ_x)² + (F_y/µ_y)² <= N², `friction` one µ or the two of them; beyond, both in the ratio they had
 
     There is no camber thrust, no aligning torque and no relaxation length. Below a millimetre a second it creeps. The
-    force that is observed is that on the wheel at the footprint. Where surfaces touch, or the solver is iterative, the
-    bound of sliding is that of the step before.
+    force that is observed is that on the wheel at the footprint. Where surfaces touch, the bound of sliding is that of
+    the step before.
     """
 
     rows: ClassVar[int] = 3

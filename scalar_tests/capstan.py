@@ -339,7 +339,7 @@ TEST = ScalarTest(
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480)),
             configurations=(
                 Configuration(name="plain", method=PLAIN, expected_order=1.0),
-                Configuration(name="4 substeps", method=Method(substeps=4), expected_order=1.0),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
             ),
             error=ladder_error,
             run=ladder_run,

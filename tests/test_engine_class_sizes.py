@@ -12,8 +12,8 @@ SOURCES = Path(__file__).parent.parent / "engine/native/src"
 MOST_MEMBERS, MOST_METHODS = 30, 40
 LARGER = {  # members and methods of those that are over: lower a number that has become smaller
     "contacts/ConeFour": (37, 4),
-    "contacts/ContactStage": (59, 111),
-    "contacts/PgsSolver": (49, 44),
+    "contacts/ContactStage": (57, 111),
+    "contacts/PgsSolver": (48, 42),
     "contacts/PivotSolver": (32, 14),
     "particles/ParticleSystem": (17, 46),
     "rigid/JointSet": (15, 53),

@@ -76,10 +76,10 @@ void PgsSolver::begin(MixedSystem& system, FrictionModel model) {
     active_.assign(bodies_ + 1, 0);
     limit_reached_.assign(bodies_ + 1, 0);
     last_change_.assign(bodies_ + 1, 0.0);
-    change_.assign(bodies_ + 1, 0.0);
-    moved_.clear();
-    moved_.reserve(bodies_);
-    none_.first = none_.second = bodies_;
+    now_.change.assign(bodies_ + 1, 0.0);
+    now_.moved.clear();
+    now_.moved.reserve(bodies_);
+    now_.none.first = now_.none.second = bodies_;
     bodies_of_.clear();
     roots_.clear();
     known_.assign(bodies_ + 1, 0);

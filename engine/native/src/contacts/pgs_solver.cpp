@@ -88,11 +88,11 @@ void PgsSolver::activate(int first, int second) noexcept {
 void PgsSolver::touch(int body) noexcept {
     if (body == bodies_ || touched_[body] != 0) return;
     touched_[body] = 1;
-    moved_.push_back(body);  // has room for all
+    now_.moved.push_back(body);  // has room for all
 }
 
 void PgsSolver::note(const Scheduled& scheduled, double change, double focus) noexcept {
-    change_[scheduled.island] = larger(change_[scheduled.island], change);
+    now_.change[scheduled.island] = larger(now_.change[scheduled.island], change);
     if (!limit_reached_[scheduled.island] || change == 0.0) return;
     touch(scheduled.first);
     touch(scheduled.second);
@@ -103,7 +103,7 @@ void PgsSolver::note(const Scheduled& scheduled, double change, double focus) no
 void PgsSolver::solve(const Scheduled* const group[4], int size, double focus) noexcept {
     const auto contact = [&](int k) { return static_cast<std::size_t>(group[k]->item - joint_count_); };
     if (size > 1 && boxes_.empty()) {
-        PackedContact* four[4] = {&none_, &none_, &none_, &none_};
+        PackedContact* four[4] = {&now_.none, &now_.none, &now_.none, &now_.none};
         const PackedFriction* slips[4] = {&no_slip_, &no_slip_, &no_slip_, &no_slip_};
         const PackedExtras* extras[4] = {&no_extras_, &no_extras_, &no_extras_, &no_extras_};
         double change[4];
@@ -133,12 +133,12 @@ void PgsSolver::solve_all(std::size_t begin, std::size_t end, double focus) noex
         }
         solve(group, size, focus);
     }
-    counts_.updated += end - begin;
+    now_.updated += end - begin;
 }
 
 /// A piece of a level some of whose contacts are scheduled: those of active islands, of those at their limit those of active bodies.
 void PgsSolver::solve_scheduled(std::size_t begin, std::size_t end, double focus) noexcept {
-    picked_.resize(end - begin + 1);
+    now_.picked.resize(end - begin + 1);
     std::size_t picked = 0;
     for (std::size_t place = begin; place < end; ++place) {
         const Scheduled& scheduled = this->scheduled()[place];
@@ -147,24 +147,25 @@ void PgsSolver::solve_scheduled(std::size_t begin, std::size_t end, double focus
         const bool asked =
             active &&
             (!limit_reached || (active_bodies_[scheduled.first] | active_bodies_[scheduled.second]) != 0);
-        picked_[picked] = &scheduled;
+        now_.picked[picked] = &scheduled;
         picked += asked;
-        counts_.seen += active && limit_reached;
-        counts_.active_done += asked && limit_reached;
-        counts_.updated += asked && !limit_reached;
+        now_.seen += active && limit_reached;
+        now_.active_done += asked && limit_reached;
+        now_.updated += asked && !limit_reached;
     }
     solve_picked(picked, focus);
 }
 
 /// Those that were picked from a level, four at once.
 void PgsSolver::solve_picked(std::size_t picked, double focus) noexcept {
-    for (std::size_t k = 0; k < std::min(picked, contacts_ahead); ++k) fetch(*picked_[k], *picked_[k]);
+    for (std::size_t k = 0; k < std::min(picked, contacts_ahead); ++k)
+        fetch(*now_.picked[k], *now_.picked[k]);
     for (std::size_t k = 0; k < picked; k += 4) {
         const std::size_t size = std::min<std::size_t>(4, picked - k);
         for (std::size_t ahead = k + contacts_ahead; ahead < std::min(picked, k + contacts_ahead + 4);
              ++ahead)
-            fetch(*picked_[ahead], *picked_[ahead]);
-        solve(&picked_[k], static_cast<int>(size), focus);
+            fetch(*now_.picked[ahead], *now_.picked[ahead]);
+        solve(&now_.picked[k], static_cast<int>(size), focus);
     }
 }
 
@@ -172,11 +173,11 @@ void PgsSolver::solve_picked(std::size_t picked, double focus) noexcept {
 void PgsSolver::iterate_active(double focus) {
     if (!marked_) mark_active();
     else marked_now_.swap(marked_next_), std::fill(marked_next_.begin(), marked_next_.end(), 0);
-    for (const int island : roots_) counts_.seen += active_[island] ? size_[island] : 0;
+    for (const int island : roots_) now_.seen += active_[island] ? size_[island] : 0;
     marking_ = true;
     std::size_t begin = 0;
     for (const std::size_t end : level_end_) {
-        picked_.resize(end - begin + 1);
+        now_.picked.resize(end - begin + 1);
         std::size_t picked = 0;
         for (std::size_t word = begin / 64; 64 * word < end; ++word) {
             std::uint64_t bits = marked_now_[word];
@@ -185,11 +186,11 @@ void PgsSolver::iterate_active(double focus) {
             for (; bits != 0; bits &= bits - 1) {
                 const Scheduled& scheduled =
                     order_[64 * word + static_cast<std::size_t>(std::countr_zero(bits))];
-                picked_[picked] = &scheduled;
+                now_.picked[picked] = &scheduled;
                 picked += active_[scheduled.island] != 0;
             }
         }
-        counts_.active_done += picked;
+        now_.active_done += picked;
         solve_picked(picked, focus);
         begin = end;
     }
@@ -204,15 +205,15 @@ void PgsSolver::iterate(double focus) noexcept {
         all = all && active_[island];
         any_at_limit = any_at_limit || (active_[island] && limit_reached_[island]);
     }
-    counts_ = {};
-    for (const int island : roots_) change_[island] = 0.0;
+    now_.updated = now_.seen = now_.active_done = 0;
+    for (const int island : roots_) now_.change[island] = 0.0;
     for (int item = 0; item < joint_count_; ++item) {
         const auto [first, second] = bodies_of_[item];
         if (std::min(first, second) == bodies_) continue;
         const int island = root(std::min(first, second));
         if (!active_[island]) continue;
-        ++(limit_reached_[island] ? counts_.seen : counts_.updated);
-        counts_.active_done += limit_reached_[island] != 0;
+        ++(limit_reached_[island] ? now_.seen : now_.updated);
+        now_.active_done += limit_reached_[island] != 0;
         note({item, first, second, island}, joints_.update_joint(static_cast<std::size_t>(item)), focus);
     }
     const bool plain = all && !any_at_limit;
@@ -232,8 +233,9 @@ void PgsSolver::iterate(double focus) noexcept {
             begin = end;
         }
     }
-    const auto [updated, seen, active_done] = counts_;
-    done_ += static_cast<double>(updated + active_done) + skip_cost * static_cast<double>(seen - active_done);
+    const std::size_t updated = now_.updated, seen = now_.seen;
+    done_ += static_cast<double>(updated + now_.active_done) +
+             skip_cost * static_cast<double>(seen - now_.active_done);
     // Lists of what has settled are not read for long.
     if (static_cast<double>(updated + seen) < few_left * static_cast<double>(scheduled().size())) select();
 }
@@ -256,7 +258,7 @@ FrictionReport PgsSolver::run(int iterations, double tolerance, double focus,
         for (const int island : roots_) {
             if (!active_[island]) continue;
             const bool limit_reached = limit_reached_[island] != 0;
-            const double change = change_[island];
+            const double change = now_.change[island];
             last_change_[island] = limit_reached ? larger(last_change_[island], change) : change;
             ++report.pgs_iterations;
             active_[island] = !(change <= (limit_reached ? focus : tolerance));
@@ -299,8 +301,8 @@ RowsResidual PgsSolver::worst(double focus, double allowed) {
     done_ += residual_cost * static_cast<double>(bodies_of_.size());
     all_touched_ = all_touched_ || joint_count_ > 0;  // whose rows may have moved others
     find_residuals();
-    for (const int body : moved_) touched_[body] = 0;
-    moved_.clear();
+    for (const int body : now_.moved) touched_[body] = 0;
+    now_.moved.clear();
     all_touched_ = false;
     RowsResidual worst{0.0, -1};
     off_.clear();

@@ -70,7 +70,7 @@ public:
         if (all_touched_ || joint_count_ > 0)
             for (int body = 0; body < bodies_; ++body) visit(body);
         else
-            for (const int body : moved_) visit(body);
+            for (const int body : now_.moved) visit(body);
     }
     const double* impulse(int contact) const noexcept { return contacts_[place_[contact]].impulse; }
     /// Multipliers of joints, and all velocities.
@@ -122,15 +122,16 @@ private:
     void find_residuals();
     double residual_of(std::size_t contact) const noexcept;
 
-    struct
-        Counts {  // of an iteration: items updated of fresh islands; of those at their limit seen, and updated
+    /// What an iteration counts and keeps.
+    struct Iteration {
+        // Items updated of fresh islands; of those at their limit seen, and updated.
         std::size_t updated = 0, seen = 0, active_done = 0;
+        std::vector<double> change;  // by root
+        std::vector<const Scheduled*> picked;
+        std::vector<int> moved;  // bodies, see touched_
+        PackedContact none{};    // fills a group
     };
-    Counts counts_;
-    std::vector<double> change_;  // by root
-    std::vector<const Scheduled*> picked_;
-    std::vector<int> moved_;  // bodies, see touched_
-    PackedContact none_{};    // fills a group
+    Iteration now_;
     FrictionModel model_ = FrictionModel::cone;
     PgsRows joints_;
     int joint_count_ = 0, bodies_ = 0;

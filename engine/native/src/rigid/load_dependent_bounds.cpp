@@ -141,14 +141,27 @@ void LoadDependentBounds::follow_bearing(int bearing, MixedSystem& solved, Joint
     rows.upper[of.row] = next;
 }
 
-/// Rows with bounds and without contacts: solved again while bounds that follow other rows move.
-bool RigidSystem::pivot_rows() {
+/// Rows without contacts: solved again while bounds that follow other rows move. Iterations that do not get there in a few
+/// rounds bound the next step by this one.
+bool RigidSystem::solve_joints() {
     load_dependent_.begin();
+    const bool iterative = solver_ == RigidSolver::iterative;
     bool same_matrix = false;
     for (int round = 0;; ++round) {
-        const PivotReport report = pivot_.solve(mixed_, same_matrix);
-        rounds_ += static_cast<std::uint64_t>(report.rounds);
-        if (!report.finite || load_dependent_.empty()) return report.finite;
+        bool finite = true;
+        if (iterative) {
+            finite = iterate_joints();
+        } else {
+            const PivotReport report = pivot_.solve(mixed_, same_matrix);
+            rounds_ += static_cast<std::uint64_t>(report.rounds);
+            finite = report.finite;
+        }
+        if (!finite || load_dependent_.empty()) return finite;
+        if (iterative && round == LoadDependentBounds::PATIENT) {
+            load_dependent_.begin();
+            load_dependent_.follow(mixed_, joints_, true);
+            return true;
+        }
         const auto [off, same] = load_dependent_.follow(mixed_, joints_);
         same_matrix = same;
         if (off <= LoadDependentBounds::AGREED) return true;

@@ -292,7 +292,7 @@ private:
     int busiest_block() const noexcept;
     void solve_velocities();
     void solve_mixed(bool touching);
-    bool pivot_rows();
+    bool iterate_joints();
     // project_positions.cpp: overlaps are removed by positions
     void note_start_of_contacts();
     void project_overlaps();

@@ -66,7 +66,7 @@ void RigidSystem::solve_mixed(bool touching) {
             scratch_.next[constrained_[k]] = mixed_.velocity[k];
         if (meet_late()) return solve_mixed(true);
     }
-    if (!load_dependent_.empty() && (touching || solver_ == RigidSolver::iterative)) {
+    if (touching && !load_dependent_.empty()) {
         load_dependent_.begin();
         load_dependent_.follow(mixed_, joints_, true);  // for the next step: here bounds are a step late
     }
@@ -144,9 +144,7 @@ bool RigidSystem::find_other_ends() {
     return scratch_.other_ends.size() > known;
 }
 
-/// Rows without contacts.
-bool RigidSystem::solve_joints() {
-    if (solver_ != RigidSolver::iterative) return pivot_rows();
+bool RigidSystem::iterate_joints() {
     std::vector<FrictionPoint> none;
     const FrictionReport report =
         solve_iterative(mixed_, none, method_.friction, method_.iterations, method_.residual_tolerance);
