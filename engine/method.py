@@ -54,7 +54,8 @@ class Method:
                        too long for the tension of light bodies are taken in parts
     solver             direct; iterative (projected Gauss-Seidel); an impact
                        among up to 24 contacts that iterations do not settle is solved directly, since what it leaves stays;
-                       so are up to 24 joints (and their contacts) that they do not settle
+                       so are up to 24 joints (and their contacts) that they do not settle, and up to 64 that
+                       they leave unsettled, from then on
     iterations, residual_tolerance   when an iterative solve stops; where rows are still off by more than
                        unsettled_residual, iterations go on there and nearby, for up to sixteen times the work (joints: four)
     friction           cone (isotropic), box (bound from the step before), scaled_box (current normal force)

@@ -121,7 +121,7 @@ def rods_error(h: float, method: Method) -> float:
 
 SCENES: dict[str, tuple[Callable[[float, Method], float], float]] = {  # error, coarsest time step
     "rods": (rods_error, 1 / 32),
-    "door": (lambda h, method: swinging_door.ladder_error(simulate, h, method), 1 / 20),
+    "door": (lambda h, method: swinging_door.ladder_error(simulate, h, method), 1 / 14),
     "top": (lambda h, method: spinning_top.ladder_error(simulate, h, method), 1 / 12),
 }
 

@@ -262,8 +262,10 @@ ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
     }
     if (report.finite && passes_other_ends(system, system.rows.size(), options_.time_step))
         return {{.ends_passed = true}};
+    const std::size_t blocks = system.rows.size() + points_.size();
+    const bool unsettled = quality_.body >= 0;
     const bool unfinished = report.finite && !report.converged && !system.rows.empty() &&
-                            system.rows.size() + points_.size() <= few_rows;
+                            blocks <= (unsettled ? few_jointed : few_rows);
     state_.by_rows = state_.by_rows || unfinished;
     if (unfinished) return {{}, true};
     state_.counters.unsettled += !report.converged;

@@ -158,7 +158,8 @@ ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vecto
     const std::size_t joints = system.rows.size();
     velocity_ = velocity;
     warm_started_ = ran_away_ = false;
-    if (options_.solver == SolverKind::iterative && !surfaces_->resists_turning) {
+    const auto by_rows = [&] { return state_.by_rows && joints + points_.size() <= few_jointed; };
+    if (options_.solver == SolverKind::iterative && !surfaces_->resists_turning && !by_rows()) {
         if (const PgsSolveEnd end = solve_by_pgs(system); !end.unfinished) return end;
     }
     std::vector<FrictionPoint>& friction = arrays_.friction;
@@ -185,6 +186,7 @@ ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vecto
         // What a resting solve leaves, the next step sees; what an impact leaves stays.
         IslandRules rules = rules_of(options_.friction, state_.by_rows);
         rules.warm_started = warm_started_;
+        if (by_rows()) rules.few_enough = few_jointed;
         report = solve_islands(system, friction, resting_solver_, options_, rules, state_.counters,
                                late ? &answered : nullptr);
         report.rounds += before.rounds, report.pgs_iterations += before.pgs_iterations;

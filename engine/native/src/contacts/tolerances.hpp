@@ -67,6 +67,8 @@ inline constexpr double tolerated = 1e-9;  // of the fastest row: a give that ne
 
 // Read by several parts
 inline constexpr std::size_t few_rows = 24;  // blocks: so many are solved directly at little cost
+inline constexpr std::size_t few_jointed =
+    64;  // the same of joints and contacts that iterations leave unsettled
 
 // contact_judge.cpp
 namespace tolerances::contact_judge {
