@@ -91,7 +91,7 @@ void PgsSolver::touch(int body) noexcept {
     now_.moved.push_back(body);  // has room for all
 }
 
-void PgsSolver::note(const Scheduled& scheduled, double change, double focus) noexcept {
+inline void PgsSolver::note(const Scheduled& scheduled, double change, double focus) noexcept {
     now_.change[scheduled.island] = larger(now_.change[scheduled.island], change);
     if (!limit_reached_[scheduled.island] || change == 0.0) return;
     touch(scheduled.first);
