@@ -8,7 +8,6 @@
 #include "contacts/pgs_kernel.hpp"
 #include "contacts/pgs_solver.hpp"
 #include "expect.hpp"
-#include "run/team.hpp"
 
 using namespace spook;
 
