@@ -75,10 +75,10 @@ def site(tmp_path_factory, recorded):
     out = tmp_path_factory.mktemp("seen") / "public"
     whole = page_test.test_page
 
-    def broken(book, test, events):
+    def broken(book, test, *more):
         if test.name == "door":
             raise ValueError("a word_that_goes_on_and_on_" + 8 * "without_a_space_")
-        return whole(book, test, events)
+        return whole(book, test, *more)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("spook_tracker.tracker.website.pages.test_page", broken)

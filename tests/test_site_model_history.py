@@ -12,16 +12,16 @@ from tests.test_tracker_model_files import KNOWN
 from tests.test_tracker_verdict import sample, series
 
 
-def _night(version: str, value: float, edit: str = "1", arithmetic: str = "f") -> SimpleNamespace:
+def _night(version: str, value: float, edit: str = "1", arithmetic: str = "f") -> Point:
     run = SimpleNamespace(
         engine=SimpleNamespace(version=version), machine=SimpleNamespace(float_environment=arithmetic)
     )
-    return SimpleNamespace(night=Point(run, sample(value, state=f"{value!r}"), edit))
+    return Point(run, sample(value, state=f"{value!r}"), edit)
 
 
-def _trend(*nights: SimpleNamespace, known=KNOWN) -> SimpleNamespace:
+def _trend(*nights: Point, known=KNOWN) -> SimpleNamespace:
     definition = series(metric="ball.rest_z", better="inside", role="reported", sensitivity=known)
-    return SimpleNamespace(definition=definition, told=SimpleNamespace(nights=nights))
+    return SimpleNamespace(definition=definition, told=SimpleNamespace(points=nights))
 
 
 def test_each_version_is_told_beside_the_one_before_newest_first() -> None:
