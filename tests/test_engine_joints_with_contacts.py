@@ -107,6 +107,19 @@ def test_what_stands_on_legs_is_settled_by_iterations_as_well(seed):
     assert run.residual <= 1e-3  # m/s
 
 
+def test_what_was_solved_directly_after_iterations_overlaps_no_more_than_before() -> None:
+    """Overlaps were parted with the masses of the last step that was iterated: .34 mm stayed."""
+    run = simulate(
+        CATALOGUE["falling_chain"].example().scene,
+        duration=0.7,
+        time_step=STEP,
+        method=Method(solver="iterative"),
+        observe={"deepest": Maximum(quantity=Penetration())},
+    )
+    assert run.status == "completed"
+    assert run["deepest"] <= 1e-6  # m
+
+
 def test_no_step_of_a_body_that_comes_to_lie_takes_many_rounds():
     """It lies on more points than it needs: where Newton's steps gain nothing they end, 500 of them or not."""
     run = start(CATALOGUE["falling_chain"].example().scene, time_step=STEP)

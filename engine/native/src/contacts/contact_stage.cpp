@@ -159,8 +159,9 @@ ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vecto
     velocity_ = velocity;
     warm_started_ = ran_away_ = false;
     const auto by_rows = [&] { return state_.by_rows && joints + points_.size() <= few_jointed; };
-    if (options_.solver == SolverKind::iterative && !surfaces_->resists_turning && !by_rows()) {
-        if (const PgsSolveEnd end = solve_by_pgs(system); !end.unfinished) return end;
+    if (options_.solver == SolverKind::iterative && !surfaces_->resists_turning) {
+        if (by_rows()) pgs_.start(system, options_.friction);  // overlaps are parted with its masses
+        else if (const PgsSolveEnd end = solve_by_pgs(system); !end.unfinished) return end;
     }
     std::vector<FrictionPoint>& friction = arrays_.friction;
     std::vector<Vec6>& next = next_;
