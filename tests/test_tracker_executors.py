@@ -131,6 +131,43 @@ def test_a_worker_that_dies_costs_its_piece(cluster: Any) -> None:
     assert found[2].outcome == "crashed"
 
 
+class KilledWorker(Exception):
+    """As Dask calls what it gives up."""
+
+
+class GivesUpTogether(Executor):
+    """Piece 2 kills every time; 3 is given up with it once."""
+
+    def submit(self, function: Any, *arguments: Any) -> Future[Any]:  # type: ignore[override]
+        future: Future[Any] = Future()
+        submitted.append(arguments[-1])
+        if arguments[-1] == 2 or (arguments[-1] == 3 and submitted.count(3) == 1):
+            future.set_exception(KilledWorker())
+        else:
+            future.set_result(function(*arguments))
+        return future
+
+
+submitted: list[int] = []
+
+
+def test_a_piece_that_stood_behind_one_that_kills_is_asked_again_alone() -> None:
+    submitted.clear()
+    found = dict(executors.answers(f"{__name__}:GivesUpTogether", dies_of_two, [1, 2, 3], here))
+
+    assert (found[1], found[3]) == (10, 30)
+    assert found[2] == Lost("crashed", "the worker died while answering, more than once")
+    assert submitted == [1, 2, 3, 2, 3] or submitted == [1, 2, 3, 3, 2]
+
+
+def test_a_piece_that_kills_alone_is_not_asked_again() -> None:
+    submitted.clear()
+    found = dict(executors.answers(f"{__name__}:GivesUpTogether", dies_of_two, [1, 2], here))
+
+    assert isinstance(found[2], Lost)
+    assert submitted == [1, 2]
+
+
 def dies_of_two(piece: int) -> int:
     if piece == 2:
         os._exit(1)

@@ -34,6 +34,7 @@ DASK = "dask://"
 Piece = TypeVar("Piece")
 Answer = TypeVar("Answer")
 PATIENCE = 20  # s to find a scheduler
+KILLED = Lost("crashed", "the worker died while answering, more than once")
 
 
 class ExecutorError(TrackerError):
@@ -72,7 +73,8 @@ def answers(
     place: Callable[[], Place],
     told: Callable[[Machine], None] = lambda machine: None,
 ) -> Iterator[tuple[Piece, Answer | Lost]]:
-    """Every piece with what `perform` made of it, or Lost, as they come; what is left is cancelled at the end.
+    """Every piece with what `perform` made of it, or Lost, as they come; what is left is cancelled at the end. Dask gives up
+    what waits at a worker that dies together with what killed it: where it gave up several, each is asked once more, alone.
 
     `place` is called beside every piece, `told` with the machine of every answer. ExecutorError if a worker's place is
     not like this one.
@@ -82,18 +84,33 @@ def answers(
         waiting: dict[Future[tuple[Answer, Place]], Piece] = {
             executor.submit(_placed, perform, place, piece): piece for piece in pieces
         }
+
+        def taken(future: Future[tuple[Answer, Place]]) -> Answer | Lost:
+            came = _answer(future)
+            answer, there = came
+            if there is not None:
+                if not there.like(here):
+                    raise ExecutorError(
+                        f"a worker of {name} is not like this machine ({there} there, {here} here): its values "
+                        "could not be compared; install the same build there, or use machines of the same kind"
+                    )
+                told(there.machine)
+            return answer
+
         try:
+            killed: list[Piece] = []
             for future in _completed(waiting):
-                came = _answer(future)
-                answer, there = came
-                if there is not None:
-                    if not there.like(here):
-                        raise ExecutorError(
-                            f"a worker of {name} is not like this machine ({there} there, {here} here): its values "
-                            "could not be compared; install the same build there, or use machines of the same kind"
-                        )
-                    told(there.machine)
-                yield waiting[future], answer
+                if (answer := taken(future)) is KILLED:
+                    killed.append(waiting[future])
+                else:
+                    yield waiting[future], answer
+            for piece in killed:  # each dies for itself, or had only stood behind another that did
+                if len(killed) > 1:
+                    again = executor.submit(_placed, perform, place, piece)
+                    waiting[again] = piece
+                    yield piece, taken(again)
+                else:
+                    yield piece, KILLED
         finally:
             for future in waiting:
                 future.cancel()
@@ -115,7 +132,7 @@ def _answer(future: Future[tuple[Answer, Place]]) -> tuple[Answer | Lost, Place 
         return Lost("crashed", "the worker died while answering"), None
     except Exception as error:
         if type(error).__name__ == "KilledWorker":  # Dask's own word for the same
-            return Lost("crashed", "the worker died while answering, more than once"), None
+            return KILLED, None
         raise
 
 
