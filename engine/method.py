@@ -17,7 +17,7 @@ STAGES_THAT_CAN_BE_FORCED = {  # as it is asked for: the stage that comes
     "rotation": "integrate_rotations",
 }
 FORMER_SOLVER = "hybrid"  # friction by iterations, the rest directly: never the best of the three
-FORMER = 'method: solver="hybrid" is gone, and solved as "direct", which is faster and nearer to the law everywhere'
+FORMER = 'method: solver="hybrid" is gone, and solved as "direct", at the same errors and less cost'
 ALONE = (
     "method: one thread does the work; threads gained nothing worth it: run several simulations side by side"
 )
@@ -81,8 +81,7 @@ class Method:
     sleep_after        how long bodies must have been that slow, s
     refinements        iterative refinements against the true equations after each factorisation
     floor              pivot floor in the factor only, relative to the diagonal
-    threads            1: two took .8 of the time of one on 10 000 balls and 1.3 on 1000, and many times as long where another
-                       program wanted a core. Run simulations side by side; more are taken back with a warning
+    threads            1; more are taken back with a warning: several simulations side by side use several cores
     force_stages       stages to keep although the scene does not need them, to measure what they cost; solve_block: the
                        general factorisation also where a chain or a mechanism in a plane has a faster way
     """

@@ -85,13 +85,15 @@ class Memory(Kept):
         self.parts[name] = part
 
 
-@pytest.mark.parametrize("rough", [0.0, 0.005, 0.1])
-def test_from_a_checkpoint_on_every_verdict_is_the_same(
-    rough: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture(autouse=True)
+def checkpoints_after_a_few_nights(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("spook_tracker.tracker.judge.lane.RECENT", 4)
     monkeypatch.setattr(checkpoints, "LATE", 24)
     monkeypatch.setattr(checkpoints, "STEP", 4)
+
+
+@pytest.mark.parametrize("rough", [0.0, 0.005, 0.1])
+def test_from_a_checkpoint_on_every_verdict_is_the_same(rough: float) -> None:
     chance, resumed = random.Random(7), 0
     for _ in range(5):
         nights = line(80)
@@ -120,12 +122,7 @@ def changed_value(points: list[Point]) -> list[Point]:
 
 
 @pytest.mark.parametrize("what", ["definition", "accepted", "value", "run", "new definition"])
-def test_what_was_read_before_a_checkpoint_and_is_other_now_is_judged_again(
-    what: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("spook_tracker.tracker.judge.lane.RECENT", 4)
-    monkeypatch.setattr(checkpoints, "LATE", 24)
-    monkeypatch.setattr(checkpoints, "STEP", 4)
+def test_what_was_read_before_a_checkpoint_and_is_other_now_is_judged_again(what: str) -> None:
     nights, kept = line(60), Memory()
     points = list(history(nights, random.Random(3), 0.0).points)
     definition, accepted = DEFINITION, ()
