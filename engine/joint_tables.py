@@ -15,14 +15,16 @@ from spook_tracker.engine.tyres import Tyre
 
 
 def drives(scene: Scene, step: float) -> dict[str, Any]:
-    """Motors, limits, springs and friction of the free coordinates, each with the index of its joint."""
-    motors, limits, springs, rubbing = [], [], [], []
+    """Motors, limits, springs, friction and armature of the free coordinates, each with the index of its joint."""
+    motors, limits, springs, rubbing, rotors = [], [], [], [], []
     for index, joint in enumerate(scene.constraints):
         constant, load = frictions(joint)
         if any(constant) or any(load):
             rubbing.append({"joint": index, "constant": constant, "load": load})
         if not isinstance(joint, AxialJoint):
             continue
+        if joint.armature:
+            rotors.append({"joint": index, "inertia": joint.armature})
         if (motor := joint.motor) is not None:
             pushes = motor.force is not None
             force = motor.force if motor.force is not None else motor.max_force
@@ -60,6 +62,7 @@ def drives(scene: Scene, step: float) -> dict[str, Any]:
         "limits": table(limits),
         "joint_springs": table(springs),
         "joint_frictions": table(rubbing),
+        "armatures": table(rotors),
     }
 
 

@@ -204,6 +204,9 @@ class AxialJoint(Joint):
     `friction` [N or N m] holds the coordinate at rest as far as it reaches, and brakes it where it moves, beside whatever
     drives it. `load_friction` adds its product with the force [N] that the joint's own rows hold: µ of a slide, µ times
     the radius of an axle. Where surfaces touch, that part follows the load of the step before.
+
+    `armature` [kg or kg m²] is inertia that goes as the coordinate does, a geared rotor's: ½ armature × rate² is in the
+    kinetic energy, and what it resists with is in the joint's force.
     """
 
     axis: Vector = (0.0, 0.0, 1.0)
@@ -212,6 +215,7 @@ class AxialJoint(Joint):
     spring: JointSpring | None = None
     friction: float = 0.0  # N or N m
     load_friction: float = 0.0  # 1 or m
+    armature: float = 0.0  # kg or kg m²
 
     def __post_init__(self) -> None:
         Joint.__post_init__(self)
@@ -221,7 +225,7 @@ class AxialJoint(Joint):
             value = getattr(self, name)
             if value is not None and not isinstance(value, kind):
                 raise SceneError(f"{owner}: {name} must be a {kind.__name__}, not {value!r}")
-        for name in ("friction", "load_friction"):
+        for name in ("friction", "load_friction", "armature"):
             object.__setattr__(self, name, check.not_negative(owner, name, getattr(self, name)))
 
 

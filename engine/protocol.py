@@ -78,6 +78,7 @@ class Capabilities:
     motors: bool = False
     limits: bool = False
     springs: bool = False  # in a joint
+    armature: bool = False
     loops: bool = True  # closed chains of joints
     kinematic: bool = False
     particles: bool = True
@@ -211,6 +212,8 @@ def _of_constraint(can: Capabilities, constraint: Constraint) -> Iterator[str]:
         for name in ("motor", "limit", "spring"):
             if getattr(constraint, name) is not None and not getattr(can, f"{name}s"):
                 yield f"a {name} in a joint"
+        if constraint.armature and not can.armature:
+            yield "armature of a joint"
         if constraint.spring is not None and constraint.spring.max_force is not None:
             yield "a spring of bounded force in a joint"
         if constraint.motor is not None and constraint.motor.force is not None:

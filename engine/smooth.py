@@ -138,6 +138,11 @@ def _check_held(row: Constraint, length: float) -> None:
                     f"method: a composition holds rows rigidly, but the {drive} of {row.name!r} drives one; use "
                     f"half_step_velocities, of order 2, there"
                 )
+        if row.armature:
+            raise MethodError(
+                f"method: a composition holds rows rigidly, and the armature of {row.name!r} is one that gives way; use "
+                f"half_step_velocities, of order 2, there"
+            )
     rest = row.rest_length if isinstance(row, Distance) else None
     if rest is not None and abs(length - rest) > 1e-9 * rest:
         raise MethodError(

@@ -14,7 +14,7 @@ from spook_tracker.engine.protocol import NotSupported, unsupported
 from spook_tracker.engine.scene import Scene
 
 CAN = replace(
-    ENGINE.capabilities, forces=frozenset({Spring})
+    ENGINE.capabilities, forces=frozenset({Spring}), armature=True
 )  # a file has no forces but of springs and actuators
 START = "start"
 

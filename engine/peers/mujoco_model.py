@@ -171,7 +171,7 @@ class _Writer:
                 axes = [np.array(tie.axis)]
         where = numbers(turned_back(turn, at - place))
         return "".join(
-            f'<joint type="{kind}" pos={where} axis={numbers(turned_back(turn, axis))} {self._loss(tie)}/>'
+            f'<joint type="{kind}" pos={where} axis={numbers(turned_back(turn, axis))} {self._loss(tie)}{_armature(tie)}/>'
             for axis in axes
         )
 
@@ -224,9 +224,9 @@ class _Writer:
             self._add(constraint, [line])
             return
         assert isinstance(constraint, Joint)
-        if any(frictions(constraint)[0]):
+        if any(frictions(constraint)[0]) or getattr(constraint, "armature", False):
             raise NotSupported(
-                f"mujoco has no friction in an equality constraint, as {constraint.name!r} would be"
+                f"mujoco has no friction or armature in an equality constraint, as {constraint.name!r} would be"
             )
         at = joint_point(self.scene, constraint)
         if isinstance(constraint, Lock):
@@ -284,6 +284,11 @@ class _Writer:
                 f"{_friction(mu, one.material, two.material, pair=True)} {self.row}/>"
             )
         return text
+
+
+def _armature(tie: Constraint) -> str:
+    size = getattr(tie, "armature", 0.0)
+    return f' armature="{size!r}"' if size else ""
 
 
 def _friction(sliding: float, *materials: Material, pair: bool = False) -> str:

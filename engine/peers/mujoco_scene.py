@@ -305,6 +305,7 @@ class _Translation:
             return
         here = float(d.qpos[m.jnt_qposadr[number]])
         form = Hinge if kind == HINGE else Prismatic
+        armature = float(m.dof_armature[dof]) + self.drives.armature(number)
         limit = None
         if m.jnt_limited[number] and self.has("LIMIT"):
             limit = Limit(
@@ -323,9 +324,10 @@ class _Translation:
                 spring=None if self.conservative else self.spring(number, here),
                 motor=Motor(force=self.drives.force(number, here)) if self.drives.of(number) else None,
                 friction=float(m.dof_frictionloss[dof]) if self.has("FRICTIONLOSS") else 0.0,
+                armature=0.0 if self.conservative else armature,
             )
         )
-        armature = float(m.dof_armature[dof]) + self.drives.armature(number)
+        armature *= self.conservative  # a composition takes none in the joint
         stiffness, _, rest = self.passive(number) if self.conservative else (0.0, 0.0, 0.0)
         if armature or stiffness:
             name = f"carriage of {self.name('joint', number)}"

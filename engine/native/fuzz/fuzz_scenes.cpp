@@ -107,23 +107,23 @@ bool joint(Bytes& bytes, RigidScene& scene, double step) {
     if (spec.kind == JointKind::hinge || spec.kind == JointKind::prismatic) {
         const int said = bytes.byte();
         if (said & 1) {
-            spec.has_motor = true;
-            spec.motor_speed = bytes.number();
-            spec.motor_force = said & 2 ? std::numeric_limits<double>::infinity() : 10.0 * bytes.share();
+            spec.motor.emplace();
+            spec.motor->speed = bytes.number();
+            spec.motor->force = said & 2 ? std::numeric_limits<double>::infinity() : 10.0 * bytes.share();
         }
         if (said & 4) {
             const double one = bytes.number(), two = bytes.number();
-            spec.has_limit = true;
-            spec.limit_lower = std::min(one, two), spec.limit_upper = std::max(one, two);
-            spec.limit_damping = 2.0 * step;
-            spec.limit_restitution = bytes.share();
+            spec.limit.emplace();
+            spec.limit->lower = std::min(one, two), spec.limit->upper = std::max(one, two);
+            spec.limit->damping = 2.0 * step;
+            spec.limit->restitution = bytes.share();
         }
         if (said & 8) {
-            spec.has_spring = true;
-            spec.spring_stiffness = bytes.size();
-            spec.spring_rest = bytes.number();
-            spec.spring_damping = bytes.share();
-            if (said & 16) spec.spring_force = 10.0 * bytes.share();
+            spec.spring.emplace();
+            spec.spring->stiffness = bytes.size();
+            spec.spring->rest = bytes.number();
+            spec.spring->damping = bytes.share();
+            if (said & 16) spec.spring->force = 10.0 * bytes.share();
         }
     }
     scene.joints.push_back(std::move(spec));
@@ -154,8 +154,7 @@ RigidMethod method(Bytes& bytes, bool smooth) {
 /// What compositions and half steps ask of a scene: see engine/smooth.py.
 bool is_smooth(const RigidScene& scene) {
     for (const JointSpec& made : scene.joints)
-        if (can_let_go(made) || made.has_motor || made.has_limit || made.has_spring ||
-            made.compliance[0] > 1e-7 ||
+        if (can_let_go(made) || made.motor || made.limit || made.spring || made.compliance[0] > 1e-7 ||
             (made.kind == JointKind::distance &&
              std::abs(made.rest_length - norm(made.first_point - made.second_point)) >
                  1e-9 * made.rest_length))

@@ -124,16 +124,16 @@ void contradictory_rows_are_named() {
     s.bodies = {box({5, 0, 0}), box({0, 0, 0})};
     for (double speed : {1.0, 2.0}) {
         JointSpec hinge = joint(JointKind::hinge, -1, 1, {0, 0, 0}, 0.0);
-        hinge.has_motor = true;
-        hinge.motor_speed = speed;
-        hinge.motor_force = std::numeric_limits<double>::infinity();
+        hinge.motor.emplace();
+        hinge.motor->speed = speed;
+        hinge.motor->force = std::numeric_limits<double>::infinity();
         s.joints.push_back(hinge);
     }
     RigidSystem contradictory = system_of(s);
     contradictory.advance(1);
     EXPECT(contradictory.health().status == Status::diverged);
     EXPECT(contradictory.health().body == 1);
-    s.joints[1].motor_speed = 1.0;
+    s.joints[1].motor->speed = 1.0;
     RigidSystem redundant = system_of(s);
     redundant.advance(10);
     EXPECT(redundant.health().status == Status::completed);
@@ -200,9 +200,9 @@ void a_bounded_motor_gives_its_force_and_no_more() {
     s.gravity = {};
     s.bodies = {box({0, 0, 0})};
     s.joints.push_back(joint(JointKind::prismatic, -1, 0, {0, 0, 0}, 0.0));
-    s.joints[0].has_motor = true;
-    s.joints[0].motor_speed = 1.0;
-    s.joints[0].motor_force = 5.0;
+    s.joints[0].motor.emplace();
+    s.joints[0].motor->speed = 1.0;
+    s.joints[0].motor->force = 5.0;
     RigidSystem system = system_of(s);
     system.advance(15);
     EXPECT_NEAR(system.state(0).velocity.x, 5.0 / 2.5 * 15 * kStep, 1e-13);
@@ -215,10 +215,10 @@ void a_limit_holds_and_lets_go() {
     s.bodies = {box({0, 0, 0})};
     s.joints.push_back(joint(JointKind::prismatic, -1, 0, {0, 0, 0}, 0.0));
     s.joints[0].axes = {Vec3{0, 0, 1}, Vec3{1, 0, 0}, Vec3{0, 1, 0}};
-    s.joints[0].has_limit = true;
-    s.joints[0].limit_lower = -0.5;
-    s.joints[0].limit_upper = 0.5;
-    s.joints[0].limit_damping = 2.0 * kStep;
+    s.joints[0].limit.emplace();
+    s.joints[0].limit->lower = -0.5;
+    s.joints[0].limit->upper = 0.5;
+    s.joints[0].limit->damping = 2.0 * kStep;
     RigidSystem system = system_of(s);
     system.advance(600);
     EXPECT_NEAR(system.coordinate(0), -0.5, 1e-12);

@@ -90,10 +90,10 @@ void read_motors(const nb::dict& motors, RigidScene& scene) {
                   force = table.numbers("max_force"), pushes = table.numbers("pushes");
     for (std::size_t i = 0; i < table.rows(); ++i) {
         JointSpec& spec = scene.joints[joint.index(i, all_joints(scene))];
-        spec.has_motor = true;
-        spec.motor_speed = speed[i];
-        spec.motor_force = force[i];
-        spec.motor_pushes = pushes.flag(i);
+        spec.motor.emplace();
+        spec.motor->speed = speed[i];
+        spec.motor->force = force[i];
+        spec.motor->pushes = pushes.flag(i);
     }
     table.expect_all_read();
 }
@@ -110,6 +110,14 @@ void read_frictions(const nb::dict& frictions, RigidScene& scene) {
     table.expect_all_read();
 }
 
+void read_armatures(const nb::dict& armatures, RigidScene& scene) {
+    Columns table(armatures, "armatures");
+    const Numbers joint = table.numbers("joint"), inertia = table.numbers("inertia");
+    for (std::size_t i = 0; i < table.rows(); ++i)
+        scene.joints[joint.index(i, all_joints(scene))].armature = inertia[i];
+    table.expect_all_read();
+}
+
 void read_limits(const nb::dict& limits, RigidScene& scene) {
     Columns table(limits, "limits");
     const Numbers joint = table.numbers("joint"), lower = table.numbers("lower"),
@@ -117,12 +125,12 @@ void read_limits(const nb::dict& limits, RigidScene& scene) {
                   damping = table.numbers("damping"), restitution = table.numbers("restitution");
     for (std::size_t i = 0; i < table.rows(); ++i) {
         JointSpec& spec = scene.joints[joint.index(i, all_joints(scene))];
-        spec.has_limit = true;
-        spec.limit_lower = lower[i];
-        spec.limit_upper = upper[i];
-        spec.limit_compliance = compliance[i];
-        spec.limit_damping = damping[i];
-        spec.limit_restitution = restitution[i];
+        spec.limit.emplace();
+        spec.limit->lower = lower[i];
+        spec.limit->upper = upper[i];
+        spec.limit->compliance = compliance[i];
+        spec.limit->damping = damping[i];
+        spec.limit->restitution = restitution[i];
     }
     table.expect_all_read();
 }
@@ -134,11 +142,11 @@ void read_joint_springs(const nb::dict& springs, RigidScene& scene) {
                   force = table.numbers("max_force");
     for (std::size_t i = 0; i < table.rows(); ++i) {
         JointSpec& spec = scene.joints[joint.index(i, all_joints(scene))];
-        spec.has_spring = true;
-        spec.spring_force = force[i];
-        spec.spring_stiffness = stiffness[i];
-        spec.spring_rest = rest[i];
-        spec.spring_damping = damping[i];
+        spec.spring.emplace();
+        spec.spring->force = force[i];
+        spec.spring->stiffness = stiffness[i];
+        spec.spring->rest = rest[i];
+        spec.spring->damping = damping[i];
     }
     table.expect_all_read();
 }
@@ -358,13 +366,13 @@ RigidMethod to_method(const nb::dict& method) {
 
 void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, const nb::dict& motors,
           const nb::dict& limits, const nb::dict& joint_springs, const nb::dict& joint_frictions,
-          const nb::dict& springs, const nb::dict& terms, const nb::dict& wire_points, const nb::dict& eyes,
-          const nb::dict& tyres, const nb::dict& fields, const nb::dict& fluids, const nb::dict& floaters,
-          const nb::dict& drives, const nb::dict& knots, const nb::dict& colliders,
-          const nb::dict& outline_corners, const nb::dict& outline_faces, const nb::dict& no_contact,
-          bool contacts, const Point& gravity, const nb::dict& method, bool loads_change,
-          const std::vector<QuantityRequest>& quantities, const std::vector<Observation>& observations,
-          double time_left) {
+          const nb::dict& armatures, const nb::dict& springs, const nb::dict& terms,
+          const nb::dict& wire_points, const nb::dict& eyes, const nb::dict& tyres, const nb::dict& fields,
+          const nb::dict& fluids, const nb::dict& floaters, const nb::dict& drives, const nb::dict& knots,
+          const nb::dict& colliders, const nb::dict& outline_corners, const nb::dict& outline_faces,
+          const nb::dict& no_contact, bool contacts, const Point& gravity, const nb::dict& method,
+          bool loads_change, const std::vector<QuantityRequest>& quantities,
+          const std::vector<Observation>& observations, double time_left) {
     RigidScene scene;
     scene.gravity = to_vec(gravity);
     scene.loads_change = loads_change;
@@ -376,6 +384,7 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
     read_limits(limits, scene);
     read_joint_springs(joint_springs, scene);
     read_frictions(joint_frictions, scene);
+    read_armatures(armatures, scene);
     scene.springs = read_springs(springs, scene.bodies.size());
     scene.fields = read_fields(fields);
     read_terms(terms, scene);
@@ -397,16 +406,16 @@ void bind_rigid(nb::module_& m) {
     bind_program<RigidSystem>(
         m, "RigidProgram", "RigidSnapshot", "A compiled scene with rigid bodies.", &make, nb::arg("bodies"),
         nb::arg("joints"), nb::arg("motors"), nb::arg("limits"), nb::arg("joint_springs"),
-        nb::arg("joint_frictions"), nb::arg("springs"), nb::arg("terms"), nb::arg("wire_points"),
-        nb::arg("eyes"), nb::arg("tyres"), nb::arg("fields"), nb::arg("fluids"), nb::arg("floaters"),
-        nb::arg("drives"), nb::arg("knots"), nb::arg("colliders"), nb::arg("outline_corners"),
-        nb::arg("outline_faces"), nb::arg("no_contact"), nb::arg("contacts"), nb::arg("gravity"),
-        nb::arg("method"), nb::arg("loads_change"), nb::arg("quantities"), nb::arg("observations"),
-        nb::arg("time_left") = 0.0,
+        nb::arg("joint_frictions"), nb::arg("armatures"), nb::arg("springs"), nb::arg("terms"),
+        nb::arg("wire_points"), nb::arg("eyes"), nb::arg("tyres"), nb::arg("fields"), nb::arg("fluids"),
+        nb::arg("floaters"), nb::arg("drives"), nb::arg("knots"), nb::arg("colliders"),
+        nb::arg("outline_corners"), nb::arg("outline_faces"), nb::arg("no_contact"), nb::arg("contacts"),
+        nb::arg("gravity"), nb::arg("method"), nb::arg("loads_change"), nb::arg("quantities"),
+        nb::arg("observations"), nb::arg("time_left") = 0.0,
         "Tables are dicts of columns, a row each, in the names of RigidBodySpec, JointSpec and Primitive;\n"
         "outlines of hulls and meshes are numbered in the order they come;\n"
         "springs and fields as for ParticleProgram. A body is an index, -1 the world; motors, limits,\n"
-        "joint_springs and joint_frictions name the joint they drive. Raises TimeoutError where making it takes longer\n"
+        "joint_springs, joint_frictions and armatures name the joint they drive. Raises TimeoutError where making it takes longer\n"
         "than `time_left` [s, 0 for no limit].");
 }
 

@@ -23,7 +23,7 @@ using namespace tolerances::contact_impact;
 /// Of successive impacts in one step.
 int most_rounds(std::size_t points) noexcept { return 100 + 20 * static_cast<int>(points); }
 
-/// Of each island's bodies, J.
+/// Of each island's bodies and rotors, J.
 void find_kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& velocity, const Islands& islands,
                          std::vector<double>& energy) {
     energy.assign(islands.count, 0.0);
@@ -34,6 +34,12 @@ void find_kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& vel
             for (int j = 0; j < 6; ++j) momentum += system.mass[b][6 * i + j] * velocity[b][j];
             energy[islands.of_body[b]] += 0.5 * momentum * velocity[b][i];
         }
+    }
+    for (const RowBlock& block : system.rows) {
+        if (block.rotor < 0) continue;
+        const double speed = row_velocity(block, block.rotor, velocity);
+        energy[islands.of_body[std::max(block.first, block.second)]] +=
+            0.5 * speed * speed / block.softness[block.rotor];
     }
 }
 
@@ -253,6 +259,7 @@ void ContactStage::take_part(MixedSystem& system, const std::vector<std::size_t>
         for (int i = 0; i < block.size; ++i) {
             const bool below = block.lower[i] == -unbounded, above = block.upper[i] == unbounded;
             block.multiplier[i] = 0.0;
+            if (i == block.rotor) continue;
             if (below && above) block.right[i] = 0.0;
             else if (i == block.stop.row && (block.stop.touching || block.stop.answered))
                 block.right[i] = block.stop.rebound;

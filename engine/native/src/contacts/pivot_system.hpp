@@ -60,6 +60,8 @@ struct RowBlock {
     bool is_contact =
         false;  // rows after the normal are friction: the law bounds them, whatever is said here
     StopRow stop;
+    int rotor =
+        -1;  // the row of a geared rotor: its softness is that of an inertia, its right side a speed, in impacts too
     std::span<const FurtherBody> further;  // what fills the rows keeps what it shows
 };
 

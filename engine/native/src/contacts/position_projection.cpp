@@ -61,7 +61,7 @@ void PositionProjector::hold_joints(MixedSystem& projection, double least) {
         for (int i = 0; i < block.size; ++i) {
             block.right[i] = block.multiplier[i] = 0.0;
             const bool below = block.lower[i] == -unbounded, above = block.upper[i] == unbounded;
-            if (!below && !above) block.lower[i] = block.upper[i] = 0.0;
+            if ((!below && !above) || i == block.rotor) block.lower[i] = block.upper[i] = 0.0;
             if (k < yielding_.size() && yielding_[k] != 0) continue;
             const double softness = block.softness[i];
             block.softness[i] = 0.0;

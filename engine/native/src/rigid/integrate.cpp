@@ -1,8 +1,10 @@
 // Stage: places. q₊ = q + h v₊, and every orientation by the turn h w₊ of its body (rigid_state.hpp). Bodies of an event went with
 // v₋ until its time: what that makes of their way is added.
 //
-// reads: velocities of bodies, the contact stage's correction(). writes: places and orientations of bodies.
+// reads: velocities of bodies, the contact stage's correction(). writes: places and orientations of bodies,
+// speeds of rotors.
 #include "rigid/rigid_system.hpp"
+#include "rigid/rotors.hpp"
 
 namespace spook {
 
@@ -22,6 +24,15 @@ void RigidSystem::integrate() {
             if (!asleep(constrained_[k]))
                 displace(constants_[constrained_[k]], h_, {extra[k][0], extra[k][1], extra[k][2]},
                          {extra[k][3], extra[k][4], extra[k][5]}, live_.bodies[constrained_[k]]);
+    }
+    const auto comes_late = [this](int body) {  // those of an event did not go with one velocity
+        return touching_ && body >= 0 && contacts_->toi_fraction(body) > 0.0;
+    };
+    for (const int k : joints_.rotors()) {
+        const JointBlock& block = joints_.blocks()[k];
+        JointState& state = joints_.states[block.joint];
+        if (rests(k)) state.rotor = state.rotor_lead = 0.0;
+        else turn_rotor(joints_, k, live_.bodies, h_, !comes_late(block.first) && !comes_late(block.second));
     }
 }
 

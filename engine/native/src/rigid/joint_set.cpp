@@ -5,6 +5,7 @@
 #include <numbers>
 #include <stdexcept>
 
+#include "rigid/rotors.hpp"
 #include "rigid/tyre_rows.hpp"
 
 namespace spook {
@@ -50,34 +51,39 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
         joint.block = static_cast<int>(blocks_.size());
         blocks_.push_back(block);
 
-        joint.tracked = spec.has_limit || spec.has_spring;
-        if (spec.has_motor || spec.has_limit || spec.has_spring || rubs(spec)) {
+        joint.tracked = spec.limit.has_value() || spec.spring.has_value() || spec.armature > 0.0;
+        if (spec.motor || spec.limit || spec.spring || spec.armature > 0.0 || rubs(spec)) {
             Axial axial;
-            axial.has_motor = spec.has_motor;
-            axial.has_limit = spec.has_limit;
-            axial.has_spring = spec.has_spring;
+            axial.has_motor = spec.motor.has_value();
+            axial.has_limit = spec.limit.has_value();
+            axial.has_spring = spec.spring.has_value();
             block.axial = true;
             block.size = 0;
             block.softness = {};
-            if (spec.has_motor) {
-                axial.speed = spec.motor_speed;
-                axial.pushes = spec.motor_pushes;
-                axial.impulse = time_step * spec.motor_force;
+            if (spec.motor) {
+                axial.speed = spec.motor->speed;
+                axial.pushes = spec.motor->pushes;
+                axial.impulse = time_step * spec.motor->force;
                 block.softness[block.size++] = 0.0;
             }
-            if (spec.has_limit) {
-                axial.lower = spec.limit_lower;
-                axial.upper = spec.limit_upper;
-                axial.restitution = spec.limit_restitution;
-                axial.limit = regularise(spec.limit_compliance, spec.limit_damping, time_step);
+            if (spec.limit) {
+                axial.lower = spec.limit->lower;
+                axial.upper = spec.limit->upper;
+                axial.restitution = spec.limit->restitution;
+                axial.limit = regularise(spec.limit->compliance, spec.limit->damping, time_step);
                 block.softness[block.size++] = axial.limit.softness;
             }
-            if (spec.has_spring) {
-                axial.spring_rest = spec.spring_rest;
-                axial.spring_stiffness = spec.spring_stiffness;
-                axial.spring_impulse = time_step * spec.spring_force;
-                axial.spring = regularise(1.0 / spec.spring_stiffness, spec.spring_damping, time_step);
+            if (spec.spring) {
+                axial.spring_rest = spec.spring->rest;
+                axial.spring_stiffness = spec.spring->stiffness;
+                axial.spring_impulse = time_step * spec.spring->force;
+                axial.spring = regularise(1.0 / spec.spring->stiffness, spec.spring->damping, time_step);
                 block.softness[block.size++] = axial.spring.softness;
+            }
+            if (spec.armature > 0.0) {  // G v₊ + λ/I = w, the rotor's speed before
+                rotors_.push_back(static_cast<int>(blocks_.size()));
+                block.rotor = block.size;
+                block.softness[block.size++] = 1.0 / spec.armature;
             }
             for (int way = 0; way < 2; ++way) {
                 if (!rubs(spec, way)) continue;
@@ -186,6 +192,7 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
         right.lower[spring] = -axial.spring_impulse;
         right.upper[spring] = axial.spring_impulse;
     }
+    if (blocks_[joint.block + 1].rotor >= 0) next(rotor_right(state, row.rate));
     for (int way = 0; way < 2; ++way) {  // friction: at rest as far as it reaches
         if (!axial.rubs[way]) continue;
         row = axial_row(joint.constants, body(joint.first, bodies), body(joint.second, bodies), way == 0);

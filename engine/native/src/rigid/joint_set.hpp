@@ -21,9 +21,11 @@ namespace spook {
 /// One block of up to six rows between two bodies: a joint's own rows, or those of its free coordinate.
 struct JointBlock {
     int joint = 0;
-    bool axial = false;           // motor, limit, spring, in this order, as far as the joint has them
+    bool axial =
+        false;  // motor, limit, spring, armature, friction, in this order, as far as the joint has them
     int first = -1, second = -1;  // bodies of the scene, −1 the world
     int size = 1;
+    int rotor = -1;  // the row of its armature
     std::array<double, 6> softness{};
 };
 
@@ -63,7 +65,6 @@ public:
     int rows(int joint) const noexcept { return joints_[joint].constants.rows; }
     JointKind kind(int joint) const noexcept { return joints_[joint].constants.kind; }
     const JointConstants& constants(int joint) const noexcept { return joints_[joint].constants; }
-    bool is_distance(int joint) const noexcept { return kind(joint) == JointKind::distance; }
     /// The bodies of a block beyond its first two: relations and wires may have more.
     std::span<const int> others(int block) const noexcept;
     /// Their Jacobians, a row of six each, as the last assemble() found them; null where no row has any.
@@ -150,6 +151,8 @@ public:
     bool follows() const noexcept { return !followed_.empty(); }
     /// After a solve: a joint whose own rows carried more than its strength holds nothing from the next step on.
     void break_overloaded(int joint, std::int64_t step);
+    /// Blocks that have a rotor, see rotors.hpp.
+    std::span<const int> rotors() const noexcept { return rotors_; }
     /// Energy of the spring of a joint's free coordinate about `rest` [J]; of a broken joint none.
     double spring_energy(int joint, double rest, std::span<const BodyState> bodies) const noexcept;
     /// That of all of them whose rest does not move with the time.
@@ -232,8 +235,9 @@ private:
         double violation = 0.0, rate = 0.0;
     };
 
-    const BodyState& body(int index, std::span<const BodyState> bodies) const noexcept {
-        return index < 0 ? world_ : bodies[index];
+    static const BodyState& body(int index, std::span<const BodyState> bodies) noexcept {
+        static const BodyState world;
+        return index < 0 ? world : bodies[index];
     }
     General general_of(const RigidScene& scene, const JointSpec& spec) const;
     Along along(const General& general, std::span<const BodyState> bodies, double* gradient) const noexcept;
@@ -254,7 +258,6 @@ private:
 
     double time_step_;
     bool some_given_ = false, stops_fold_ = false;
-    BodyState world_;
     LargeArray<Joint> joints_;
     std::vector<Axial> axials_;
     std::vector<General> generals_;
@@ -264,7 +267,8 @@ private:
     std::vector<BearingRow> bearings_;
     std::vector<double> gradient_;  // of one general row: six per body
     std::vector<int> followed_;
-    std::vector<int> stops_;  // joints with a row that only pushes one way
+    std::vector<int> stops_;   // joints with a row that only pushes one way
+    std::vector<int> rotors_;  // blocks
     LargeArray<JointBlock> blocks_;
 };
 

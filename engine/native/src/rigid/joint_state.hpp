@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cstdint>
+#include <limits>
 #include <vector>
 
 #include "linear/large_array.hpp"
@@ -13,7 +14,7 @@ namespace spook {
 /// What a joint carries from step to step.
 struct JointState {
     std::array<double, 6> multiplier{};
-    std::array<double, 5> axial_multiplier{};
+    std::array<double, 6> axial_multiplier{};
     Vec3 first_reach,
         second_reach;  // from the centres to the point where forces are read, at the last step
     bool broken = false;
@@ -26,7 +27,11 @@ struct JointState {
         -1.0;  // how far the scene began beyond its limit, as far as it still is; negative: not known
     bool folds = false;    // the stops of the joint are hit several times in the step,
     double fold_to = 0.0;  // and its coordinate is here behind the last, m or rad
-    double angle = 0.0;    // unwrapped coordinate of a hinge that needs it
+    double rotor =
+        std::numeric_limits<double>::quiet_NaN();  // speed of its armature, m/s or rad/s; NaN: not known yet
+    double rotor_lead =
+        0.0;             // by which the coordinate went faster over the last step than its row began with
+    double angle = 0.0;  // unwrapped coordinate of a hinge that needs it
     // N s: of an eye's row; of a tyre's rows along and across; of a joint's friction, as far as it follows the load
     std::array<double, 2> bound{};
     double slides =

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "rigid/rigid_system.hpp"
+#include "rigid/rotors.hpp"
 
 namespace spook {
 
@@ -59,6 +60,11 @@ void RigidSystem::start_half_step() {
             find_bias(bias_.data());
             for (std::size_t row = 0; row < rows; ++row) right_[row] -= h_ * bias_[row];
             if (!factor_and_solve()) live_.not_solved = constrained_.front();
+            for (const int k : joints_.rotors()) {
+                const JointBlock& block = joints_.blocks()[k];
+                joints_.states[block.joint].rotor -=
+                    0.5 * block.softness[block.rotor] * solution_[matrix_.offset(k) + block.rotor];
+            }
             const double* x = solution_.data() + rows;
             for (int i : constrained_) {
                 const Vec3 v{x[0], x[1], x[2]};
@@ -86,10 +92,18 @@ void RigidSystem::start_half_step_touching() {
     const MixedSystem mixed = mixed_;
     find_velocities();
     const LargeArray<BodyState> whole = live_.bodies;
+    std::vector<double> rotors;
+    for (const int k : joints_.rotors()) {
+        const double now = rotor_speed(joints_, k, start.bodies);
+        rotors.push_back(
+            now - 0.5 * (joints_.states[joints_.blocks()[k].joint].rotor + rotor_change(joints_, k) - now));
+    }
     live_ = start;
     mixed_ = mixed;
     contacts_ = fresh_contacts_;
     std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
+    for (std::size_t i = 0; i < rotors.size(); ++i)
+        joints_.states[joints_.blocks()[joints_.rotors()[i]].joint].rotor = rotors[i];
     rounds_ = pgs_iterations_ = 0;
     residual_ = 0.0;
     for (int i = 0; i < bodies(); ++i) {

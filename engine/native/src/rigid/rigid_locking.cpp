@@ -344,7 +344,8 @@ double RigidSystem::driven(const Loop& loop) {
             const double* j = jacobian(k, second);
             for (int i = 0; i < block.size; ++i)
                 for (int axis = 0; axis < 6; ++axis, ++j)
-                    push_[solver_index_[body]][axis] += *j * solution_[matrix_.offset(k) + i];
+                    if (i != block.rotor)  // inertia drives nothing
+                        push_[solver_index_[body]][axis] += *j * solution_[matrix_.offset(k) + i];
         }
     }
     double sum = 0.0;

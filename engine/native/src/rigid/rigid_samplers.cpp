@@ -6,7 +6,7 @@ namespace {
 std::vector<int> distances(const RigidSystem& system) {
     std::vector<int> found;
     for (int joint = 0; joint < system.joints().count(); ++joint)
-        if (system.joints().is_distance(joint)) found.push_back(joint);
+        if (system.joints().kind(joint) == JointKind::distance) found.push_back(joint);
     return found;
 }
 

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <vector>
 
 #include "collision/detection.hpp"
@@ -73,7 +74,20 @@ struct RelationTerm {
     double coefficient = 0.0;
 };
 
-/// Rows of a joint in the order of engine/joints.py, then those of its free coordinate: motor, limit, spring.
+struct MotorSpec {
+    double speed = 0.0, force = 0.0;  // force may be infinite
+    bool pushes = false;              // with `force` whatever the speed
+};
+struct LimitSpec {
+    double lower = 0.0, upper = 0.0, compliance = 0.0, damping = 0.0, restitution = 0.0;
+};
+struct JointSpringSpec {
+    double stiffness = 0.0, rest = 0.0, damping = 0.0;
+    double force = std::numeric_limits<double>::infinity();  // N, N m: the most it pulls
+};
+
+/// Rows of a joint in the order of engine/joints.py, then those of its free coordinate: motor, limit, spring, armature,
+/// friction.
 struct JointSpec {
     JointKind kind = JointKind::lock;
     int first = -1, second = -1;     // body, −1 the world
@@ -98,13 +112,10 @@ struct JointSpec {
     double torque_strength =
         std::numeric_limits<double>::infinity();  // N m    what one of coefficient 1 feels
 
-    bool has_motor = false, has_limit = false, has_spring = false;
-    double motor_speed = 0.0, motor_force = 0.0;  // force may be infinite
-    bool motor_pushes = false;                    // with motor_force whatever the speed
-    double limit_lower = 0.0, limit_upper = 0.0, limit_compliance = 0.0, limit_damping = 0.0;
-    double limit_restitution = 0.0;
-    double spring_stiffness = 0.0, spring_rest = 0.0, spring_damping = 0.0;
-    double spring_force = std::numeric_limits<double>::infinity();  // N, N m: the most it pulls
+    std::optional<MotorSpec> motor;
+    std::optional<LimitSpec> limit;
+    std::optional<JointSpringSpec> spring;
+    double armature = 0.0;                  // kg, kg m²: inertia that goes as the free coordinate does
     std::array<double, 2> dry_friction{};   // of the slide along the axis, N, and of the turn about it, N m
     std::array<double, 2> load_friction{};  // the same per N the joint holds: 1, m
 };
@@ -133,9 +144,9 @@ inline bool rubs(const JointSpec& joint) noexcept { return rubs(joint, 0) || rub
 /// Whether some row of the joint has a finite bound.
 inline bool can_let_go(const JointSpec& joint) noexcept {
     return joint.one_sided || gives_way(joint.kind) || can_break(joint) || rubs(joint) ||
-           (joint.has_motor && (joint.motor_pushes || std::isfinite(joint.motor_force))) ||
-           (joint.has_spring && std::isfinite(joint.spring_force)) ||
-           (joint.has_limit && joint.limit_lower < joint.limit_upper);
+           (joint.motor && (joint.motor->pushes || std::isfinite(joint.motor->force))) ||
+           (joint.spring && std::isfinite(joint.spring->force)) ||
+           (joint.limit && joint.limit->lower < joint.limit->upper);
 }
 
 struct RigidMethod {

@@ -38,7 +38,7 @@ Facts facts_of(const RigidScene& scene) {
     facts.bounded = std::any_of(scene.joints.begin(), scene.joints.end(),
                                 [](const JointSpec& joint) { return can_let_go(joint); });
     facts.limited = std::any_of(scene.joints.begin(), scene.joints.end(), [](const JointSpec& joint) {
-        return joint.one_sided || (joint.has_limit && joint.limit_lower < joint.limit_upper);
+        return joint.one_sided || (joint.limit && joint.limit->lower < joint.limit->upper);
     });
     facts.contacts = Detection(scene.colliders, dynamic, scene.no_contact).possible();
     facts.rubbing = facts.contacts && rubbing >= 2;

@@ -1,4 +1,5 @@
 #include "rigid/rigid_system.hpp"
+#include "rigid/rotors.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -249,6 +250,7 @@ void RigidSystem::reset(StageClock* clock) {
         rows.second = block.second < 0 ? -1 : solver_index_[block.second];
         rows.size = block.size;
         rows.softness = block.softness;
+        rows.rotor = block.rotor;
         mixed_.rows.push_back(rows);
     }
     if (half_step_ && may_touch) start_half_step_touching();
@@ -304,7 +306,7 @@ double RigidSystem::kinetic_energy() const noexcept {
         sum += 0.5 * constants_[i].mass * dot(s.velocity, s.velocity);
         if (!constants_[i].particle) sum += 0.5 * dot(s.angular_velocity, s.angular_momentum);
     }
-    return sum;
+    return sum + rotor_energy(joints_, live_.bodies);
 }
 
 double RigidSystem::potential_energy() const noexcept {

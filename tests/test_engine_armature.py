@@ -1,0 +1,206 @@
+"""Inertia that goes with a joint's coordinate: against statics, a tight integration, momentum, and MuJoCo's Runge-Kutta."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from spook_tracker.engine import (
+    WORLD,
+    AngularVelocity,
+    Box,
+    Energy,
+    Final,
+    Hinge,
+    JointCoordinate,
+    Load,
+    Material,
+    Method,
+    MethodError,
+    Position,
+    Prismatic,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+    Velocity,
+    simulate,
+    start,
+)
+
+HALF = Method(half_step_velocities=True)
+CORRECTED = Method(half_step_velocities=True, corrections=2)
+MASS, MOMENT, ARM, ROTOR = 2.0, 0.05, 0.4, 0.7  # kg, kg m², m, kg m²
+
+
+def pendulum(**hinge: float) -> Scene:
+    """A bob on a hinge, let go level."""
+    bob = RigidBody(name="bob", mass=MASS, inertia=(MOMENT, MOMENT, MOMENT), position=(ARM, 0.0, 0.0))
+    joint = Hinge(
+        name="joint",
+        between=(WORLD, "bob"),
+        at=(0.0, 0.0, 0.0),
+        axis=(0.0, 1.0, 0.0),
+        compliance=0.0,
+        **hinge,
+    )
+    return Scene(bodies=(bob,), constraints=(joint,), gravity=(0.0, 0.0, -9.81))
+
+
+@pytest.mark.parametrize(
+    ("method", "order"), [(Method(), 1.0), (HALF, 2.0), (Method(solver="iterative"), 1.0)]
+)
+def test_a_pendulum_falls_by_the_sum_of_its_inertias(method: Method, order: float) -> None:
+    inertia = MOMENT + MASS * ARM**2 + ROTOR
+    reference = solve_ivp(
+        lambda _, s: [s[1], MASS * 9.81 * ARM * math.cos(s[0]) / inertia], (0.0, 1.0), [0.0, 0.0], rtol=1e-11
+    ).y[0, -1]
+    errors = []
+    for steps in (100, 200):
+        seen = {"angle": Final(quantity=JointCoordinate("joint"))}
+        run = simulate(
+            pendulum(armature=ROTOR), time_step=1 / steps, duration=1.0, method=method, observe=seen
+        )
+        errors.append(abs(float(run["angle"]) - reference))
+    assert errors[-1] < 0.02
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(order, abs=0.15)
+
+
+def test_its_energy_is_kept_and_counted() -> None:
+    seen = {"energy": Trace(quantity=Energy())}
+    run = simulate(pendulum(armature=ROTOR), time_step=1e-3, duration=2.0, method=HALF, observe=seen)
+    assert np.ptp(run["energy"]) < 1e-4 * MASS * 9.81 * ARM
+
+
+ARM_OF_THREE = """<mujoco><option timestep="2e-4" integrator="RK4"/><worldbody><body>
+<joint type="hinge" axis="0 1 0" armature=".3"/><inertial pos=".3 0 0" mass="1.5" diaginertia=".02 .05 .06"/>
+<body pos=".6 0 0"><joint type="hinge" axis="0 0 1" armature=".1"/><inertial pos=".2 .1 0" mass=".8" diaginertia=".01 .03 .02"/>
+<body pos=".4 0 0"><joint type="slide" axis="1 0 1" armature=".5"/><inertial pos="0 0 .1" mass=".3" diaginertia=".01 .02 .03"/>
+</body></body></body></worldbody></mujoco>"""
+SPEEDS = (1.0, 4.0, 0.2)  # rad/s, rad/s, m/s
+
+
+@pytest.mark.parametrize(("method", "order", "least"), [(Method(), 1.0, 2e-2), (CORRECTED, 2.0, 3e-4)])
+def test_an_arm_whose_axes_turn_goes_as_by_runge_kutta(method: Method, order: float, least: float) -> None:
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_string(ARM_OF_THREE)
+    data = mujoco.MjData(model)
+    data.qvel[:] = SPEEDS
+    mujoco.mj_forward(model, data)
+    bodies, joints = [], []
+    for k, form in enumerate((Hinge, Hinge, Prismatic)):
+        speed = np.zeros(6)
+        mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_BODY, k + 1, speed, 0)
+        bodies.append(
+            RigidBody(
+                name=f"b{k}",
+                mass=float(model.body_mass[k + 1]),
+                inertia=tuple(model.body_inertia[k + 1]),
+                position=tuple(data.xipos[k + 1]),
+                velocity=tuple(speed[3:]),
+                angular_velocity=tuple(speed[:3]),
+            )
+        )
+        joints.append(
+            form(
+                name=f"j{k}",
+                between=(WORLD if k == 0 else f"b{k - 1}", f"b{k}"),
+                at=tuple(data.xanchor[k]),
+                axis=tuple(data.xaxis[k]),
+                compliance=0.0,
+                armature=float(model.dof_armature[k]),
+            )
+        )
+    scene = Scene(bodies=tuple(bodies), constraints=tuple(joints), gravity=(0.0, 0.0, -9.81))
+    for _ in range(5000):
+        mujoco.mj_step(model, data)
+    mujoco.mj_forward(model, data)
+    errors = []
+    for steps in (100, 200, 400):
+        run = simulate(
+            scene,
+            time_step=1 / steps,
+            duration=1.0,
+            method=method,
+            observe={f"b{k}": Final(quantity=Position(f"b{k}")) for k in range(3)},
+        )
+        errors.append(max(float(np.abs(run[f"b{k}"] - data.xipos[k + 1]).max()) for k in range(3)))
+    assert errors[-1] < least
+    assert math.log2(errors[1] / errors[2]) == pytest.approx(order, abs=0.15)
+
+
+@pytest.mark.parametrize("method", [Method(), HALF, Method(solver="iterative")])
+@pytest.mark.parametrize("rotor", [0.0, 0.3, 5.0])
+def test_an_elastic_ball_meets_the_bar_and_its_rotor(method: Method, rotor: float) -> None:
+    elastic = Material(restitution=1.0)
+    bar = RigidBody(
+        name="bar",
+        mass=2.0,
+        shape=Box((1.0, 0.1, 0.1)),
+        position=(0.5, 0.0, 0.0),
+        inertia=(0.01, 0.2, 0.2),
+        material=elastic,
+    )
+    ball = RigidBody(
+        name="ball",
+        mass=0.5,
+        shape=Sphere(0.05),
+        position=(0.8, 0.0, 0.4),
+        velocity=(0.0, 0.0, -3.0),
+        material=elastic,
+    )
+    joint = Hinge(
+        name="joint",
+        between=(WORLD, "bar"),
+        at=(0.0, 0.0, 0.0),
+        axis=(0.0, -1.0, 0.0),
+        compliance=0.0,
+        armature=rotor,
+    )
+    seen = {"ball": Final(quantity=Velocity("ball")), "bar": Final(quantity=AngularVelocity("bar"))}
+    run = simulate(
+        Scene(bodies=(bar, ball), constraints=(joint,)),
+        time_step=1 / 240,
+        duration=0.3,
+        method=method,
+        observe=seen,
+    )
+    inertia = 0.2 + 2.0 * 0.25 + rotor
+    impulse = 2.0 * 3.0 / (1 / 0.5 + 0.8**2 / inertia)
+    assert float(run["ball"][2]) == pytest.approx(-3.0 + impulse / 0.5, rel=1e-10)
+    assert float(run["bar"][1]) == pytest.approx(
+        0.8 * impulse / inertia, rel=5e-4
+    )  # the bar turns on: order 1
+
+
+def test_between_two_free_bodies_it_moves_no_common_centre() -> None:
+    bodies = (
+        RigidBody(name="one", mass=1.0, inertia=(0.1, 0.1, 0.1), position=(0.0, 0.0, 0.0)),
+        RigidBody(name="two", mass=3.0, inertia=(0.1, 0.1, 0.1), position=(1.0, 0.0, 0.0)),
+    )
+    rail = Prismatic(name="rail", between=("one", "two"), axis=(1.0, 0.0, 0.0), compliance=0.0, armature=2.0)
+    scene = Scene(
+        bodies=bodies, constraints=(rail,), forces=(Load(name="pull", body="two", force=(6.0, 0.0, 0.0)),)
+    )
+    seen = {name: Final(quantity=Velocity(name)) for name in ("one", "two")}
+    run = simulate(scene, time_step=0.01, duration=1.0, observe=seen)
+    # x₁'' m₁ = 2 q'', x₂'' m₂ = 6 − 2 q'', q = x₂ − x₁
+    rate = 6.0 / 3.0 / (1.0 + 2.0 * (1.0 + 1.0 / 3.0))
+    assert float(run["one"][0]) == pytest.approx(2.0 * rate, rel=1e-12)
+    assert float(run["two"][0]) == pytest.approx(2.0 * rate + rate, rel=1e-12)
+
+
+def test_it_goes_on_from_a_snapshot_to_the_bit_and_stands_in_the_way_of_compositions() -> None:
+    with start(pendulum(armature=ROTOR), time_step=0.01) as run:
+        run.step(20)
+        kept = run.save()
+        run.step(30)
+        there = run.state
+        run.restore(kept)
+        run.step(30)
+        assert all(np.array_equal(run.state[name], there[name]) for name in there)
+    with pytest.raises(MethodError, match="armature of 'joint'"):
+        simulate(pendulum(armature=ROTOR), time_step=0.01, duration=0.1, method=Method(composition="order4"))
