@@ -4,6 +4,10 @@
 
 `bench/engines.py` puts them with all the others, and its page has a table of the answers. None is a gate: each shows what
 comes of a choice that an engine's makers made.
+
+    tracker run --engine newton --catalogue bench.engine_facts:ARM
+
+asks one more, of those that have stops in joints: an arm of light links.
 """
 
 from __future__ import annotations
@@ -12,7 +16,18 @@ from functools import partial
 
 import numpy as np
 
-from spook_tracker.engine import Energy, Final, Particle, Position, Result, RigidBody, Scene, Trace
+from spook_tracker.engine import (
+    Energy,
+    Final,
+    Hinge,
+    Limit,
+    Particle,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Trace,
+)
 from spook_tracker.scalar_tests.beam.scene import COUNT as BOXES
 from spook_tracker.scalar_tests.beam.scene import scene as beam
 from spook_tracker.scalar_tests.case import Example, Measurement, Metric, ScalarTest, Simulate
@@ -26,6 +41,15 @@ HINGES = 10
 FALL_STEPS = 30  # half a second
 STANDING, LANDED, STAND = 0.3, 1.0, 10.0  # slope, below the friction coefficient of 0.5; s
 FLIGHT, FLIGHT_STEPS = 10.0, 1000  # m, in one second
+ARM_LINKS, LINK, LINK_MASS, STOP, ARM_FALL = 6, 0.1, 0.1, 0.5, 2.0  # m, kg, rad either way, s
+ARM_AXES = (
+    (0.0, 0.0, 1.0),
+    (0.0, 1.0, 0.0),
+    (0.0, 1.0, 0.0),
+    (1.0, 0.0, 0.0),
+    (0.0, 1.0, 0.0),
+    (1.0, 0.0, 0.0),
+)
 
 
 def energy_gain(simulate: Simulate, time_step: float) -> dict[str, float]:
@@ -78,6 +102,38 @@ def _flying() -> RigidBody:
     return RigidBody(
         name="ball", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0), velocity=(FLIGHT, 0.0, 0.0)
     )
+
+
+def arm() -> Scene:
+    """An arm the size of those of hobbyists, stretched out level: slender links, a stop either way in each joint."""
+    inertia = LINK_MASS * LINK**2 / 12.0
+    links = tuple(
+        RigidBody(
+            name=f"{k}",
+            mass=LINK_MASS,
+            inertia=(0.02 * inertia, inertia, inertia),
+            position=((k + 0.5) * LINK, 0.0, 0.0),
+        )
+        for k in range(ARM_LINKS)
+    )
+    joints = tuple(
+        Hinge(
+            name=f"joint {k}",
+            between=(f"{k - 1}" if k else "world", f"{k}"),
+            at=(k * LINK, 0.0, 0.0),
+            axis=ARM_AXES[k],
+            limit=Limit(lower=-STOP, upper=STOP),
+        )
+        for k in range(ARM_LINKS)
+    )
+    return Scene(bodies=links, constraints=joints, gravity=(0.0, 0.0, -9.81))
+
+
+def arm_gain(simulate: Simulate, time_step: float) -> dict[str, float]:
+    """Largest gain of energy of that arm, let go [J]: stops give none, so that it never rises; hanging it lacks 1.8 J."""
+    seen = {"energy": Trace(quantity=Energy(), from_start=True)}
+    energy = simulate(arm(), time_step=time_step, duration=ARM_FALL, observe=seen)["energy"]
+    return {"energy_gain": float(np.max(energy))}
 
 
 def _fact(
@@ -156,5 +212,17 @@ FACTS = {
         lost_digits,
         lambda: Example(scene=Scene(bodies=(_flying(),)), time_step=1.0 / FLIGHT_STEPS),
         (1.0 / FLIGHT_STEPS,),
+    ),
+}
+
+ARM = {
+    "fact_arm": _fact(
+        f"Do stops hold an arm of {ARM_LINKS} light links",
+        "energy_gain",
+        "J",
+        f"largest gain of energy of an arm of {ARM_LINKS} links of {LINK_MASS:g} kg with stops, let go level, {ARM_FALL:g} s",
+        arm_gain,
+        lambda: Example(scene=arm(), time_step=TIME_STEP),
+        (TIME_STEP, 1.0 / 240.0),
     ),
 }

@@ -43,7 +43,11 @@ from spook_tracker.tracker.website.recorded import Occasion
 
 OURS = engine_places.OURS
 FACTS = "bench.engine_facts:FACTS"
-COMPILED = ("mjx",)  # takes seconds to compile each scene: asked last, where time is short
+COMPILED = (
+    "mujoco_warp",
+    "newton",
+    "mjx",
+)  # take seconds to compile a scene: asked last, where time is short
 FACT_LIMIT = 5.0  # s of one simulation
 # Of every engine, ours included: short runs are timed three times, what takes longer than this many seconds twice, visiting
 # all rungs before the second; most of the time goes into models that are built anew for each.

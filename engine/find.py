@@ -37,6 +37,8 @@ EXTRAS: Mapping[str, str] = {
     "rapier3d": "rapier3d",
     "sapien": "sapien",
     "mjx": "mujoco-mjx",
+    "newton": "newton",
+    "mujoco_warp": "mujoco-warp",
 }  # engine: its package, from PyPI
 NODE: Mapping[str, str] = {
     "cannon": "cannon-es",

@@ -79,6 +79,8 @@ FACTS: Mapping[str, Facts] = {
     "jolt": Facts("32 bits", "MIT", "C++, JavaScript", "CPU"),
     "mjx": Facts("64 bits", "Apache-2.0", "Python (JAX)", "CPU, GPU, TPU"),
     "mujoco": Facts("64 bits", "Apache-2.0", "C, Python", "CPU"),
+    "mujoco_warp": Facts("32 bits", "Apache-2.0", "Python (Warp)", "CPU, GPU"),
+    "newton": Facts("32 bits", "Apache-2.0", "Python (Warp)", "CPU, GPU"),
     "p2": Facts("64 bits", "MIT", "JavaScript", "CPU, in a plane"),
     "pybullet": Facts("64 bits", "Zlib", "C++, Python", "CPU"),
     "rapier": Facts("32 bits", "Apache-2.0", "Rust, JavaScript", "CPU"),

@@ -1,0 +1,38 @@
+"""What the engines of Warp share: its kernels on the CPU, in single precision, and steps replayed as one graph.
+
+Launches from Python cost more than small scenes' kernels: a graph of one step is recorded once, without running it, and
+replayed by a call that goes through all its kernels, as these engines' own examples do on a GPU.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import warnings
+from collections.abc import Callable, Iterator
+
+from spook_tracker.engine.peers.stepped import quiet
+
+with quiet():  # it says which devices it has found
+    import warp
+
+    warp.config.log_level = warp.LOG_ERROR
+    warp.init()
+
+DEVICE = "cpu"
+MADE = f"wheel from the package index, float32, {DEVICE} by Warp {warp.__version__}"
+
+
+@contextlib.contextmanager
+def silent() -> Iterator[None]:
+    """No word of what is compiled, nor a warning of what is young or of another version; the steps run on the CPU."""
+    with quiet(), warnings.catch_warnings(), warp.ScopedDevice(DEVICE):
+        warnings.simplefilter("ignore")
+        yield
+
+
+def replayed(step: Callable[[], None]) -> Callable[[], None]:
+    """The launches of `step` as one call; it is not taken by being recorded, but all it needs is compiled."""
+    with warp.ScopedCapture(device=DEVICE) as capture:
+        step()
+    graph = capture.graph
+    return lambda: warp.capture_launch(graph)
