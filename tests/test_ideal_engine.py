@@ -17,6 +17,7 @@ from spook_tracker.engine import (
     CentralGravity,
     ConstraintForce,
     ContactForce,
+    Cylinder,
     Distance,
     Hinge,
     Lock,
@@ -107,6 +108,36 @@ def on_a_slope(task: Task, scene: Scene) -> dict[str, Any]:
     }
 
 
+def on_each_other(task: Task, scene: Scene) -> dict[str, Any]:
+    """Bodies at rest from below: each is carried by the one before it, with all that lies on it."""
+    masses = np.array([body.mass for body in scene.bodies[1:]])
+    loads = np.cumsum(masses[::-1])[::-1, None] * -np.array(scene.gravity)
+    names = [body.name for body in scene.bodies]
+    count = len(task.samples)
+    return {
+        "positions": np.tile([body.position for body in scene.bodies], (count, 1, 1)),
+        "contact_forces": {
+            (above, below): np.tile(load, (count, 1))
+            for above, below, load in zip(names[1:], names, loads, strict=False)
+        },
+    }
+
+
+def bouncing(task: Task, scene: Scene) -> dict[str, Any]:
+    """A ball let go above a plane: parabolas, each e times as long as the one before."""
+    ball, g = scene.bodies[1], -scene.gravity[2]
+    height, back = ball.position[2] - ball.shape.radius, ball.material.restitution
+    fall = math.sqrt(2.0 * height / g)
+    places = np.tile([body.position for body in scene.bodies], (len(task.samples), 1, 1))
+    for row, time in enumerate(task.samples * task.time_step):
+        begins, speed = -fall, g * fall  # as if it had come up from the plane
+        while back > 0.0 and time > begins + 2.0 * speed / g:
+            begins, speed = begins + 2.0 * speed / g, back * speed
+        since = time - begins
+        places[row, 1, 2] = ball.shape.radius + speed * since - 0.5 * g * since**2
+    return {"positions": places}
+
+
 def bar_that_swings(task: Task, scene: Scene) -> dict[str, Any]:
     """A rigid pendulum about the y axis through the origin."""
     bar, times = scene.bodies[0], task.samples * task.time_step
@@ -149,8 +180,12 @@ def form_of(scene: Scene) -> Callable[[Task, Scene], dict[str, Any]]:
     """By what a scene is about."""
     if isinstance(scene.bodies[0], Particle):
         return particle
+    if not scene.constraints and scene.bodies[0].motion == "static":
+        if scene.bodies[1].material.restitution:
+            return bouncing
+        return on_a_slope if any(scene.gravity[:2]) else on_each_other
     if not scene.constraints:
-        return on_a_slope if scene.bodies[0].motion == "static" else particle
+        return particle
     first = scene.constraints[0]
     return bar_that_swings if isinstance(first, Hinge) and first.axis == (0.0, 1.0, 0.0) else at_rest
 
@@ -160,9 +195,9 @@ class Ideal:
 
     name = "ideal"
     capabilities = Capabilities(
-        shapes=frozenset({Box, Capsule, Plane, Sphere}), joints=frozenset({Distance, Hinge, Lock}),
+        shapes=frozenset({Box, Capsule, Cylinder, Plane, Sphere}), joints=frozenset({Distance, Hinge, Lock}),
         forces=frozenset({CentralGravity}), shows=frozenset({ConstraintForce, ContactForce}), compliance=True,
-        friction=True,
+        friction=True, restitution=True,
     )  # fmt: skip
     configurations: tuple[Configuration, ...] = (Configuration(name="exact", reason="closed forms"),)
 
@@ -179,6 +214,7 @@ class Ideal:
 
 ANSWERED = (
     "falling_object", "pendulum", "planetarium", "door", "beam", "friction", "slip_angle", "bar_pendulum", "seconds_pendulum",
+    "slope_grid", "resting_grid", "bounce_grid",
 )  # fmt: skip
 
 

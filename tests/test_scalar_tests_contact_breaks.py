@@ -27,13 +27,14 @@ from spook_tracker.scalar_tests import (
     pile,
     resting_ball,
     resting_box,
+    resting_grid,
     rolling_friction,
     rolling_sphere,
     seams,
     sinking_sphere,
     vehicle,
 )
-from spook_tracker.scalar_tests.inclined_plane import force_ratio, slip_angle
+from spook_tracker.scalar_tests.inclined_plane import force_ratio, slip_angle, slope_grid
 from spook_tracker.scalar_tests.inclined_plane import friction as plane
 from spook_tracker.scalar_tests.inclined_plane.scene import EDGE, FRICTION
 from spook_tracker.scalar_tests.measured import last_bounce, oblique_impact, rolling_beats
@@ -69,6 +70,7 @@ def test_coulombs_law_knows_neither_step_nor_mass(time_step: Fraction, mass: Fra
     """A step in fractions: what friction may take, µ N h/m, over what gravity gives, g h sin θ."""
     assert band("slip_angle", "longest-step") == (slip_angle.LONGEST,) * 2
     assert band("friction", "longest-step") == (plane.LONGEST,) * 2
+    assert band("slope_grid", "longest-step") == (slope_grid.LONGEST,) * 2
     assert band("force_ratio", "heaviest") == (force_ratio.HEAVIEST,) * 2
     for slope in (Fraction(3, 10), Fraction(7, 10)):
         normal, along = time_step * mass, time_step * mass * slope  # N s, in g cos θ
@@ -138,6 +140,15 @@ def test_a_sphere_sinks_while_it_is_heavier_than_what_it_displaces() -> None:
     displaced = sinking_sphere.WATER * float(np.trapezoid(math.pi * (r * r - slices**2), slices))
     volume = 4.0 / 3.0 * math.pi * r**3
     assert high * volume > displaced > 0.9999 * low * volume
+
+
+def test_the_force_under_a_capsule_that_lies_is_shared_by_its_ends_whatever_the_step() -> None:
+    """A level axis: half of h m g at each end of its line, and no moment about its middle."""
+    g = resting_grid
+    assert band("resting_grid", "longest-step") == (g.LONGEST, g.LONGEST)
+    for h in np.geomspace(g.TIME_STEP, g.LONGEST, 50).tolist():
+        ends = np.linalg.solve([[1.0, 1.0], [-0.5, 0.5]], [h * g.GRAVITY * g.MASS, 0.0])
+        assert ends.sum() / h == pytest.approx(g.GRAVITY * g.MASS, rel=1e-14) and ends[0] == ends[1]
 
 
 def test_the_force_under_a_ball_knows_no_step() -> None:

@@ -175,6 +175,9 @@ BROKEN: dict[str, Simulate] = {
     "resting_ball": with_scene(lighter),
     "resting_stack": with_scene(lighter),
     "rolling_sphere": with_scene(lighter),
+    "slope_grid": with_scene(slippery),
+    "resting_grid": with_scene(much_lighter),
+    "bounce_grid": with_scene(dull),
 }
 
 

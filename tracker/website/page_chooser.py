@@ -31,8 +31,8 @@ SEVERE: tuple[OutcomeClass, ...] = (
 Scene = tuple[str, str, str]  # test, ladder, unit
 USES: Mapping[str, tuple[str, ...]] = {  # every test of the catalogue that has a ladder stands in one
     "Stacks and heaps": (
-        "resting_box", "resting_ball", "resting_stack", "overhang", "leaning_cards", "card_house", "pile", "falling_pile",
-        "masonry_arch", "stone_bridge", "rocking_block", "shaken_block",
+        "resting_box", "resting_ball", "resting_stack", "resting_grid", "overhang", "leaning_cards", "card_house", "pile",
+        "falling_pile", "masonry_arch", "stone_bridge", "rocking_block", "shaken_block",
     ),
     "Robots and chains of joints": (
         "pendulum", "n_pendulum", "simple_pendulum", "double_pendulum", "swinging_door", "door", "motor", "robot_arm", "arm_path",
@@ -46,15 +46,15 @@ USES: Mapping[str, tuple[str, ...]] = {  # every test of the catalogue that has 
         "seams", "rolling_beats",
     ),
     "Gripping, sliding, conveying": (
-        "friction", "slip_angle", "force_ratio", "edge_roll", "grasp", "grain", "conveyor", "turntable", "sorting",
+        "friction", "slip_angle", "force_ratio", "slope_grid", "edge_roll", "grasp", "grain", "conveyor", "turntable", "sorting",
     ),
     "Ropes, springs, soft joints": (
         "oscillator_spring", "oscillator_row", "oscillator_damped", "beam", "cantilever", "wires", "capstan", "hanging_cable",
         "taut_rope", "rope", "falling_chain",
     ),
     "Flight and impacts": (
-        "falling_object", "planetarium", "rotating_box", "thrown_die", "bouncing_ball", "billiards", "floating_box",
-        "sinking_sphere", "last_bounce",
+        "falling_object", "planetarium", "rotating_box", "thrown_die", "bouncing_ball", "bounce_grid", "billiards",
+        "floating_box", "sinking_sphere", "last_bounce",
     ),
 }  # fmt: skip
 

@@ -1,0 +1,168 @@
+"""Does a ball come back as high as its restitution says, whatever that is and whatever the step?"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from spook_tracker.engine import (
+    PLAIN,
+    Method,
+    Plane,
+    Position,
+    Result,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+)
+from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.case import (
+    BreakPoint,
+    Configuration,
+    Example,
+    Ladder,
+    Measurement,
+    Metric,
+    ScalarTest,
+    Simulate,
+    StabilityStudy,
+)
+
+RADIUS = 0.1  # m
+HEIGHT = 1.0  # m, gap at the start
+GRAVITY = 9.81  # m/s²
+RESTITUTIONS = (0.3, 0.5, 0.8, 1.0)
+STEPS_A_SECOND = (60, 240, 1000)
+BOUNCES = 2
+RIGHT = 0.02  # of the height
+MIDDLE, TIME_STEP = 0.5, 1.0 / 240.0  # restitution and step [s] of the ladder and of the search
+
+
+def scene(restitution: float, height: float = HEIGHT) -> Scene:
+    """A ball so high [m] above a plane."""
+    springy = Material(restitution=restitution)
+    floor = RigidBody(
+        name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=springy
+    )
+    ball = RigidBody(
+        name="ball", mass=1.0, shape=Sphere(RADIUS), position=(0.0, 0.0, RADIUS + height), material=springy
+    )
+    return Scene(bodies=(floor, ball), gravity=(0.0, 0.0, -GRAVITY))
+
+
+def flight(restitution: float, height: float = HEIGHT) -> tuple[float, float]:
+    """When the flight after the last bounce is a fifth and four fifths over [s]: its height is sought in between."""
+    fall = math.sqrt(2.0 * height / GRAVITY)
+    begins = fall * (1.0 + 2.0 * sum(restitution**k for k in range(1, BOUNCES)))
+    lasts = 2.0 * fall * restitution**BOUNCES
+    return begins + 0.2 * lasts, begins + 0.8 * lasts
+
+
+def height_error(
+    simulate: Simulate,
+    restitution: float,
+    time_step: float,
+    method: Method = PLAIN,
+    height: float = HEIGHT,
+) -> float:
+    """How far the height after the second bounce is from e⁴ h, over that."""
+    first, last = (round(when / time_step) for when in flight(restitution, height))
+    lasts = last * time_step
+    observe = {"place": Trace(quantity=Position("ball"), first=first)}
+    built = scene(restitution, height)
+    place = simulate(built, time_step=time_step, duration=lasts, method=method, observe=observe)["place"]
+    return float(np.max(place[:, 2]) - RADIUS) / (height * restitution ** (2 * BOUNCES)) - 1.0
+
+
+def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+    return abs(height_error(simulate, MIDDLE, time_step, method))
+
+
+def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """The same flight with nothing observed."""
+    lasts = round(flight(MIDDLE)[1] / time_step) * time_step
+    return simulate(scene(MIDDLE), time_step=time_step, duration=lasts, method=method)
+
+
+def lowest(simulate: Simulate) -> BreakPoint:
+    """The lowest drop [m] whose second bounce is right."""
+
+    def comes_back(height: float) -> bool:
+        return abs(height_error(simulate, MIDDLE, TIME_STEP, height=height)) <= RIGHT
+
+    return break_point(comes_back, HEIGHT, 1e-6, resolution=0.05, walk=12)
+
+
+def _at(restitution: float, per_second: int) -> Measurement:
+    time_step = 1.0 / per_second
+    return Measurement(
+        configuration="plain",
+        time_step=time_step,
+        parameters={"e": restitution},
+        metrics=(
+            Metric(
+                name="height_error",
+                description="height after the second bounce against e⁴ h, over that",
+                unit="1",
+                role="gate",
+                limit=RIGHT,
+                limit_source="Newton's law of impact, and free fall; to two hundredths of the height",
+                limit_kind="physical",
+                reference=0.0,
+                tolerance=1e-9,
+            ),
+        ),
+        measure=lambda simulate: {"height_error": height_error(simulate, restitution, time_step)},
+        note="Direct solver.",
+    )
+
+
+TEST = ScalarTest(
+    title="Grid of bounces",
+    question="Does a ball come back as high as its restitution says, whatever that is and whatever the step?",
+    why="A restitution that is a spring's damping, or is lost where a step ends beside the impact, is right at one step only.",
+    model="A ball is dropped on a plane, with four restitutions at three steps; its height after the second bounce is read.",
+    parameters=(
+        ("ball", "radius 0.1 m, 1 kg, 1 m above the plane"),
+        ("restitution", "e = 0.3, 0.5, 0.8, 1"),
+        ("gravity", "9.81 m/s²"),
+        ("time step", "1/60, 1/240, 1/1000 s"),
+    ),
+    theory=("Height after n bounces: e²ⁿ h.",),
+    reference="Newton's law of impact (closed form).",
+    conclusion="Green: a ball bounces by its restitution. Red: by its step, or not at all.",
+    source="ours; asked for by users of several engines (newton-physics/newton#2549)",
+    measurements=tuple(_at(e, n) for e in RESTITUTIONS for n in STEPS_A_SECOND),
+    example=lambda: Example(scene=scene(MIDDLE), time_step=TIME_STEP, duration=3.0),
+    ladders=(
+        Ladder(
+            name="second",
+            description="height after the second bounce against e⁴ h, over that, e = 0.5",
+            unit="1",
+            time_steps=tuple(1.0 / n for n in (60, 120, 240, 480, 960)),
+            configurations=(
+                Configuration(name="plain", method=PLAIN, expected_order=None),
+                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+            ),
+            error=ladder_error,
+            run=ladder_run,
+            target_error=1e-2,
+            target_seconds=0.01,
+        ),
+    ),
+    stability=(
+        StabilityStudy(
+            name="lowest",
+            title="Lowest drop that comes back to its height",
+            configuration="plain",
+            definition="height after the second bounce is e⁴ h to two hundredths, e = 0.5, 1/240 s",
+            study=lowest,
+            unit="m",
+            better="smaller",
+            expected_source="none: how much of a flight of a few steps is seen hangs on where in a step it begins",
+        ),
+    ),
+)
