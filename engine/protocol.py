@@ -116,6 +116,15 @@ class Task:
     time_limit: float | None  # s, of the processor where the adapter can tell, else of wall time
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Worlds:
+    """The same scene in many worlds at once: what an adapter's `worlds(task, count)` gives, where it has one."""
+
+    positions: npt.NDArray[np.float64]  # (count, bodies, 3) m, at the end
+    seconds: float  # of all steps of all of them, compiled before
+    setup_seconds: float
+
+
 @runtime_checkable
 class Adapter(Protocol):
     """What a module behind the protocol offers as ENGINE."""

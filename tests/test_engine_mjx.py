@@ -29,3 +29,9 @@ def test_what_our_adapter_cannot_ask_is_refused_before_anything_compiles() -> No
     pulled = Scene(bodies=(ball,), forces=(CentralGravity(name="sun", centre=(0.0, 0.0, 0.0), strength=1.0),))
     with pytest.raises(NotSupported, match="our adapter cannot ask mjx for the force central gravity"):
         find("mjx").simulate(pulled, time_step=0.01, steps=1)
+
+
+def test_a_box_slides_as_mujoco_s_but_for_its_own_points_of_contact() -> None:
+    theirs = peer_scenes.slid(partial(find("mujoco").simulate, configuration="defaults"), 0.7)
+    mine = peer_scenes.slid(partial(find("mjx").simulate, configuration="defaults"), 0.7)
+    assert mine == pytest.approx(theirs, rel=0.01)

@@ -72,10 +72,10 @@ def test_what_our_adapter_cannot_ask_is_refused_before_anything_compiles() -> No
 
 def test_more_contacts_than_there_is_room_for_are_an_outcome(monkeypatch: pytest.MonkeyPatch) -> None:
     """It would leave them out and go on, so that boxes fall through each other."""
-    from spook_tracker.engine.peers import mujoco_warp
+    from spook_tracker.engine.peers import warp_graph
 
-    monkeypatch.setattr(mujoco_warp, "LEAST_ROOM", 2)
-    monkeypatch.setattr(mujoco_warp, "CONTACTS_PER_BODY", 1)
+    monkeypatch.setattr(warp_graph, "LEAST_ROOM", 2)
+    monkeypatch.setattr(warp_graph, "CONTACTS_PER_BODY", 1)
     ground, box = peer_scenes.box_on_ground(0.0).bodies
     above = replace(box, position=(0.0, 0.0, 0.6))
     found = run("defaults")(

@@ -27,6 +27,7 @@ from spook_tracker.engine import (
 )
 from spook_tracker.engine.find import find
 from spook_tracker.engine.protocol import NotSupported
+from spook_tracker.scalar_tests import resting_grid
 from tests import peer_scenes
 
 pytest.importorskip("newton", reason="the extra newton is not installed: pip install 'spook-tracker[newton]'")
@@ -110,6 +111,13 @@ def test_a_contact_shows_the_weight_it_carries_where_the_solver_shows_any() -> N
         assert found["f"] == pytest.approx([0.0, 0.0, 9.81], abs=0.02), name
     with pytest.raises(NotSupported, match=r"newton \(featherstone\) does not show contacts"):
         run("featherstone")(peer_scenes.box_on_ground(0.0), time_step=H, steps=1, observe=observe)
+
+
+def test_a_stack_of_ten_has_room_for_its_contacts() -> None:
+    """By SolverMuJoCo's own guess half of them are left out, and the stack falls."""
+    observe = {"way": Final(quantity=Position(), from_start=True)}
+    found = run("mujoco")(resting_grid.stack(*(1.0,) * 10), time_step=H, steps=30, observe=observe)
+    assert np.abs(found["way"]).max() < 0.02
 
 
 def test_a_load_as_large_as_the_weight_keeps_a_body_where_it_is() -> None:

@@ -18,17 +18,15 @@ from spook_tracker.engine.joints import Ball, Distance, Hinge, Lock, Prismatic, 
 from spook_tracker.engine.observe import ContactCount, Penetration
 from spook_tracker.engine.peers import mujoco as through_c
 from spook_tracker.engine.peers.stepped import stepped
-from spook_tracker.engine.peers.warp_graph import MADE, replayed, silent
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
+from spook_tracker.engine.peers.warp_graph import MADE, overflowed, replayed, room, silent
+from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task, Worlds
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Sphere
 
 with silent():
     import mujoco_warp
 
-CONTACTS_PER_BODY, ROWS_PER_CONTACT, LEAST_ROOM = 16, 6, 64
-OVERFLOW = mujoco_warp.OverflowType  # its other kinds tell of what was not iterated to the end
-ROOM = OVERFLOW.NEFC | OVERFLOW.NJMAX_NNZ | OVERFLOW.BROADPHASE | OVERFLOW.NARROWPHASE | OVERFLOW.CCD
+
 CAREFUL = 'cone="elliptic" impratio="100" tolerance="1e-6" iterations="100"'
 
 
@@ -70,12 +68,26 @@ class MuJoCoWarp:
             run = _Run(task)
             return stepped(task, run.step, run._read, time.perf_counter() - began, run.health)
 
+    def worlds(self, task: Task, count: int) -> Worlds:
+        """Copies of the state beside one model."""
+        with silent():
+            began = time.perf_counter()
+            run = _Run(task, count)
+            setup, began = time.perf_counter() - began, time.perf_counter()
+            run.step(task.steps)
+            took = time.perf_counter() - began
+            if told := run.health():
+                raise NotSupported(told)
+            mujoco_warp.kinematics(run.kernels, run.state)
+            return Worlds(positions=run.state.xpos.numpy()[:, run.ids], seconds=took, setup_seconds=setup)
+
 
 class _Run(through_c._Run):
     """MuJoCo's model, stepped by MuJoCo Warp and read where it came to."""
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: Task, count: int = 1) -> None:
         super().__init__(task)
+        self.count = count
         try:
             self.kernels = mujoco_warp.put_model(self.model)
         except NotImplementedError as error:
@@ -84,14 +96,13 @@ class _Run(through_c._Run):
         self.launch = replayed(lambda: mujoco_warp.step(self.kernels, self.state))
 
     def _put(self) -> Any:
-        room = max(LEAST_ROOM, CONTACTS_PER_BODY * self.model.nbody) if self.task.scene.contacts else 0
-        rows = ROWS_PER_CONTACT * room + max(LEAST_ROOM, 2 * self.model.nv + int(self.data.nefc))
-        return mujoco_warp.put_data(self.model, self.data, nconmax=room, njmax=rows)
+        bodies = self.model.nbody if self.task.scene.contacts else 0
+        sizes = room(bodies, self.model.nv, int(self.data.nefc))
+        return mujoco_warp.put_data(self.model, self.data, nworld=self.count, **sizes)
 
     def health(self) -> str:
-        """Nothing, or what it had no room for: it leaves that out and goes on."""
-        full = OVERFLOW(int(self.state.overflow.numpy().max())) & ROOM
-        return f"it ran out of room ({full.name})" if full else ""
+        """Nothing, or what it had no room for."""
+        return overflowed(self.state)
 
     def step(self, count: int) -> None:
         for _ in range(count):

@@ -26,8 +26,8 @@ from spook_tracker.engine.peers.frames import End, along, ends_of, xyzw
 from spook_tracker.engine.peers.pushes import Pushes
 from spook_tracker.engine.peers.stepped import Kept, stepped
 from spook_tracker.engine.peers.surfaces import one_friction, one_restitution, pairs_apart
-from spook_tracker.engine.peers.warp_graph import DEVICE, MADE, replayed, silent
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
+from spook_tracker.engine.peers.warp_graph import DEVICE, MADE, overflowed, replayed, room, silent
+from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task, Worlds
 from spook_tracker.engine.recorded_joints import conjugate, product, turned
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
@@ -131,11 +131,30 @@ class Newton:
             world.replay()
             return stepped(task, world.step, world.read, time.perf_counter() - began, world.health)
 
+    def worlds(self, task: Task, count: int) -> Worlds:
+        """Copies of the scene in one model, which do not touch each other."""
+        with silent():
+            began = time.perf_counter()
+            world = _World(task, count)
+            if world.pushes:
+                raise NotSupported("our adapter cannot ask newton for forces in many worlds")
+            world.replay()
+            setup, began = time.perf_counter() - began, time.perf_counter()
+            world.step(task.steps)
+            took, places = time.perf_counter() - began, world.states[0].body_q.numpy()[:, :3]
+            fixed = [body.position for body in task.scene.bodies]
+            found = np.tile(np.array(fixed, dtype=float), (count, 1, 1))
+            moving = [world.bodies[body.name] for body in task.scene.bodies]
+            for k, index in enumerate(moving):
+                if index != -1:
+                    found[:, k] = places.reshape(count, -1, 3)[:, index]
+            return Worlds(positions=found, seconds=took, setup_seconds=setup)
+
 
 class _World:
-    """One model in one solver, and what is read off it."""
+    """One model in one solver, and what is read off it; or so many copies of it."""
 
-    def __init__(self, task: Task) -> None:
+    def __init__(self, task: Task, count: int = 1) -> None:
         self.task, self.scene = task, task.scene
         options = task.configuration.options
         self.kind, self.substeps = options["solver"], options.get("substeps", 1)
@@ -152,6 +171,12 @@ class _World:
         self._grow()
         if self.scene.contacts:
             self._clothe()
+        if count > 1:
+            one, self.builder = self.builder, newton.ModelBuilder(gravity=self.scene.gravity)
+            if self.kind == "SolverKamino":
+                make.register_custom_attributes(self.builder)
+            self.builder.replicate(one, count)
+        self.count = count
         self.builder.color()
         self.model = self.builder.finalize(device=DEVICE)
         self._set_going()
@@ -180,7 +205,10 @@ class _World:
         self.launch: Callable[[], None] = self.advance
 
     def _settings(self, options: dict[str, Any]) -> dict[str, Any]:
-        """Of the solver; Kamino has a page of its own for them, and finds its contacts itself."""
+        """Of the solver: MuJoCo's guess of room is too small for a stack of ten, Kamino has a page of its own for them."""
+        if self.kind == "SolverMuJoCo":
+            bodies = len(self.bodies) if self.scene.contacts else 0
+            return options | room(bodies, 6 * len(self.bodies))
         if self.kind != "SolverKamino":
             return options
         config = newton.solvers.SolverKamino.Config.from_model(self.model)
@@ -322,12 +350,12 @@ class _World:
 
     def _set_going(self) -> None:
         """Speeds of bodies, and of joints from them."""
-        speeds = np.zeros((len(self.model.body_qd), 6), dtype=np.float32)
+        speeds = np.zeros((len(self.model.body_qd) // self.count, 6), dtype=np.float32)
         for body in self.scene.bodies:
             if (index := self.bodies[body.name]) != -1:
                 speeds[index] = (*body.velocity, *self.turning[body.name])
         if len(speeds):
-            self.model.body_qd.assign(speeds)
+            self.model.body_qd.assign(np.tile(speeds, (self.count, 1)))
             newton.eval_ik(self.model, self.model, self.model.joint_q, self.model.joint_qd)
 
     # its steps
@@ -390,8 +418,10 @@ class _World:
         return where, turns, speeds, spins
 
     def health(self) -> str:
-        """Nothing, or that a value is not finite."""
+        """Nothing, or that a value is not finite, or what there was no room for."""
         finite = np.isfinite(self.states[0].body_q.numpy()).all()
+        if finite and self.kind == "SolverMuJoCo":
+            return overflowed(self.solver.mjw_data)
         return "" if finite else "a value is not finite"
 
     def read(self, keep: Kept, row: int, sample: int) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import contextlib
 import warnings
 from collections.abc import Callable, Iterator
+from typing import Any
 
 from spook_tracker.engine.peers.stepped import quiet
 
@@ -19,6 +20,8 @@ with quiet():  # it says which devices it has found
     warp.init()
 
 DEVICE = "cpu"
+CONTACTS_PER_BODY, ROWS_PER_CONTACT, LEAST_ROOM = 16, 6, 64  # of MuJoCo Warp, whose own guess is 64 of both
+LACKING = ("NEFC", "NJMAX_NNZ", "BROADPHASE", "NARROWPHASE", "CCD")  # what it had no room for, by its names
 MADE = f"wheel from the package index, float32, {DEVICE} by Warp {warp.__version__}"
 
 
@@ -28,6 +31,21 @@ def silent() -> Iterator[None]:
     with quiet(), warnings.catch_warnings(), warp.ScopedDevice(DEVICE):
         warnings.simplefilter("ignore")
         yield
+
+
+def room(bodies: int, freedoms: int, rows: int = 0) -> dict[str, int]:
+    """For contacts and constraints in MuJoCo Warp; `rows` are those that there are at the start."""
+    contacts = max(LEAST_ROOM, CONTACTS_PER_BODY * bodies)
+    return {"nconmax": contacts, "njmax": ROWS_PER_CONTACT * contacts + max(LEAST_ROOM, 2 * freedoms + rows)}
+
+
+def overflowed(data: Any) -> str:
+    """What MuJoCo Warp had no room for: it leaves that out and goes on. Its other kinds tell of what was not iterated on."""
+    from mujoco_warp import OverflowType
+
+    full = int(data.overflow.numpy().max())
+    names = [kind for kind in LACKING if full & int(OverflowType[kind])]
+    return f"it ran out of room ({', '.join(names)})" if names else ""
 
 
 def replayed(step: Callable[[], None]) -> Callable[[], None]:
