@@ -1,4 +1,7 @@
-"""What the page of engines says above its table of facts, and what the table must show for each sentence to stand."""
+"""What the page of engines says above its table of facts, and what the table must show for each sentence to stand.
+
+And below it, of what its table has not: an arm with stops, and the engines that are not asked.
+"""
 
 from __future__ import annotations
 
@@ -120,6 +123,35 @@ SENTENCES: tuple[tuple[Callable[[Columns], bool], tuple[str, ...]], ...] = (
             "- **Uniform motion** needs no method: what is lost in 1000 steps is rounding, far more in single precision than in double.",
         ),
     ),
+)
+
+ARM = (
+    "## An arm with stops, in Newton's six solvers",
+    "",
+    "`tracker run --engine newton --catalogue bench.engine_facts:ARM` lets an arm of six links of 0.1 m and 0.1 kg fall from the",
+    "level, each of whose joints has stops at half a radian. Stops give no energy. In Newton 1.8.0 SolverFeatherstone comes apart at",
+    "1/60 and at 1/240 s, twenty substeps each, and so does SolverSemiImplicit; SolverMuJoCo, SolverXPBD and SolverKamino hold the",
+    "arm. Without its stops Featherstone holds it, too: they are springs whose stiffness knows nothing of a light link's inertia",
+    "([newton#4269](https://github.com/newton-physics/newton/issues/4269) reports it of robots).",
+    "",
+)
+NOT_ASKED = (
+    "## Engines that are not asked",
+    "",
+    "Tried with Python 3.11, Node and a CPU in November 2026. Those that can be had lack an adapter here:",
+    "",
+    "| engine | where it was looked for | what happens |",
+    "|---|---|---|",
+    "| Simbody | `opensim` 4.6, PyPI | inside OpenSim: installs, imports, swings a pendulum; no adapter yet |",
+    "| MotrixSim | `motrixsim` 0.10.1, PyPI | installs, reads MJCF, lets a box rest; prints a line when imported; no adapter yet |",
+    "| Brax | `brax` 0.14.2, PyPI | installs; its positional, spring and generalized pipelines let a ball rest once JAX has compiled them; says itself that they are not maintained, and names MJX, which is asked |",
+    "| JaxSim | `jaxsim` 0.9.0, PyPI | installs and imports; no adapter yet |",
+    "| Havok | `@babylonjs/havok` 1.3, npm | its build for the web can be had, not tried; the native library is its maker's to license |",
+    "| ODE | `libode8` 0.16.2, Debian | offered as a library, not tried; no adapter yet |",
+    "| Genesis | `genesis-world` 1.4.5, PyPI | not installed: an 84 MB wheel that wants some forty more packages, VTK and OpenCV among them, and PyTorch beside it |",
+    "| Chrono | PyPI, npm, Debian | not there: what PyPI calls `pychrono` is a package about delays |",
+    "| AGX Dynamics | PyPI | `agx` there only marks an installation that is licensed |",
+    "",
 )
 
 

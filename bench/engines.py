@@ -212,6 +212,8 @@ def page(database: str, of_facts: str = "") -> str:
         *engine_places.choice(run),
         *engine_places.single(run),
         *_facts(facts),
+        *engine_kinds.ARM,
+        *engine_kinds.NOT_ASKED,
         *_gates(samples),
         *_rungs(samples, runs),
         *engine_places.first(run),
@@ -356,13 +358,13 @@ def _treatment(samples: Mapping[str, ranks.Samples]) -> list[str]:
 
 
 READING = (
-    "An engine is asked in two or three settings (`tracker engines` says which and why); the best of them counts. A *scene*",
+    "An engine is asked in its settings (`tracker engines` says which and why); the best of them counts. A *scene*",
     "is one quantity of one scalar test, its *error* the distance from a closed form or a reference of known accuracy, its",
     "*run time* the processor's for the engine's own steps in one thread, models built before. *First* is which comes within an",
     "error soonest, whatever step that takes. What an engine cannot be asked (a joint, a shape, a force it does not show) is not",
-    "supported, by name, and no mark against it. What pushes besides gravity does so from Python in dart and pybullet, before",
-    "every step, and in mujoco, in every stage, where it is the pull of the sun in planetarium: there the run times of these",
-    "three are Python's more than theirs. All others push in their own loop.",
+    "supported, by name, and no mark against it. What pushes besides gravity does so from Python in dart, newton, pybullet and",
+    "sapien, before every step, and in mujoco, in every stage, where it is the pull of the sun in planetarium: there the run",
+    "times of these five are Python's more than theirs. All others push in their own loop.",
 )
 
 

@@ -12,6 +12,8 @@ from typing import Any
 import msgspec
 import pytest
 
+import bench.engine_kinds as engine_kinds
+import spook_tracker.engine.find as find
 import spook_tracker.tracker as tracker
 from spook_tracker.tracker.document.run_document import Asked
 from spook_tracker.tracker.judge.rank import Race
@@ -205,6 +207,16 @@ def test_times_of_another_machine_are_not_set_against_ours(engines: Any, tmp_pat
     assert "not timed here: rival." in told
     assert "| rival | 5 | 1 | 0 | 1 |" in told, "its answers count wherever they were given"
     assert told.endswith("Nowhere.\n")
+
+
+def test_the_published_page_says_which_engines_are_not_asked_and_what_stops_do_to_newton(
+    engines: Any,
+) -> None:
+    told = engines.PAGE.read_text(encoding="utf-8")
+    assert "\n".join((*engine_kinds.ARM, *engine_kinds.NOT_ASKED)) in told
+    assert not {*find.EXTRAS, *find.NODE, *find.BUILT} & {
+        line.split(" | ")[0].strip("| ").lower() for line in engine_kinds.NOT_ASKED
+    }
 
 
 def test_the_published_page_and_the_causes_are_of_one_piece(engines: Any) -> None:
