@@ -10,9 +10,12 @@ from __future__ import annotations
 import hashlib
 import math
 import os
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
+
+import numpy as np
 
 from spook_tracker.engine.model_bodies import (
     DEEPEST,
@@ -140,8 +143,8 @@ class _Reader:
                 raise ModelError(
                     f"{path} is a pointer of Git LFS in place of the file itself; fetch it with: git lfs pull"
                 )
-        if found.suffix.lower() == ".dae" and b"<!ENTITY" in found.read_bytes():
-            raise ModelError(f"{path} {ENTITIES}")
+        if found not in self.files and (wrong := _wrong_mesh(found)):
+            raise ModelError(f"{path} {wrong}")
         self.files.setdefault(found)
         if len(self.files) > MOST_FILES:
             raise ModelError(f"{self.path} consists of more than {MOST_FILES} files")
@@ -351,6 +354,30 @@ class _Reader:
             total.update(f"{_beside(file, main)}\0".encode())
             total.update(hashlib.sha256(file.read_bytes()).digest())
         return total.hexdigest()[:16]
+
+
+def _wrong_mesh(file: Path) -> str:
+    """Why engines' own readers would come to harm by it; empty if they would not, or it is no mesh written as text."""
+    kind = file.suffix.lower()
+    if kind == ".dae":
+        content = file.read_bytes()
+        if b"<!ENTITY" in content:
+            return ENTITIES
+        try:
+            ElementTree.fromstring(content)
+        except (ElementTree.ParseError, ValueError, LookupError) as error:
+            return f"is no XML: {error}"
+    if kind == ".obj":
+        content = file.read_bytes()
+        corners = len(re.findall(rb"^[ \t]*v[ \t]", content, re.MULTILINE))
+        faces = b" ".join(re.findall(rb"^[ \t]*f[ \t]+(.*)", content, re.MULTILINE))
+        try:
+            named = np.array(re.sub(rb"/\S*", b"", faces).split(), dtype=np.int64)
+        except (ValueError, OverflowError):
+            return "has faces of something else than whole numbers"
+        if len(far := named[(named == 0) | (np.abs(named) > corners)]):
+            return f"has a face with corner {far[0]}, of {corners}"
+    return ""
 
 
 def _resolved(path: Path) -> Path:

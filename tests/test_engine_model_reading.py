@@ -142,6 +142,9 @@ BOMB = '<!DOCTYPE m [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><mujoco><worldbody
         ('<sdf><include><uri>model://parts</uri></include></sdf>', "secret.stl, which lies outside"),
         ('<sdf><include><uri>robot.xml</uri></include></sdf>', "which includes it"),
         ('<sdf><model><link><mesh><uri>parts/bomb.dae</uri></mesh></link></model></sdf>', "bomb.dae declares XML entities"),
+        ('<sdf><model><link><mesh><uri>parts/torn.dae</uri></mesh></link></model></sdf>', "torn.dae is no XML"),
+        (CART.replace("wheel.stl", "../parts/far.obj"), "far.obj has a face with corner 9, of 3"),
+        (CART.replace("wheel.stl", "../parts/word.obj"), "word.obj has faces of something else"),
         ('<sdf><model><link><mesh><uri>http://a/b.stl</uri></mesh></link></model></sdf>', "b.stl, which is no file"),
     ],
 )  # fmt: skip
@@ -157,6 +160,9 @@ def test_what_cannot_be_read_is_one_sentence_that_names_the_file(
         "<sdf><model><mesh><uri>../../secret.stl</uri></mesh></model></sdf>"
     )
     (tmp_path / "models/parts/bomb.dae").write_text(BOMB)
+    (tmp_path / "models/parts/torn.dae").write_bytes(b"<COLLADA\xff\x00")
+    for name, face in (("far", "1/1/1 2//1 9"), ("word", "1 2 x")):
+        (tmp_path / f"models/parts/{name}.obj").write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf {face}\n")
     file = tmp_path / "models/robot.xml"
     file.write_text(text)
 
@@ -164,7 +170,7 @@ def test_what_cannot_be_read_is_one_sentence_that_names_the_file(
         read(file)
 
     assert "\n" not in str(raised.value)
-    assert any(name in str(raised.value) for name in ("robot.xml", "model.sdf", "bomb.dae"))
+    assert any(name in str(raised.value) for name in ("robot.xml", "model.sdf", ".dae", ".obj"))
 
 
 @pytest.mark.parametrize(
