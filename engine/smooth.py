@@ -11,6 +11,7 @@ from spook_tracker.engine.forces import Fluid, Load, Spring
 from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, frictions
 from spook_tracker.engine.method import Method
 from spook_tracker.engine.scene import Scene
+from spook_tracker.engine.time_functions import TimeFunction
 from spook_tracker.engine.tyres import Tyre
 
 RIGID = 1e-7  # m/N or rad/(N m), the softest row a composition takes for rigid
@@ -132,16 +133,18 @@ def _check_held(row: Constraint, length: float) -> None:
             f"{max(held):g} m/N; make it {RIGID:g} at most, or a Spring"
         )
     if isinstance(row, AxialJoint):
-        for drive in ("motor", "limit", "spring"):
+        for drive in ("motor", "limit"):
             if getattr(row, drive) is not None:
                 raise MethodError(
                     f"method: a composition holds rows rigidly, but the {drive} of {row.name!r} drives one; use "
                     f"half_step_velocities, of order 2, there"
                 )
-        if row.armature:
+        if row.spring is not None and (
+            row.spring.damping != 0.0 or isinstance(row.spring.rest, TimeFunction)
+        ):
             raise MethodError(
-                f"method: a composition holds rows rigidly, and the armature of {row.name!r} is one that gives way; use "
-                f"half_step_velocities, of order 2, there"
+                f"method: a composition takes the spring of {row.name!r} as a force that goes back and forth in time; "
+                f"give it damping=0 and a rest that stays, or use half_step_velocities, of order 2"
             )
     rest = row.rest_length if isinstance(row, Distance) else None
     if rest is not None and abs(length - rest) > 1e-9 * rest:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from spook_tracker.engine import (
     Final,
     Hinge,
     JointCoordinate,
+    JointSpring,
     Load,
     Material,
     Method,
@@ -36,7 +38,7 @@ CORRECTED = Method(half_step_velocities=True, corrections=2)
 MASS, MOMENT, ARM, ROTOR = 2.0, 0.05, 0.4, 0.7  # kg, kg m², m, kg m²
 
 
-def pendulum(**hinge: float) -> Scene:
+def pendulum(**hinge: Any) -> Scene:
     """A bob on a hinge, let go level."""
     bob = RigidBody(name="bob", mass=MASS, inertia=(MOMENT, MOMENT, MOMENT), position=(ARM, 0.0, 0.0))
     joint = Hinge(
@@ -83,7 +85,10 @@ ARM_OF_THREE = """<mujoco><option timestep="2e-4" integrator="RK4"/><worldbody><
 SPEEDS = (1.0, 4.0, 0.2)  # rad/s, rad/s, m/s
 
 
-@pytest.mark.parametrize(("method", "order", "least"), [(Method(), 1.0, 2e-2), (CORRECTED, 2.0, 3e-4)])
+@pytest.mark.parametrize(
+    ("method", "order", "least"),
+    [(Method(), 1.0, 2e-2), (CORRECTED, 2.0, 3e-4), (Method(composition="order4"), 4.0, 1e-6)],
+)
 def test_an_arm_whose_axes_turn_goes_as_by_runge_kutta(method: Method, order: float, least: float) -> None:
     mujoco = pytest.importorskip("mujoco")
     model = mujoco.MjModel.from_xml_string(ARM_OF_THREE)
@@ -193,8 +198,34 @@ def test_between_two_free_bodies_it_moves_no_common_centre() -> None:
     assert float(run["two"][0]) == pytest.approx(2.0 * rate + rate, rel=1e-12)
 
 
-def test_it_goes_on_from_a_snapshot_to_the_bit_and_stands_in_the_way_of_compositions() -> None:
-    with start(pendulum(armature=ROTOR), time_step=0.01) as run:
+@pytest.mark.parametrize(("composition", "order"), [("order4", 4.0), ("order6", 6.0)])
+@pytest.mark.parametrize("rotor", [0.0, ROTOR])
+def test_compositions_take_it_and_a_spring_of_the_coordinate(
+    composition: Literal["order4", "order6"], order: float, rotor: float
+) -> None:
+    inertia = MOMENT + MASS * ARM**2 + rotor
+    reference = solve_ivp(
+        lambda _, s: [s[1], (MASS * 9.81 * ARM * math.cos(s[0]) - 9.0 * (s[0] - 0.3)) / inertia],
+        (0.0, 1.0),
+        [0.0, 0.0],
+        rtol=1e-13,
+        atol=1e-14,
+        method="DOP853",
+    ).y[:, -1]
+    scene = pendulum(armature=rotor, spring=JointSpring(stiffness=9.0, rest=0.3, damping=0.0))
+    seen = {"angle": Final(quantity=JointCoordinate("joint")), "spin": Final(quantity=AngularVelocity("bob"))}
+    errors = []
+    for steps in (20, 40):
+        run = simulate(
+            scene, time_step=1 / steps, duration=1.0, method=Method(composition=composition), observe=seen
+        )
+        errors.append(np.array([float(run["angle"]), float(run["spin"][1])]) - reference)
+    assert np.log2(np.abs(errors[0] / errors[1])) == pytest.approx(order, abs=0.25)
+
+
+@pytest.mark.parametrize("method", [Method(), HALF, Method(composition="order6")])
+def test_it_goes_on_from_a_snapshot_to_the_bit(method: Method) -> None:
+    with start(pendulum(armature=ROTOR), time_step=0.01, method=method) as run:
         run.step(20)
         kept = run.save()
         run.step(30)
@@ -202,5 +233,9 @@ def test_it_goes_on_from_a_snapshot_to_the_bit_and_stands_in_the_way_of_composit
         run.restore(kept)
         run.step(30)
         assert all(np.array_equal(run.state[name], there[name]) for name in there)
-    with pytest.raises(MethodError, match="armature of 'joint'"):
-        simulate(pendulum(armature=ROTOR), time_step=0.01, duration=0.1, method=Method(composition="order4"))
+
+
+def test_a_composition_refuses_a_spring_that_loses_energy() -> None:
+    scene = pendulum(spring=JointSpring(stiffness=9.0))
+    with pytest.raises(MethodError, match=r"the spring of 'joint' as a force .* give it damping=0"):
+        simulate(scene, time_step=0.01, duration=0.1, method=Method(composition="order4"))

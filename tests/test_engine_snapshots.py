@@ -39,7 +39,7 @@ def corpus() -> dict[str, Made]:
     few = Method(solver="iterative", iterations=2)
     made["unsettled"] = (islands((40,), few)[0], 0.01, few)
     for kind, scenes in (("particles", particle_scenes), ("rigid", rigid_scenes)):
-        made[f"{kind}, halved"] = (stiff(scenes.tree(rng())), 0.15, Method(composition="order4"))
+        made[f"{kind}, halved"] = (stiff(scenes.tree(rng())), 0.3, Method(composition="order4"))
     made["a lock that breaks"] = (coupling_scenes.hung(strength=22.0), 0.01, Method())
     scene, method = islands((12, 9), Method())
     made["overlaps in two islands"] = (scene, 0.01, method)

@@ -5,8 +5,7 @@ it has one way into the scene, or a name it is refused by: nothing is passed ove
 
 - Bodies without joints between them are one rigid body, in its principal axes.
 - A body with several joints gets light bodies between them, of LIGHT of its mass.
-- Armature is a carriage of that mass on a level rail of the world, which goes as the joint does.
-- A servo of bounded force drives a light carriage of its own.
+- A servo of bounded force drives a light carriage on a level rail of the world, which goes as the joint does.
 - Damping, springs and actuators that are linear in place and speed are one compliant row of their joint.
 - Contacts are rigid, as all of this engine's are, whatever solref and solimp say.
 """
@@ -24,7 +23,6 @@ import numpy.typing as npt
 from spook_tracker.engine.bodies import WORLD, RigidBody
 from spook_tracker.engine.check import Rotation
 from spook_tracker.engine.couplings import Relation
-from spook_tracker.engine.forces import Spring
 from spook_tracker.engine.joints import Ball, Constraint, Hinge, JointSpring, Limit, Lock, Motor, Prismatic
 from spook_tracker.engine.peers.lacking import Lacks
 from spook_tracker.engine.peers.mujoco_drives import FADING, Drives
@@ -91,7 +89,6 @@ class _Translation:
         self.bodies: list[RigidBody] = []
         self.constraints: list[Constraint] = []
         self.main: dict[int, RigidBody] = {}
-        self.springs: list[Spring] = []
         self.joints = [""] * model.njnt
         self.tied: set[frozenset[str]] = set()
         off = mujoco.mjtDisableBit
@@ -139,7 +136,6 @@ class _Translation:
         scene = Scene(
             bodies=(*self.bodies, *fixed),
             constraints=tuple(self.constraints),
-            forces=tuple(self.springs),
             gravity=tuple(np.asarray(m.opt.gravity) if self.has("GRAVITY") else np.zeros(3)),
             contacts=touching,
             no_contact=tuple(apart),
@@ -305,7 +301,6 @@ class _Translation:
             return
         here = float(d.qpos[m.jnt_qposadr[number]])
         form = Hinge if kind == HINGE else Prismatic
-        armature = float(m.dof_armature[dof]) + self.drives.armature(number)
         limit = None
         if m.jnt_limited[number] and self.has("LIMIT"):
             limit = Limit(
@@ -321,24 +316,19 @@ class _Translation:
                 axis=tuple(d.xaxis[number]),
                 compliance=0.0,
                 limit=limit,
-                spring=None if self.conservative else self.spring(number, here),
+                spring=self.spring(number, here),
                 motor=Motor(force=self.drives.force(number, here)) if self.drives.of(number) else None,
                 friction=float(m.dof_frictionloss[dof]) if self.has("FRICTIONLOSS") else 0.0,
-                armature=0.0 if self.conservative else armature,
+                armature=float(m.dof_armature[dof]) + self.drives.armature(number),
             )
         )
-        armature *= self.conservative  # a composition takes none in the joint
-        stiffness, _, rest = self.passive(number) if self.conservative else (0.0, 0.0, 0.0)
-        if armature or stiffness:
-            name = f"carriage of {self.name('joint', number)}"
-            self.carriage(number, name, armature or LIGHT * float(m.dof_M0[dof]), stiffness, rest - here)
         for actuator, arm in self.drives.bounded(number):
             stiff, pulls_to, damping, most = self.drives.servo(number, actuator, arm, here)
             if stiff <= 0.0 or damping < 0.0:
                 self.lack(PUSHES_AWAY, "joint", number)
                 continue
             servo = JointSpring(stiffness=stiff, rest=pulls_to, damping=damping / stiff, max_force=most)
-            self.carriage(number, servo_name(actuator), LIGHT * float(m.dof_M0[dof]), servo=servo)
+            self.carriage(number, servo_name(actuator), LIGHT * float(m.dof_M0[dof]), servo)
 
     def passive(self, number: int) -> tuple[float, float, float]:
         """Stiffness and damping of a joint by itself, and where its spring rests [m or rad]."""
@@ -365,16 +355,8 @@ class _Translation:
         whole = whole or FADING * damping
         return JointSpring(stiffness=whole, rest=pull / whole, damping=damping / whole)
 
-    def carriage(
-        self,
-        number: int,
-        name: str,
-        mass: float,
-        stiffness: float = 0.0,
-        stretched: float = 0.0,
-        servo: JointSpring | None = None,
-    ) -> None:
-        """What goes as the joint does, a metre a radian, on a level rail of the world: its mass is armature, its spring the joint's."""
+    def carriage(self, number: int, name: str, mass: float, servo: JointSpring) -> None:
+        """What goes as the joint does, a metre a radian, on a level rail of the world that a servo of bounded force pulls."""
         gravity = np.asarray(self.m.opt.gravity)
         rail = np.eye(3)[int(np.argmin(np.abs(gravity)))]
         rail = rail - gravity * (rail @ gravity) / max(gravity @ gravity, 1e-300)
@@ -398,10 +380,6 @@ class _Translation:
                 compliance=0.0,
             ),
         ]
-        if stiffness:
-            self.springs.append(
-                Spring(name=f"spring of {name}", between=(name, tuple(rail * stretched)), stiffness=stiffness)
-            )
 
     # Equality constraints
 

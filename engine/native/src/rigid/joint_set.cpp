@@ -15,6 +15,7 @@ constexpr double kUnbounded = std::numeric_limits<double>::infinity();
 }
 
 JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_step) {
+    const bool composed = scene.method.composition > 2;
     for (const JointSpec& spec : scene.joints) {
         Joint joint;
         const auto start = [&](int body) { return body < 0 ? nullptr : &scene.bodies[body].position; };
@@ -78,10 +79,12 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
                 axial.spring_stiffness = spec.spring->stiffness;
                 axial.spring_impulse = time_step * spec.spring->force;
                 axial.spring = regularise(1.0 / spec.spring->stiffness, spec.spring->damping, time_step);
-                block.softness[block.size++] = axial.spring.softness;
+                if (composed)
+                    spring_kicks_.push_back({joint.block, spec.spring->stiffness, spec.spring->rest});
+                else block.softness[block.size++] = axial.spring.softness;
             }
             if (spec.armature > 0.0) {  // G v₊ + λ/I = w, the rotor's speed before
-                rotors_.push_back(static_cast<int>(blocks_.size()));
+                some_.rotors.push_back(static_cast<int>(blocks_.size()));
                 block.rotor = block.size;
                 block.softness[block.size++] = 1.0 / spec.armature;
             }
@@ -94,10 +97,10 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
                                          axial.friction[way], spec.load_friction[way]});
                 block.softness[block.size++] = 0.0;
             }
-            blocks_.push_back(block);
+            if (block.size > 0) blocks_.push_back(block);
             joint.axial = static_cast<int>(axials_.size());
             axials_.push_back(axial);
-            if (joint.tracked) followed_.push_back(static_cast<int>(joints_.size()));
+            if (joint.tracked) some_.followed.push_back(static_cast<int>(joints_.size()));
         }
         joints_.push_back(joint);
     }
@@ -106,7 +109,7 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
         const Joint& joint = joints_[j];
         const bool limit = joint.axial >= 0 && axials_[joint.axial].has_limit,
                    wire = joint.general >= 0 && generals_[joint.general].one_sided;
-        if (limit || wire) stops_.push_back(static_cast<int>(j));
+        if (limit || wire) some_.stops.push_back(static_cast<int>(j));
     }
     for (const General& general : generals_)
         for (const RelationTerm& term : general.terms) track(term.joint);
@@ -183,7 +186,7 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
             (low ? right.lower : right.upper)[next(value)] = 0.0;
         }
     }
-    if (axial.has_spring) {
+    if (axial.has_spring && spring_kicks_.empty()) {
         const double rest = axial.spring.violation_gain * (state.angle - axial.spring_rest);
         // A rest r(t) in the averaged law: G v₊ − r'₊ in place of G v₊, G v − r'₋ in place of G v.
         const int spring = next(axial.rest_moves ? axial.spring.upsilon * (row.rate - axial.rest_before) -
@@ -350,7 +353,7 @@ double JointSet::coordinate(int index, std::span<const BodyState> bodies) const 
 }
 
 void JointSet::follow(std::span<const BodyState> bodies) noexcept {
-    for (const int index : followed_) {
+    for (const int index : some_.followed) {
         const Joint& joint = joints_[index];
         const BodyState &first = body(joint.first, bodies), &second = body(joint.second, bodies);
         const Vec3 spin = second.angular_velocity - first.angular_velocity;

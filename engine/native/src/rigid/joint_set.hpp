@@ -54,6 +54,11 @@ struct BearingRow {
     int holding = 0;                     // the block of what it holds
     double constant = 0.0, share = 0.0;  // N s or N m s; 1 or m
 };
+/// A spring of a free coordinate that acts as a force, by the block of its joint's own rows.
+struct JointSpringKick {
+    int block = 0;
+    double stiffness = 0.0, rest = 0.0;
+};
 class JointSet : public JointStates {
 public:
     using State = JointState;
@@ -63,7 +68,6 @@ public:
     std::span<const JointBlock> blocks() const noexcept { return blocks_; }
     int count() const noexcept { return static_cast<int>(joints_.size()); }
     int rows(int joint) const noexcept { return joints_[joint].constants.rows; }
-    JointKind kind(int joint) const noexcept { return joints_[joint].constants.kind; }
     const JointConstants& constants(int joint) const noexcept { return joints_[joint].constants; }
     /// The bodies of a block beyond its first two: relations and wires may have more.
     std::span<const int> others(int block) const noexcept;
@@ -133,13 +137,13 @@ public:
     double given_back(int block, int& row) const noexcept;
     /// From now on the turns of this hinge are counted.
     void track(int joint) noexcept {
-        if (std::find(followed_.begin(), followed_.end(), joint) == followed_.end())
-            followed_.push_back(joint);
+        if (std::find(some_.followed.begin(), some_.followed.end(), joint) == some_.followed.end())
+            some_.followed.push_back(joint);
         joints_[joint].tracked = true;
     }
     /// A new step: whose stops were closed in the one before is known from then on, however often rows are assembled.
     void begin_step() noexcept {
-        for (const int joint : stops_) {
+        for (const int joint : some_.stops) {
             states[joint].at_limit = states[joint].closed;
             states[joint].rebounds = 0.0;
             states[joint].met = 0;
@@ -148,11 +152,13 @@ public:
     }
     /// Counts the turns of tracked hinges after every step, whose rates tell how many there were.
     void follow(std::span<const BodyState> bodies) noexcept;
-    bool follows() const noexcept { return !followed_.empty(); }
+    bool follows() const noexcept { return !some_.followed.empty(); }
     /// After a solve: a joint whose own rows carried more than its strength holds nothing from the next step on.
     void break_overloaded(int joint, std::int64_t step);
+    /// In compositions, which hold rows rigidly, springs of free coordinates are forces: see joint_spring_kicks.hpp.
+    std::span<const JointSpringKick> spring_kicks() const noexcept { return spring_kicks_; }
     /// Blocks that have a rotor, see rotors.hpp.
-    std::span<const int> rotors() const noexcept { return rotors_; }
+    std::span<const int> rotors() const noexcept { return some_.rotors; }
     /// Energy of the spring of a joint's free coordinate about `rest` [J]; of a broken joint none.
     double spring_energy(int joint, double rest, std::span<const BodyState> bodies) const noexcept;
     /// That of all of them whose rest does not move with the time.
@@ -266,9 +272,12 @@ private:
     std::vector<TyreForm> tyre_forms_;
     std::vector<BearingRow> bearings_;
     std::vector<double> gradient_;  // of one general row: six per body
-    std::vector<int> followed_;
-    std::vector<int> stops_;   // joints with a row that only pushes one way
-    std::vector<int> rotors_;  // blocks
+    struct {
+        std::vector<int> followed;
+        std::vector<int> stops;   // joints with a row that only pushes one way
+        std::vector<int> rotors;  // blocks
+    } some_;
+    std::vector<JointSpringKick> spring_kicks_;
     LargeArray<JointBlock> blocks_;
 };
 

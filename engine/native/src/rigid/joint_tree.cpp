@@ -52,8 +52,8 @@ bool JointTree::attach(std::span<const int> tied) {
     const auto blocks = joints_->blocks();
     const auto moving = [&](int body) { return body >= 0 && constants_[body].moves(); };
     for (const JointBlock& block : blocks) {
-        if (block.axial || joints_->kind(block.joint) == JointKind::relation ||
-            joints_->kind(block.joint) == JointKind::wire)
+        if (block.axial || joints_->constants(block.joint).kind == JointKind::relation ||
+            joints_->constants(block.joint).kind == JointKind::wire)
             return false;
         for (int body : {block.first, block.second})
             if (body >= 0 && constants_[body].motion == Motion::kinematic) return false;

@@ -16,7 +16,9 @@
 #include <cstdio>
 #include <limits>
 
+#include "rigid/joint_spring_kicks.hpp"
 #include "rigid/rigid_system.hpp"
+#include "rigid/rotors.hpp"
 #include "rigid/tolerances.hpp"
 #include "run/composition.hpp"
 
@@ -42,7 +44,10 @@ void RigidSystem::start_composition() {
     prepare_hold();
     if (solver_ != RigidSolver::block) return;
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
-        for (int i = 0; i < joints_.blocks()[k].size; ++i) matrix_.diagonal(k)[i] = -0.0;
+        for (int i = 0; i < joints_.blocks()[k].size; ++i)
+            if (i != joints_.blocks()[k].rotor) matrix_.diagonal(k)[i] = -0.0;
+    for (const int k : joints_.rotors())
+        joints_.states[joints_.blocks()[k].joint].rotor = rotor_speed(joints_, k, live_.bodies);
 }
 
 void RigidSystem::compose(std::int64_t steps) {
@@ -84,7 +89,8 @@ double RigidSystem::tension_rate() {
             const double across = inertia.x + inertia.y + inertia.z -
                                   std::max({inertia.x, inertia.y, inertia.z}) -
                                   std::min({inertia.x, inertia.y, inertia.z});
-            rates[b] += pull * (1.0 / across + 1.0 / (constants_[b].mass * length2));
+            // A body goes sideways by turning about its joint: near its centre that is a turn, however light it is.
+            rates[b] += pull * (1.0 / across + 1.0 / std::max(constants_[b].mass * length2, across));
         }
     }
     return *std::max_element(rates.begin(), rates.end());
@@ -115,6 +121,8 @@ void RigidSystem::composed_step(double h, int depth) {
     LargeArray<BodyState>& start = step_start_[depth];
     start = live_.bodies;
     const double pending = live_.pending;
+    std::vector<double> rotors;
+    for (const int k : joints_.rotors()) rotors.push_back(joints_.states[joints_.blocks()[k].joint].rotor);
     bool solved = true;
     for (std::size_t stage = 0; stage < stages.size() && solved; ++stage)
         solved = composed_stage(stages[stage] * h, stage);
@@ -125,6 +133,8 @@ void RigidSystem::composed_step(double h, int depth) {
         return;
     }
     live_.bodies = start;
+    for (std::size_t i = 0; i < rotors.size(); ++i)
+        joints_.states[joints_.blocks()[joints_.rotors()[i]].joint].rotor = rotors[i];
     live_.pending = pending;
     ++live_.halved_steps;
     for (int half = 0; half < 2; ++half) {
@@ -147,6 +157,11 @@ void RigidSystem::kick_all(double span) {
         s.velocity += (span / h_) * kick(i);
         s.angular_momentum += span * body.torque;
     }
+    pull_by_springs(joints_, constants_, live_.bodies, [&](const JointSpringPull& pull) {
+        BodyState& s = live_.bodies[pull.body];
+        s.velocity += (span / constants_[pull.body].mass) * pull.force;
+        if (!constants_[pull.body].particle) s.angular_momentum += span * pull.torque;
+    });
 }
 
 /// Momenta += Gᵀ Λ with the Jacobians as assembled.
@@ -226,6 +241,11 @@ bool RigidSystem::hold_stage(double tau, double span, std::size_t stage) {
     push(multiplier_.data());
     if (clock_) clock_->mark(Stage::assemble_rows);
     if (!hold_rows(tau)) return false;
+    for (const int k : joints_.rotors()) {
+        const JointBlock& block = joints_.blocks()[k];
+        joints_.states[block.joint].rotor -=
+            block.softness[block.rotor] * multiplier_[matrix_.offset(k) + block.rotor];
+    }
     if (!in_tree_) remember(stage, span);
     for (int i : constrained_) {
         BodyState& s = live_.bodies[i];
@@ -272,7 +292,9 @@ void RigidSystem::read_composition() {
     std::fill(right_.begin(), right_.end(), 0.0);
     std::size_t row = 0;
     for (int k = 0; k < static_cast<int>(blocks.size()); ++k)
-        for (int i = 0; i < blocks[k].size; ++i, ++row) right_[row] = -row_speed(k, i, false);
+        for (int i = 0; i < blocks[k].size; ++i, ++row)
+            right_[row] =
+                (i == blocks[k].rotor ? joints_.states[blocks[k].joint].rotor : 0.0) - row_speed(k, i, false);
     if (!factor_and_solve()) live_.not_solved = constrained_.front();
     take();
     push(multiplier_.data());
@@ -286,11 +308,19 @@ void RigidSystem::read_composition() {
         for (int k = 0; k < 3; ++k) *right++ = p[k];
         for (int k = 0; k < 3 && !constants_[i].particle; ++k) *right++ = l[k];
     }
+    pull_by_springs(joints_, constants_, live_.bodies, [&](const JointSpringPull& pull) {
+        double* to =
+            right_.data() + matrix_.offset(static_cast<int>(blocks.size()) + solver_index_[pull.body]);
+        for (int k = 0; k < 3; ++k) to[k] += h_ * pull.force[k];
+        for (int k = 0; k < 3 && !constants_[pull.body].particle; ++k) to[3 + k] += h_ * pull.torque[k];
+    });
     solve_again();
     take();
     const double* multiplier = multiplier_.data();
     for (const JointBlock& block : blocks) {
-        std::copy_n(multiplier, block.size, joints_.states[block.joint].multiplier.data());
+        JointSet::State& state = joints_.states[block.joint];
+        std::copy_n(multiplier, block.size,
+                    block.axial ? state.axial_multiplier.data() : state.multiplier.data());
         multiplier += block.size;
     }
 }

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "rigid/rigid_system.hpp"
+#include "rigid/rotors.hpp"
 #include "rigid/tolerances.hpp"
 
 namespace spook {
@@ -71,6 +72,10 @@ bool RigidSystem::factor_dense() {
                             j[5] * twist.z;
         }
     }
+    for (const int k : joints_.rotors()) {
+        const int row = matrix_.offset(k) + blocks[k].rotor;
+        dense_rows_.row(row)[row] += blocks[k].softness[blocks[k].rotor];
+    }
     return dense_rows_.factor(method_.floor);
 }
 
@@ -80,6 +85,10 @@ double RigidSystem::violations_ahead(double tau) {
         lead(constants_[constrained_[k]], axes_[k], tau, live_.bodies[constrained_[k]],
              trial_[constrained_[k]]);
     violations_at(trial_, violation_.data());
+    for (const int k : joints_.rotors()) {
+        const int row = matrix_.offset(k) + joints_.blocks()[k].rotor;
+        violation_[row] = rotor_gap(joints_, k, live_.bodies, trial_, tau, multiplier_[row]);
+    }
     double worst = 0.0;
     for (std::size_t row = 0; row < extent_.size(); ++row) {
         const double off = std::fabs(violation_[row]) / extent_[row];

@@ -6,7 +6,7 @@ namespace {
 std::vector<int> distances(const RigidSystem& system) {
     std::vector<int> found;
     for (int joint = 0; joint < system.joints().count(); ++joint)
-        if (system.joints().kind(joint) == JointKind::distance) found.push_back(joint);
+        if (system.joints().constants(joint).kind == JointKind::distance) found.push_back(joint);
     return found;
 }
 
@@ -21,7 +21,7 @@ Sampler joint_sampler(const RigidSystem* s, int joint, bool force) {
                     for (int distance : all) read_distance(distance, out++);
                 }};
     }
-    const JointKind kind = s->joints().kind(joint);
+    const JointKind kind = s->joints().constants(joint).kind;
     if (kind == JointKind::relation && force)  // what a coordinate of coefficient 1 feels
         return {1, [=](double* out) { *out = -s->tension(joint); }};
     if (kind == JointKind::distance || kind == JointKind::relation || kind == JointKind::wire)

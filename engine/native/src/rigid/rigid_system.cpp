@@ -97,7 +97,7 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
         std::vector<char> yielding;
         for (const JointBlock& block : joints_.blocks()) {
             joint_pairs.push_back({block.first, block.second});
-            yielding.push_back(joints_.has_spring(block) || gives_way(joints_.kind(block.joint)));
+            yielding.push_back(joints_.has_spring(block) || gives_way(joints_.constants(block.joint).kind));
         }
         for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
             for (int body : joints_.others(k)) joint_pairs.push_back({joints_.blocks()[k].first, body});

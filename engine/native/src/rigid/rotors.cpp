@@ -13,6 +13,16 @@ AxialRow row_of(const JointSet& joints, const JointBlock& block, std::span<const
     return axial_row(joints.constants(block.joint), body(block.first), body(block.second));
 }
 
+/// From a place of the coordinate to where the bodies are; `near`: to within half a turn of a hinge.
+double way_of(const JointSet& joints, const JointBlock& block, double from, std::span<const BodyState> to,
+              double near) noexcept {
+    constexpr double turn = 2.0 * std::numbers::pi;
+    const double way = row_of(joints, block, to).coordinate - from;
+    return joints.constants(block.joint).kind == JointKind::hinge
+               ? way + turn * std::round((near - way) / turn)
+               : way;
+}
+
 }  // namespace
 
 double rotor_right(JointState& state, double rate) noexcept {
@@ -41,6 +51,13 @@ double rotor_energy(const JointSet& joints, std::span<const BodyState> bodies) n
     return sum;
 }
 
+double rotor_gap(const JointSet& joints, int index, std::span<const BodyState> from,
+                 std::span<const BodyState> to, double time, double impulse) noexcept {
+    const JointBlock& block = joints.blocks()[index];
+    const double goes = time * (joints.states[block.joint].rotor - block.softness[block.rotor] * impulse);
+    return way_of(joints, block, row_of(joints, block, from).coordinate, to, goes) - goes;
+}
+
 void turn_rotor(JointSet& joints, int index, std::span<const BodyState> bodies, double h,
                 bool evenly) noexcept {
     const JointBlock& block = joints.blocks()[index];
@@ -49,12 +66,7 @@ void turn_rotor(JointSet& joints, int index, std::span<const BodyState> bodies, 
     const double rate = state.rotor - state.rotor_lead;
     state.rotor_lead = 0.0;
     if (!evenly || state.broken) return;
-    double way = row_of(joints, block, bodies).coordinate - state.angle;
-    if (joints.kind(block.joint) == JointKind::hinge) {
-        constexpr double turn = 2.0 * std::numbers::pi;
-        way += turn * std::round((h * rate - way) / turn);
-    }
-    state.rotor_lead = way / h - rate;
+    state.rotor_lead = way_of(joints, block, state.angle, bodies, h * rate) / h - rate;
 }
 
 }  // namespace spook

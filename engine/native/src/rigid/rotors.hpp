@@ -20,6 +20,9 @@ double rotor_right(JointState& state, double rate) noexcept;
 double rotor_change(const JointSet& joints, int block) noexcept;
 /// At which speed the bodies turn it.
 double rotor_speed(const JointSet& joints, int block, std::span<const BodyState> bodies) noexcept;
+/// How much further its coordinate goes from one place to another than the rotor in that time, after an impulse on it [m or rad].
+double rotor_gap(const JointSet& joints, int block, std::span<const BodyState> from,
+                 std::span<const BodyState> to, double time, double impulse) noexcept;
 /// Of all rotors where the bodies move so [J].
 double rotor_energy(const JointSet& joints, std::span<const BodyState> bodies) noexcept;
 /// Once bodies have moved by h, before overlaps are parted. `evenly`: with the velocities of the solve all the way.
