@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 
 import numpy as np
@@ -38,6 +39,7 @@ RESTITUTIONS = (0.3, 0.5, 0.8, 1.0)
 STEPS_A_SECOND = (60, 240, 1000)
 BOUNCES = 2
 RIGHT = 0.02  # of the height
+HIGHEST = 1e4  # m, where the search for the highest drop ends
 MIDDLE, TIME_STEP = 0.5, 1.0 / 240.0  # restitution and step [s] of the ladder and of the search
 
 
@@ -87,13 +89,19 @@ def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     return simulate(scene(MIDDLE), time_step=time_step, duration=lasts, method=method)
 
 
+def comes_back(simulate: Simulate, height: float) -> bool:
+    """Whether the second bounce of a drop from so high [m] is right."""
+    return abs(height_error(simulate, MIDDLE, TIME_STEP, height=height)) <= RIGHT
+
+
 def lowest(simulate: Simulate) -> BreakPoint:
     """The lowest drop [m] whose second bounce is right."""
+    return break_point(functools.partial(comes_back, simulate), HEIGHT, 1e-6, resolution=0.05, walk=12)
 
-    def comes_back(height: float) -> bool:
-        return abs(height_error(simulate, MIDDLE, TIME_STEP, height=height)) <= RIGHT
 
-    return break_point(comes_back, HEIGHT, 1e-6, resolution=0.05, walk=12)
+def highest(simulate: Simulate) -> BreakPoint:
+    """The highest one [m]."""
+    return break_point(functools.partial(comes_back, simulate), HEIGHT, HIGHEST, resolution=0.05, walk=4)
 
 
 def _at(restitution: float, per_second: int) -> Measurement:
@@ -163,6 +171,17 @@ TEST = ScalarTest(
             unit="m",
             better="smaller",
             expected_source="none: how much of a flight of a few steps is seen hangs on where in a step it begins",
+        ),
+        StabilityStudy(
+            name="highest",
+            title="Highest drop that comes back to its height",
+            configuration="plain",
+            definition="height after the second bounce is e⁴ h to two hundredths, e = 0.5, 1/240 s",
+            study=highest,
+            unit="m",
+            expected=(HIGHEST, HIGHEST),
+            expected_source="a higher drop takes more steps of the same length, and less of it is lost between two of them; the "
+            "search ends at 10 000 m",
         ),
     ),
 )

@@ -37,6 +37,7 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.heavier import heavier
 
 EDGE, RADIUS = 1.0, 0.5  # m
 MASS = 1.0  # kg
@@ -54,7 +55,7 @@ STACKS = (2, 5, 10, 20)  # boxes
 RATIOS = (1.0, 1e2, 1e4)  # of the upper box's mass
 RATIO = 100.0  # of the ladders
 DEEP, ASIDE, OFF = 1e-3, 1e-4, 0.01  # m, m, of the load
-LONGEST = 1e4  # s, where the search for the longest step ends
+LONGEST, HEAVIEST = 1e4, 1e12  # s, kg, where the searches end
 ROUGH = Material(friction=0.5)
 
 
@@ -137,6 +138,16 @@ def longest_step(simulate: Simulate) -> BreakPoint:
         return result.completed and abs(float(result["force"][2]) / (MASS * GRAVITY) - 1.0) < 1e-9
 
     return break_point(presses, TIME_STEP, LONGEST, walk=8)
+
+
+def heaviest(simulate: Simulate) -> BreakPoint:
+    """The heaviest standing cylinder [kg] that is told to press with its weight."""
+
+    def presses(mass: float) -> bool:
+        built = heavier(on_plane("cylinder"), mass / MASS, "body 1")
+        return load_error(simulate, built) < 1e-9
+
+    return break_point(presses, MASS, HEAVIEST, walk=5)
 
 
 def _lies(what: str, built: Scene, parameters: Mapping[str, float]) -> Measurement:
@@ -264,6 +275,16 @@ TEST = ScalarTest(
             unit="s",
             expected=(LONGEST, LONGEST),
             expected_source="an impulse of h m g over h, shared by two contacts alike: the step scales out of it; the search ends at 10 000 s",
+        ),
+        StabilityStudy(
+            name="heaviest",
+            title="Heaviest standing cylinder that presses with its weight",
+            configuration="direct",
+            definition="the force is the weight to 1e-9 of it after two seconds",
+            study=heaviest,
+            unit="kg",
+            expected=(HEAVIEST, HEAVIEST),
+            expected_source="mass scales out of statics; the search ends at 1e12 kg",
         ),
     ),
 )

@@ -15,6 +15,7 @@ from scipy.optimize import linprog
 from spook_tracker.scalar_tests import (
     between_walls,
     blow,
+    bounce_grid,
     bouncing_ball,
     bowl,
     cradle,
@@ -71,6 +72,7 @@ def test_coulombs_law_knows_neither_step_nor_mass(time_step: Fraction, mass: Fra
     assert band("slip_angle", "longest-step") == (slip_angle.LONGEST,) * 2
     assert band("friction", "longest-step") == (plane.LONGEST,) * 2
     assert band("slope_grid", "longest-step") == (slope_grid.LONGEST,) * 2
+    assert band("slope_grid", "heaviest") == (slope_grid.HEAVIEST,) * 2
     assert band("force_ratio", "heaviest") == (force_ratio.HEAVIEST,) * 2
     for slope in (Fraction(3, 10), Fraction(7, 10)):
         normal, along = time_step * mass, time_step * mass * slope  # N s, in g cos θ
@@ -149,6 +151,19 @@ def test_the_force_under_a_capsule_that_lies_is_shared_by_its_ends_whatever_the_
     for h in np.geomspace(g.TIME_STEP, g.LONGEST, 50).tolist():
         ends = np.linalg.solve([[1.0, 1.0], [-0.5, 0.5]], [h * g.GRAVITY * g.MASS, 0.0])
         assert ends.sum() / h == pytest.approx(g.GRAVITY * g.MASS, rel=1e-14) and ends[0] == ends[1]
+    assert band("resting_grid", "heaviest") == (g.HEAVIEST, g.HEAVIEST)
+    for mass in np.geomspace(g.MASS, g.HEAVIEST, 13).tolist():
+        rim = np.linalg.lstsq(np.array([[1.0] * 3, [1.0, -0.5, -0.5], [0.0, 1.0, -1.0]]), [mass, 0.0, 0.0])[0]
+        assert rim.sum() / mass == pytest.approx(1.0, rel=1e-14), "three points of its rim carry it alike"
+
+
+def test_less_of_a_higher_bounce_is_lost_between_two_steps() -> None:
+    """The path between two samples sags by g h²/8 at most, whatever its height."""
+    b = bounce_grid
+    assert band("bounce_grid", "highest") == (b.HIGHEST, b.HIGHEST)
+    sag = b.GRAVITY * b.TIME_STEP**2 / 8.0
+    lost = [sag / (b.MIDDLE**4 * height) for height in np.geomspace(b.HEIGHT, b.HIGHEST, 50).tolist()]
+    assert lost[0] < b.RIGHT and all(np.diff(lost) < 0.0)
 
 
 def test_the_force_under_a_ball_knows_no_step() -> None:

@@ -30,7 +30,7 @@ GENTLE, STEEP = 0.9, 1.2  # times µ: the slopes on which it stands and slides
 STEPS_A_SECOND = (30, 60, 240)
 SETTLED, STOOD, SLID = 0.5, 1.5, 1.0  # s: at rest from, looked at until; how long it slides
 ASKEW = DIRECTIONS[1]
-LONGEST = 100.0  # s, where the search for the longest step ends
+LONGEST, HEAVIEST = 100.0, 1e12  # s, kg, where the searches end
 STANDING, SLIDING = 1e-4, 1e-3  # m in a second; of the speed
 
 
@@ -88,13 +88,13 @@ def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
     return simulate(built, time_step=time_step, duration=SLID, method=method)
 
 
-def tells_apart(simulate: Simulate, time_step: float) -> bool:
+def tells_apart(simulate: Simulate, time_step: float = 1.0 / 60.0, mass: float = 1.0) -> bool:
     """Whether the box stands on the gentle slope and slides as it should down the steep one, askew, for ten such steps."""
     observe = {"velocity": Final(quantity=Velocity("box"))}
     found = [
-        simulate(scene(times * FRICTION, ASKEW, FRICTION), time_step=time_step, steps=10, observe=observe)[
-            "velocity"
-        ]
+        simulate(
+            scene(times * FRICTION, ASKEW, FRICTION, mass), time_step=time_step, steps=10, observe=observe
+        )["velocity"]
         for times in (GENTLE, STEEP)
     ]
     right = downhill(FRICTION, ASKEW, 10.0 * time_step)
@@ -105,6 +105,11 @@ def tells_apart(simulate: Simulate, time_step: float) -> bool:
 def longest_step(simulate: Simulate) -> BreakPoint:
     """The longest step [s] in which the box knows its slope and its way."""
     return break_point(functools.partial(tells_apart, simulate), 1.0 / 60.0, LONGEST, walk=6)
+
+
+def heaviest(simulate: Simulate) -> BreakPoint:
+    """The heaviest box [kg] that knows them."""
+    return break_point(lambda mass: tells_apart(simulate, mass=mass), 1.0, HEAVIEST, walk=5)
 
 
 def _at(per_second: int) -> tuple[Measurement, ...]:
@@ -192,6 +197,16 @@ TEST = ScalarTest(
             unit="s",
             expected=(LONGEST, LONGEST),
             expected_source="gravity and the impulses that answer it have the factor h alike; the search ends at 100 s",
+        ),
+        StabilityStudy(
+            name="heaviest",
+            title="Heaviest box that stands, and slides straight down",
+            configuration="cone",
+            definition="the same at 1/60 s",
+            study=heaviest,
+            unit="kg",
+            expected=(HEAVIEST, HEAVIEST),
+            expected_source="mass scales out of Coulomb's law; the search ends at 1e12 kg",
         ),
     ),
 )
