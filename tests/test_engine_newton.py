@@ -92,7 +92,7 @@ def test_friction_holds_below_its_coefficient_and_slides_by_the_closed_form_abov
 
 @pytest.mark.parametrize(
     ("configuration", "deep"),
-    [("mujoco", 1e-3), ("xpbd", 2e-5), ("kamino", 1e-6), ("featherstone", 4e-3), ("vbd", 4e-3)],
+    [("mujoco", 1e-5), ("xpbd", 2e-5), ("kamino", 1e-6), ("featherstone", 4e-3), ("vbd", 4e-3)],
 )
 @pytest.mark.parametrize("shape", [None, Capsule(0.2, 0.6), Cylinder(0.2, 1.0)])
 def test_shapes_rest_as_deep_as_contacts_give(shape: Any, configuration: str, deep: float) -> None:
@@ -117,7 +117,7 @@ def test_a_stack_of_ten_has_room_for_its_contacts() -> None:
     """By SolverMuJoCo's own guess half of them are left out, and the stack falls."""
     observe = {"way": Final(quantity=Position(), from_start=True)}
     found = run("mujoco")(resting_grid.stack(*(1.0,) * 10), time_step=H, steps=30, observe=observe)
-    assert np.abs(found["way"]).max() < 0.02
+    assert np.abs(found["way"]).max() < 5e-3
 
 
 def test_a_load_as_large_as_the_weight_keeps_a_body_where_it_is() -> None:

@@ -47,6 +47,8 @@ FORCES = (
     "SolverKamino",
 )  # that show those of contacts through Newton's containers
 FINDS_CONTACTS = ("SolverMuJoCo", "SolverKamino")  # itself; the others are told by Newton's pipeline
+OF_ITS_OWN = ("SolverMuJoCo", "SolverKamino")  # attributes of bodies and surfaces
+HARD = (0.9999, 0.9999, 0.001, 0.5, 2.0)  # as hard as MuJoCo's contacts get: those of our adapter of MuJoCo
 NO_BOUNCE = ("restitution",)
 
 
@@ -67,7 +69,7 @@ class Newton:
         Configuration(
             name="mujoco",
             reason="SolverMuJoCo, MuJoCo's equations as MuJoCo Warp has them: Runge-Kutta of order 4, elliptic cones and "
-            "impratio 100 as in Newton's examples of legged robots, iterations to the tolerance of single precision",
+            "impratio 100 as in Newton's examples of legged robots, contacts as hard as they get (solimp 0.9999)",
             expected_order=4.0,
             options={
                 "solver": "SolverMuJoCo",
@@ -164,7 +166,7 @@ class _World:
         self.builder = newton.ModelBuilder(gravity=self.scene.gravity)
         self.builder.rigid_gap = GAP
         make: Any = getattr(newton.solvers, self.kind)
-        if self.kind == "SolverKamino":
+        if self.kind in OF_ITS_OWN:
             make.register_custom_attributes(self.builder)
         self.bodies: dict[str, int] = {}  # by name; what does not move is part of the world
         self.shapes: dict[str, int] = {}
@@ -173,7 +175,7 @@ class _World:
             self._clothe()
         if count > 1:
             one, self.builder = self.builder, newton.ModelBuilder(gravity=self.scene.gravity)
-            if self.kind == "SolverKamino":
+            if self.kind in OF_ITS_OWN:
                 make.register_custom_attributes(self.builder)
             self.builder.replicate(one, count)
         self.count = count
@@ -334,6 +336,8 @@ class _World:
         turn = np.array(body.orientation) if index == -1 else joint_tree.UPRIGHT
         place = body.position if index == -1 else (0.0, 0.0, 0.0)
         common = {"body": index, "xform": _pose(place, turn), "cfg": config}
+        if self.kind == "SolverMuJoCo":
+            common["custom_attributes"] = {"mujoco:geom_solimp": HARD}
         if isinstance(shape, Plane):
             common["xform"] = _pose(place, product(turn, upwards(shape.normal)))
             return int(self.builder.add_shape_plane(**common, width=0.0, length=0.0))
