@@ -143,6 +143,19 @@ def test_a_fall_is_read_half_a_step_apart() -> None:
     assert abs(asked(fall, method=Method(half_step_velocities=True)).books.unexplained) < 1e-9
 
 
+def test_a_fall_that_something_may_brake_makes_nothing() -> None:
+    """Its joint has a stop: half a step of the fall was taken each step, so that all of it came back out of nothing."""
+    arms = tuple(
+        RigidBody(name=n, mass=1.0, inertia=(0.1, 0.1, 0.1), position=(x, 0, 9))
+        for n, x in (("a", 0), ("b", 1))
+    )
+    joint = Hinge(
+        name="j", between=("a", "b"), at=(0.5, 0, 9), axis=(0, 1, 0), limit=Limit(lower=-1, upper=1)
+    )
+    run = asked(Scene(bodies=arms, constraints=(joint,), gravity=DOWN, contacts=False), 0.2, h=1 / 60)
+    assert run.status == "completed", run.failure
+
+
 def test_a_conveyor_gives_and_takes() -> None:
     rough = Material(friction=0.5)
     belt = RigidBody(
