@@ -25,8 +25,8 @@ LINKS = 10  # of 1 kg and 1 m
 DOWN = (0.0, 0.0, -9.81)  # m/s²
 
 
-def thrown(load: float, steps_a_second: int) -> tuple[Result, float]:
-    """A load [kg] at the end of a chain, thrown at 1 m/s for 5 s; and how the energy errs, over the throw's."""
+def loaded_chain(load: float) -> Scene:
+    """A load [kg] at the end of a chain, thrown at 1 m/s."""
     links = [
         RigidBody(name=f"{k}", mass=1.0, position=(0.0, 0.0, -k - 0.5), inertia=(1 / 12, 1 / 12, 0.01))
         for k in range(LINKS)
@@ -43,8 +43,13 @@ def thrown(load: float, steps_a_second: int) -> tuple[Result, float]:
         Ball(name=f"to {ends[k + 1]}", between=(ends[k], ends[k + 1]), at=(0.0, 0.0, -k), compliance=0.0)
         for k in range(LINKS + 1)
     ]
+    return Scene(bodies=(*links, weight), constraints=tuple(joints), gravity=DOWN)
+
+
+def thrown(load: float, steps_a_second: int) -> tuple[Result, float]:
+    """That for 5 s; and how the energy errs, over the throw's."""
     result = simulate(
-        Scene(bodies=(*links, weight), constraints=tuple(joints), gravity=DOWN),
+        loaded_chain(load),
         time_step=1.0 / steps_a_second,
         duration=5.0,
         method=ORDER_4,

@@ -19,6 +19,7 @@ from spook_tracker.engine import Method, MethodError, Run, Scene, SimulationFail
 from spook_tracker.engine import snapshot as form
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from tests import coupling_scenes, particle_scenes, rigid_scenes, sleep_scenes
+from tests.test_engine_energy_made import loaded_chain
 from tests.test_engine_run import SCENES, rng, stiff, tumble
 from tests.test_engine_time_limits import islands
 
@@ -39,7 +40,8 @@ def corpus() -> dict[str, Made]:
     few = Method(solver="iterative", iterations=2)
     made["unsettled"] = (islands((40,), few)[0], 0.01, few)
     for kind, scenes in (("particles", particle_scenes), ("rigid", rigid_scenes)):
-        made[f"{kind}, halved"] = (stiff(scenes.tree(rng())), 0.3, Method(composition="order4"))
+        made[f"{kind}, halved"] = (stiff(scenes.tree(rng())), 0.15, Method(composition="order4"))
+    made["rigid, in parts"] = (loaded_chain(300.0), 1 / 60, Method(composition="order4"))
     made["a lock that breaks"] = (coupling_scenes.hung(strength=22.0), 0.01, Method())
     scene, method = islands((12, 9), Method())
     made["overlaps in two islands"] = (scene, 0.01, method)

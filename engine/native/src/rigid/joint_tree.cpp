@@ -52,6 +52,7 @@ bool JointTree::attach(std::span<const int> tied) {
     const auto blocks = joints_->blocks();
     const auto moving = [&](int body) { return body >= 0 && constants_[body].moves(); };
     for (const JointBlock& block : blocks) {
+        if (block.axial && block.size == 1 && block.rotor == 0) continue;
         if (block.axial || joints_->constants(block.joint).kind == JointKind::relation ||
             joints_->constants(block.joint).kind == JointKind::wire)
             return false;
@@ -64,6 +65,7 @@ bool JointTree::attach(std::span<const int> tied) {
         for (std::size_t k = 0; k < blocks.size(); ++k) {
             const JointBlock& block = blocks[k];
             for (const bool backwards : {false, true}) {
+                if (block.axial) continue;
                 const int holder = backwards ? block.second : block.first;
                 const int body = backwards ? block.first : block.second;
                 if (!moving(body) || hung[body] >= 0) continue;
@@ -118,6 +120,9 @@ bool JointTree::attach(std::span<const int> tied) {
             node.axis = joint.axes[0];
             node.parent_arm = node.backwards ? joint.second_arm : joint.first_arm;
             node.arm = node.backwards ? joint.first_arm : joint.second_arm;
+            if (const std::size_t own = static_cast<std::size_t>(one.joint) + 1;
+                own < blocks.size() && blocks[own].joint == node.joint)
+                node.armature = 1.0 / blocks[own].softness[0];
         }
         const double arms = norm(node.parent_arm) + norm(node.arm);
         node.extent = arms > 0.0 ? arms : 1.0;
@@ -142,11 +147,24 @@ bool JointTree::attach(std::span<const int> tied) {
     }
     scale_ = scale / static_cast<double>(std::max<std::size_t>(1, nodes_.size()));
     std::vector<int> in_tree(static_cast<std::size_t>(trees_), 0);
-    for (const Node& node : nodes_) in_tree[node.tree] += node.coordinates();
+    std::size_t with_rotor = 0;
+    for (const Node& node : nodes_) {
+        in_tree[node.tree] += node.coordinates();
+        with_rotor += node.armature > 0.0;
+    }
+    if (with_rotor < joints_->rotors().size()) return false;
     courses_.assign(nodes_.size(), Course{});
     pushes_.assign(nodes_.size(), {});
     twists_.assign(nodes_.size(), {});
-    return coordinates_ > 0 && *std::max_element(in_tree.begin(), in_tree.end()) <= MOST_IN_A_TREE;
+    const int most = has_light() ? MOST_WITH_LIGHT : MOST_IN_A_TREE;
+    return coordinates_ > 0 && *std::max_element(in_tree.begin(), in_tree.end()) <= most;
+}
+
+/// Whether some body is far lighter than another.
+bool JointTree::has_light() const noexcept {
+    const auto [least, most] = std::minmax_element(
+        nodes_.begin(), nodes_.end(), [](const Node& a, const Node& b) { return a.mass < b.mass; });
+    return least != nodes_.end() && least->mass < LIGHT * most->mass;
 }
 
 /// The joints that are left, and which of their rows say more than the forest does.
@@ -157,6 +175,7 @@ bool JointTree::close(const LargeArray<BodyState>& start) {
     take(start);
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         const JointBlock& block = blocks[k];
+        if (block.axial) continue;
         Closing loop{};
         loop.block = static_cast<int>(k);
         loop.first = block.first < 0 ? -1 : node_of_[block.first];
@@ -329,7 +348,7 @@ bool JointTree::order() {
         for (const Closing::Column& column : loop.columns)
             loop.places.push_back(place_of_[nodes_[column.node].first + column.coordinate]);
     system_.prepare(coordinates_ + rows_, reach);
-    return reach <= FARTHEST;
+    return reach <= (has_light() ? MOST_WITH_LIGHT : FARTHEST);
 }
 
 /// Takes the scene into a plane if nothing in it leaves one that two axes of the world span.
@@ -339,7 +358,7 @@ void JointTree::flatten() {
     for (const Node& node : nodes_)
         for (int i = 0; i < 3 && normal < 0 && node.turns == 1; ++i)
             if (std::fabs(node.axis[i]) > 0.9) normal = i;
-    if (normal < 0) return;
+    if (normal < 0 || !joints_->rotors().empty()) return;
     const Plane3 flat{normal};
     const auto lies = [&](Vec3 axis) { return std::fabs(axis[normal]) <= ROUNDING; };
     const auto stands = [&](Vec3 axis) {

@@ -43,7 +43,8 @@ public:
     /// One stage over τ: from poses and kicked momenta to poses at its end and momenta on the way. `increments`, per
     /// coordinate: in, where to look; out, what each joint moved (m; rad in a plane, in space the sine of half the angle). False, and
     /// nothing changed, if no solution is near. `rounds` counts evaluations.
-    bool stage(double tau, LargeArray<BodyState>& bodies, double* increments, std::int64_t& rounds) noexcept;
+    bool stage(double tau, LargeArray<BodyState>& bodies, JointStates& joints, double* increments,
+               std::int64_t& rounds) noexcept;
 
 private:
     struct Node {  // a body with the joint it is attached to; a parent stands before all attached to it
@@ -56,6 +57,7 @@ private:
         Vec3 parent_arm, arm;       // from the centres to the joint, at the start
         Vec3 axis, slide_axes[3];
         double mass = 0.0, extent = 1.0;
+        double armature = 0.0;  // of its joint's coordinate, kg or kg m²
         Vec3 inertia;
         int coordinates() const noexcept { return turns + slides; }
     };
@@ -103,6 +105,7 @@ private:
     };
 
     bool attach(std::span<const int> tied);
+    bool has_light() const noexcept;
     bool close(const LargeArray<BodyState>& start);
     void drop_fulfilled_rows();
     bool independent(const LargeArray<BodyState>& start);
@@ -115,7 +118,8 @@ private:
     void turn_ends() noexcept;
     void place() noexcept;
     void turn_by(const double* step) noexcept;
-    void gain(const LargeArray<BodyState>& bodies, double tau) noexcept;
+    void gain(const LargeArray<BodyState>& bodies, const JointStates& joints, double tau) noexcept;
+    static double moved(const Node& node, const Course& course) noexcept;
     void fill_masses() noexcept;
     void fill_loops(bool derivatives) noexcept;
     void find_rows(const Closing& loop, const LargeArray<BodyState>& bodies, LoopRows& out) noexcept;

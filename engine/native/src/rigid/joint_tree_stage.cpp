@@ -171,8 +171,15 @@ void JointTree::turn_by(const double* step) noexcept {
     }
 }
 
+/// How far the coordinate of a joint with armature goes [rad or m], as the joint counts it.
+double JointTree::moved(const Node& node, const Course& m) noexcept {
+    const double goes =
+        node.turns == 1 ? 2.0 * arc_tangent(dot(vector_of(m.moved), node.axis), m.moved.w) : m.slid[0];
+    return node.backwards ? -goes : goes;
+}
+
 /// right_: −τ/scale × what the coordinates still gain that no force gives.
-void JointTree::gain(const LargeArray<BodyState>& bodies, double tau) noexcept {
+void JointTree::gain(const LargeArray<BodyState>& bodies, const JointStates& joints, double tau) noexcept {
     const double over = tau / scale_;
     for (std::size_t k = 0; k < nodes_.size(); ++k) {
         const Node& node = nodes_[k];
@@ -187,6 +194,10 @@ void JointTree::gain(const LargeArray<BodyState>& bodies, double tau) noexcept {
         const Vec3 about = m.twist - cross(m.reach, m.push);
         for (int i = 0; i < node.coordinates(); ++i)
             right_[place_of_[node.first + i]] = -over * dot(m.along[i], i < node.turns ? about : m.push);
+        if (node.armature > 0.0) {
+            const double gained = node.armature * (moved(node, m) / tau - joints.states[node.joint].rotor);
+            right_[place_of_[node.first]] -= over * (node.backwards ? -gained : gained);
+        }
         if (node.parent < 0) continue;
         Course& p = courses_[node.parent];
         p.push += m.push;
@@ -241,6 +252,7 @@ void JointTree::fill_masses() noexcept {
                 if (nodes_[b].parent < 0) break;
                 twist += cross(courses_[b].from_parent, push);
             }
+            system_.at(column, column) += over * node.armature;
         }
     }
 }
@@ -320,7 +332,7 @@ void JointTree::fill_loops(bool derivatives) noexcept {
     }
 }
 
-bool JointTree::stage(double tau, LargeArray<BodyState>& bodies, double* increments,
+bool JointTree::stage(double tau, LargeArray<BodyState>& bodies, JointStates& joints, double* increments,
                       std::int64_t& rounds) noexcept {
     if (!plane_.empty()) return plane_.stage(tau, bodies, increments, rounds);
     if (!pivots_.empty()) {
@@ -337,7 +349,7 @@ bool JointTree::stage(double tau, LargeArray<BodyState>& bodies, double* increme
     std::fill(multiplier_.begin(), multiplier_.end(), 0.0);
     for (JointRounds round;;) {
         move(tau);
-        gain(bodies, tau);
+        gain(bodies, joints, tau);
         if (round.fresh()) {
             turn_ends();
             system_.clear();
@@ -381,6 +393,7 @@ bool JointTree::stage(double tau, LargeArray<BodyState>& bodies, double* increme
         s.turn_less_one = end.turn_less_one;
         s.velocity = over * m.shift;
         s.angular_momentum = m.momentum;
+        if (node.armature > 0.0) joints.states[node.joint].rotor = over * moved(node, m);
         double* own = increments + node.first;
         const Vec3 e = vector_of(m.moved);
         if (node.turns == 1) own[0] = dot(e, node.axis);

@@ -63,7 +63,7 @@ void RigidSystem::compose(std::int64_t steps) {
 
 /// The square of the rate at which tension turns a body back, of the fastest one, 1/s²: a force F that pulls at its arm r does so with
 /// F r/I, and shakes it sideways with F/(m r). A light link under a heavy load does so at many times the rate of its swing.
-double RigidSystem::tension_rate() {
+double RigidSystem::tension_rate(double allowed) {
     LargeArray<BodyState>& going = step_start_[0];
     going = live_.bodies;
     read_composition();
@@ -93,7 +93,62 @@ double RigidSystem::tension_rate() {
             rates[b] += pull * (1.0 / across + 1.0 / std::max(constants_[b].mass * length2, across));
         }
     }
-    return *std::max_element(rates.begin(), rates.end());
+    const double most = *std::max_element(rates.begin(), rates.end());
+    if (!(most > allowed)) return most;
+
+    // Each body by itself would shake so; joints may tie light ones to heavy ones. The fastest turning that joints allow, by power
+    // iteration of M⁻¹ K, with K of the forces on its arms, from a start in which light bodies turn most.
+    stiffness_.assign(constrained_.size(), Mat3{});
+    for (std::size_t k = 0; k < blocks.size(); ++k) {
+        if (blocks[k].axial) continue;
+        const JointSet::State& state = joints_.states[blocks[k].joint];
+        const double* rows = jacobian(static_cast<int>(k), true);
+        Vec3 force;
+        for (int i = 0; i < blocks[k].size; ++i, rows += 6)
+            force += (state.multiplier[i] / h_) * Vec3{rows[0], rows[1], rows[2]};
+        for (const bool second : {false, true}) {
+            const int b = second ? blocks[k].second : blocks[k].first;
+            if (b < 0 || solver_index_[b] < 0 || constants_[b].particle) continue;
+            const Vec3 arm = second ? state.second_reach : state.first_reach, pull = second ? force : -force;
+            Mat3& held = stiffness_[solver_index_[b]];
+            for (int i = 0; i < 3; ++i)
+                for (int j = 0; j < 3; ++j)
+                    held(i, j) +=
+                        (i == j ? dot(pull, arm) : 0.0) - 0.5 * (pull[i] * arm[j] + arm[i] * pull[j]);
+        }
+    }
+    const int row_blocks = static_cast<int>(blocks.size());
+    std::vector<Vec3> turn;
+    for (const int i : constrained_) {
+        const Vec3 own = constants_[i].inertia;
+        const double light = constants_[i].particle ? 0.0 : 1.0 / (own.x + own.y + own.z);
+        turn.push_back(light * Vec3{1.0 - 0.3 * (i % 4), 0.4 * (i % 3) - 0.5, 0.7 - 0.25 * (i % 5)});
+    }
+    double fastest = 0.0, before = 0.0;
+    for (int round = 0; round < ROUNDS; ++round) {
+        std::fill(right_.begin(), right_.end(), 0.0);
+        for (std::size_t k = 0; k < constrained_.size(); ++k) {
+            if (constants_[constrained_[k]].particle) continue;
+            const Vec3 torque = stiffness_[k] * turn[k];
+            std::copy_n(&torque.x, 3, right_.data() + matrix_.offset(row_blocks + static_cast<int>(k)) + 3);
+        }
+        solve_again();
+        double size = 0.0;
+        for (std::size_t k = 0; k < constrained_.size(); ++k) {
+            const int i = constrained_[k];
+            const double* x = solution_.data() + matrix_.offset(row_blocks + static_cast<int>(k));
+            size += constants_[i].mass * (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
+            if (constants_[i].particle) continue;
+            turn[k] = {x[3], x[4], x[5]};
+            size += dot(turn[k], live_.bodies[i].inertia * turn[k]);
+        }
+        size = std::sqrt(size);
+        if (!(size > 0.0) || !std::isfinite(size)) return round == 0 ? most : std::min(most, ALIKE * fastest);
+        if (round > 0) fastest = std::max(round + 1 < ROUNDS ? 0.0 : before, size);
+        before = size;
+        for (Vec3& each : turn) each = (1.0 / size) * each;
+    }
+    return std::min(most, ALIKE * fastest);
 }
 
 /// Steps whose longest stage is too long for the tension are taken in parts, in halves of halves; once parted they remain so.
@@ -101,8 +156,9 @@ void RigidSystem::look_at_tension() {
     double longest = 0.0;
     for (const double stage : composition_stages(method_.composition))
         longest = std::max(longest, h_ * std::abs(stage));
-    const double turned = longest * longest * tension_rate();
     int parts = live_.parts;
+    const double turned =
+        longest * longest * tension_rate(NEAR * MOST_OF_RATE * parts * parts / (longest * longest));
     while (turned > MOST_OF_RATE * parts * parts && parts < MOST_PARTS) parts *= 2;
     live_.tension_look = turned > NEAR * MOST_OF_RATE * parts * parts ? OFTEN : SELDOM;
     if (parts == live_.parts) return;
@@ -229,7 +285,7 @@ void RigidSystem::forget(std::size_t stage) {
 bool RigidSystem::hold_stage(double tau, double span, std::size_t stage) {
     if (in_tree_) {
         guess(stage, tau);
-        if (tree_.stage(tau, live_.bodies, multiplier_.data(), live_.newton_iterations)) {
+        if (tree_.stage(tau, live_.bodies, joints_, multiplier_.data(), live_.newton_iterations)) {
             remember(stage, tau);
             return true;
         }

@@ -236,7 +236,7 @@ private:
     void start_composition();
     void compose(std::int64_t steps);
     void composed_step(double h, int depth);
-    double tension_rate();
+    double tension_rate(double allowed);
     void look_at_tension();
     bool composed_stage(double tau, std::size_t stage);
     bool hold_stage(double tau, double span, std::size_t stage);

@@ -34,9 +34,12 @@ inline constexpr double SLIGHT = 1e-17;  // of the square of a tilt: what K need
 
 // joint_tree.cpp
 namespace tolerances::joint_tree {
-inline constexpr int MOST_IN_A_TREE = 12;  // coordinates: beyond it blocks of bodies and rows are cheaper
-inline constexpr int MOST_ROWS = 200;      // that close loops
-inline constexpr int FARTHEST = 24;        // off the diagonal: wider bands cost more than blocks
+inline constexpr double LIGHT =
+    1e-4;  // of the heaviest: impulses of rows would throw such a body about while they are sought
+inline constexpr int MOST_WITH_LIGHT = 128;  // coordinates, where some are so light
+inline constexpr int MOST_IN_A_TREE = 12;    // coordinates: beyond it blocks of bodies and rows are cheaper
+inline constexpr int MOST_ROWS = 200;        // that close loops
+inline constexpr int FARTHEST = 24;          // off the diagonal: wider bands cost more than blocks
 }  // namespace tolerances::joint_tree
 
 // plane_step.cpp
@@ -71,6 +74,8 @@ inline constexpr std::size_t few_members = 8;  // bodies of an island: most are 
 namespace tolerances::rigid_composition {
 inline constexpr int DIFFERENCES = 8;        // of a stage's forces from step to step, the zeroth included
 inline constexpr double MOST_OF_RATE = 2.0;  // of τ² times the tension's rate: a stage τ is unstable above 4
+inline constexpr int ROUNDS = 24;            // of power iteration for that rate
+inline constexpr double ALIKE = 2.0;         // times what it finds, which comes near from below
 inline constexpr int MOST_PARTS = 1024;      // of a step
 inline constexpr double NEAR = 1.0 / 64.0;   // of that: nearer than this tension is looked at often
 inline constexpr std::int64_t OFTEN = 8, SELDOM = 256;  // steps
