@@ -220,12 +220,12 @@ def test_a_swing_that_breaks_off_at_long_steps_is_compared_at_shorter_ones(
         asked.append(step)
         if engine == "spook" and step > 0.004:
             raise model_agreement.BrokeOff("spook: diverged")
-        return np.full((1, 3), 1e-8 if engine == "spook" else 0.0), 1.0
+        return np.full((1, 3), (1e-8 if engine == "spook" else 0.0) + 1e-12 * step), 1.0
 
     monkeypatch.setattr(model_agreement, "_ran", ran)
     found = agreement(None, "spook")  # type: ignore[arg-type]
 
-    assert found.apart == pytest.approx(np.sqrt(3.0) * 1e-8) and found.resolved
+    assert found.apart == pytest.approx(np.sqrt(3.0) * 1e-8, rel=1e-4) and found.resolved
     assert asked == [1e-3, 5e-4, 1e-2, 5e-3, 2.5e-3, 1.25e-3]
 
 
@@ -242,3 +242,19 @@ def test_a_swing_that_takes_longer_than_there_is_time_is_told(
 
     assert found.word == "runs" and found.out_of_time and not found.agrees
     assert found.sentence == "out of time: mujoco needs steps of 0.001 s or less"
+
+
+def test_a_step_that_an_engine_takes_in_the_same_parts_is_halved_further(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[float] = []
+
+    def ran(_model: object, _engine: str, step: float, _end: float) -> tuple[np.ndarray, float]:
+        asked.append(step)
+        return np.array([[1.0 if step > 0.3 else 1e-8 * step, 0.0, 0.0]]), 1.0
+
+    monkeypatch.setattr(model_agreement, "_ran", ran)
+    there, changed, _ = model_agreement._resolved(None, "parts", 1.0, 0.0)  # type: ignore[arg-type]
+
+    assert asked == [1.0, 0.5, 0.25, 0.125]
+    assert there[0, 0] == 1.25e-9 and 0.0 < changed < 1e-8

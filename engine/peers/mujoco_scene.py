@@ -32,6 +32,7 @@ from spook_tracker.engine.scene import Scene
 
 Array = npt.NDArray[np.float64]
 LIGHT = 1e-7  # of its mass and inertia, what stands between two joints of one body
+LIGHTER = 1e-10  # the same where joint coordinates are used, which nothing is too light for
 PUSHES_AWAY = "an actuator that pushes away from where it stands or drives what moves"
 APART = 1e-6  # of the model's extent: how far a tie may be open at the start
 FREE, BALL, SLIDE, HINGE = (
@@ -84,6 +85,7 @@ def still(model: Any) -> npt.NDArray[np.int64]:
 class _Translation:
     def __init__(self, model: Any, data: Any, conservative: bool) -> None:
         self.m, self.d, self.conservative = model, data, conservative
+        self.light = LIGHTER if conservative else LIGHT
         self.weld = still(model)
         self.lacks = Lacks()
         self.bodies: list[RigidBody] = []
@@ -270,8 +272,8 @@ class _Translation:
                     RigidBody(
                         name=end,
                         position=tuple(anchor),
-                        mass=LIGHT * mass,
-                        inertia=(LIGHT * mass * reach**2,) * 3,
+                        mass=self.light * mass,
+                        inertia=(self.light * mass * reach**2,) * 3,
                         velocity=tuple(speed),
                         angular_velocity=tuple(spin),
                     )
@@ -328,7 +330,7 @@ class _Translation:
                 self.lack(PUSHES_AWAY, "joint", number)
                 continue
             servo = JointSpring(stiffness=stiff, rest=pulls_to, damping=damping / stiff, max_force=most)
-            self.carriage(number, servo_name(actuator), LIGHT * float(m.dof_M0[dof]), servo)
+            self.carriage(number, servo_name(actuator), self.light * float(m.dof_M0[dof]), servo)
 
     def passive(self, number: int) -> tuple[float, float, float]:
         """Stiffness and damping of a joint by itself, and where its spring rests [m or rad]."""

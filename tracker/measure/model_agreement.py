@@ -76,6 +76,10 @@ def _resolved(
         step *= 0.5
         after, _ = _ran(model, engine, step, end)
         changed = _apart(after, before) / size
+        if (
+            changed == 0.0 and step > FINEST
+        ):  # the engine has taken the same parts of both steps, which says nothing
+            continue
         if changed <= RESOLVED or step <= FINEST or changed > last:  # what grows again is rounding, or chaos
             return after, changed, size
         before, last = after, changed

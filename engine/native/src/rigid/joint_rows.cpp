@@ -1,5 +1,7 @@
 #include "rigid/joint_rows.hpp"
 
+#include <limits>
+
 #include "linear/elementary.hpp"
 #include "run/quantities.hpp"
 
@@ -75,15 +77,22 @@ void assemble_distance(const JointConstants& joint, const BodyState& first, cons
 
 }  // namespace
 
+/// From one place to another, none where it is rounding of both: lengths are measured by it.
+Vec3 arm_between(Vec3 from, Vec3 to) noexcept {
+    constexpr double rounding = 4.0 * std::numeric_limits<double>::epsilon();
+    const Vec3 arm = to - from;
+    return norm(arm) <= rounding * (norm(from) + norm(to)) ? Vec3{} : arm;
+}
+
 JointConstants constants_of(const JointSpec& spec, const Vec3* first_start,
                             const Vec3* second_start) noexcept {
     JointConstants joint;
     joint.kind = spec.kind;
     joint.holds = holds_of(spec.kind);
     joint.rows = row_count(spec.kind);
-    if (first_start) joint.first_arm = spec.first_point - *first_start;
-    if (second_start) joint.second_arm = spec.second_point - *second_start;
-    joint.span = spec.second_point - spec.first_point;
+    if (first_start) joint.first_arm = arm_between(*first_start, spec.first_point);
+    if (second_start) joint.second_arm = arm_between(*second_start, spec.second_point);
+    joint.span = arm_between(spec.first_point, spec.second_point);
     joint.axes = spec.axes;
     joint.rest_length = spec.rest_length;
     return joint;
