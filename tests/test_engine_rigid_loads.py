@@ -24,9 +24,11 @@ from spook_tracker.engine import (
     Method,
     MethodError,
     Momentum,
+    Plane,
     Position,
     RigidBody,
     Scene,
+    Sphere,
     Trace,
     compile,
     simulate,
@@ -136,11 +138,18 @@ def test_a_bridge_hangs_in_its_catenary() -> None:
     )  # all gaps in a row, and a sag of 45°
 
 
-def test_a_divergence_under_tension_names_it_and_its_cure() -> None:
-    result = simulate(chain(1e4), time_step=1 / 60, duration=5.0)
+@pytest.mark.parametrize("touching", [False, True])
+def test_a_divergence_under_tension_names_it_and_a_cure_that_is_taken(touching: bool) -> None:
+    scene = chain(1e4)
+    if touching:  # where surfaces may meet, string_stiffness is refused
+        load = replace(scene.bodies[-1], shape=Sphere(0.1))
+        floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, -100.0))
+        scene = replace(scene, bodies=(*scene.bodies[:-1], load, floor), contacts=True)
+    result = simulate(scene, time_step=1 / 60, duration=5.0)
 
     assert result.status == "diverged"
-    assert "tension" in result.failure and "string_stiffness=True" in result.failure
+    assert "tension" in result.failure and "smaller time step" in result.failure
+    assert ("string_stiffness=True" in result.failure) != touching
 
 
 @pytest.mark.parametrize("velocity", [-50.0, 10.0])

@@ -229,8 +229,11 @@ const char* RigidSystem::cause(bool known) const noexcept {
     return stiff_ ? "ran away: its joints carry more than so light a body can take in a step (T h²/(m l) is "
                     "above 0.3), and their load changes within one, while string_stiffness knows that of "
                     "the step before; use composition=\"order4\" without it, or a smaller time step"
-                  : "ran away: its joints carry more tension than so light a body can take in a step "
-                    "(T h²/(m l) is above 0.3); use string_stiffness=True, or a smaller time step";
+           : contacts_ || solver_ != RigidSolver::block
+               ? "ran away: its joints carry more tension than so light a body can take in a step "
+                 "(T h²/(m l) is above 0.3); use a smaller time step"
+               : "ran away: its joints carry more tension than so light a body can take in a step "
+                 "(T h²/(m l) is above 0.3); use string_stiffness=True, or a smaller time step";
 }
 
 }  // namespace spook
