@@ -14,6 +14,7 @@ import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
+from xml.parsers import expat
 
 import numpy as np
 
@@ -360,15 +361,16 @@ def _wrong_mesh(file: Path) -> str:
     """Why engines' own readers would come to harm by it; empty if they would not, or it is no mesh written as text."""
     kind = file.suffix.lower()
     if kind == ".dae":
-        content = file.read_bytes()
-        if b"<!ENTITY" in content:
-            return ENTITIES
+        parser = expat.ParserCreate()  # keeps no tree, which takes ten times the text
+        parser.EntityDeclHandler = _no_entity
         try:
-            ElementTree.fromstring(content)
-        except (ElementTree.ParseError, ValueError, LookupError) as error:
+            parser.Parse(file.read_bytes(), True)
+        except ModelError as error:
+            return str(error)
+        except (expat.ExpatError, ValueError, LookupError) as error:
             return f"is no XML: {error}"
     if kind == ".obj":
-        content = file.read_bytes()
+        content = re.sub(rb"\\\r?\n", b" ", re.sub(rb"#.*", b"", file.read_bytes()))
         corners = len(re.findall(rb"^[ \t]*v[ \t]", content, re.MULTILINE))
         faces = b" ".join(re.findall(rb"^[ \t]*f[ \t]+(.*)", content, re.MULTILINE))
         try:
@@ -378,6 +380,10 @@ def _wrong_mesh(file: Path) -> str:
         if len(far := named[(named == 0) | (np.abs(named) > corners)]):
             return f"has a face with corner {far[0]}, of {corners}"
     return ""
+
+
+def _no_entity(*_declared: object) -> None:
+    raise ModelError(ENTITIES)
 
 
 def _resolved(path: Path) -> Path:

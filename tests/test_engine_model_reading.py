@@ -174,6 +174,25 @@ def test_what_cannot_be_read_is_one_sentence_that_names_the_file(
 
 
 @pytest.mark.parametrize(
+    "face", ["1 2 3  # a comment", "1/1/1 2//2 3/3", "-1 -2 -3", "1 2 \\\n3", "1 2 3\n#f 9 9 9"]
+)
+def test_a_face_may_be_written_in_any_way_that_obj_has(cart: Path, face: str) -> None:
+    (cart.parent / "meshes/wheel.obj").write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf {face}\n")
+    cart.write_text(cart.read_text().replace("wheel.stl", "wheel.obj"))
+
+    assert {one.suffix for one in read(cart).files} >= {".obj"}
+
+
+def test_an_entity_in_a_collada_of_another_encoding_is_found(tmp_path: Path) -> None:
+    (tmp_path / "bomb.dae").write_bytes(f'<?xml version="1.0" encoding="utf-16"?>{BOMB}'.encode("utf-16"))
+    file = tmp_path / "robot.sdf"
+    file.write_text("<sdf><model><link><mesh><uri>bomb.dae</uri></mesh></link></model></sdf>")
+
+    with pytest.raises(ModelError, match=r"bomb\.dae declares XML entities"):
+        read(file)
+
+
+@pytest.mark.parametrize(
     ("encoding", "content"),
     [("utf-16", BOMB), ("utf-16-le", BOMB), ("iso-8859-1", CART.replace('"tip"', '"Knöchel"'))],
 )
