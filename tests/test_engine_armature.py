@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any, Literal
 
 import numpy as np
@@ -233,6 +234,21 @@ def test_it_goes_on_from_a_snapshot_to_the_bit(method: Method) -> None:
         run.restore(kept)
         run.step(30)
         assert all(np.array_equal(run.state[name], there[name]) for name in there)
+
+
+@pytest.mark.parametrize("method", [HALF, Method(composition="order4")])
+def test_a_spring_that_is_set_while_it_runs_pulls_to_where_it_is_set(method: Method) -> None:
+    scene = replace(
+        pendulum(spring=JointSpring(stiffness=50.0, rest=0.0, damping=0.0)), gravity=(0.0, 0.0, 0.0)
+    )
+    rate = math.sqrt(50.0 / (MOMENT + MASS * ARM**2))
+    with start(scene, time_step=0.005, method=method, observe={"angle": JointCoordinate("joint")}) as run:
+        run.step(10)
+        run.set_rest("joint", 0.7)
+        run.step(60)
+        assert float(run["angle"]) == pytest.approx(
+            0.7 * (1.0 - math.cos(rate * 0.3)), abs=0.01
+        )  # half a step late
 
 
 def test_a_composition_refuses_a_spring_that_loses_energy() -> None:

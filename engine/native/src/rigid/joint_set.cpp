@@ -75,13 +75,12 @@ JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_
                 block.softness[block.size++] = axial.limit.softness;
             }
             if (spec.spring) {
-                axial.spring_rest = spec.spring->rest;
-                axial.spring_stiffness = spec.spring->stiffness;
+                axial.spring_at = static_cast<int>(springs_.size());
+                axial.spring_pulls = composed;
+                springs_.push_back({joint.block, spec.spring->stiffness, spec.spring->rest});
                 axial.spring_impulse = time_step * spec.spring->force;
                 axial.spring = regularise(1.0 / spec.spring->stiffness, spec.spring->damping, time_step);
-                if (composed)
-                    spring_kicks_.push_back({joint.block, spec.spring->stiffness, spec.spring->rest});
-                else block.softness[block.size++] = axial.spring.softness;
+                if (!composed) block.softness[block.size++] = axial.spring.softness;
             }
             if (spec.armature > 0.0) {  // G v₊ + λ/I = w, the rotor's speed before
                 some_.rotors.push_back(static_cast<int>(blocks_.size()));
@@ -186,8 +185,8 @@ void JointSet::assemble_axial(const Joint& joint, State& state, std::span<const 
             (low ? right.lower : right.upper)[next(value)] = 0.0;
         }
     }
-    if (axial.has_spring && spring_kicks_.empty()) {
-        const double rest = axial.spring.violation_gain * (state.angle - axial.spring_rest);
+    if (axial.has_spring && !axial.spring_pulls) {
+        const double rest = axial.spring.violation_gain * (state.angle - springs_[axial.spring_at].rest);
         // A rest r(t) in the averaged law: G v₊ − r'₊ in place of G v₊, G v − r'₋ in place of G v.
         const int spring = next(axial.rest_moves ? axial.spring.upsilon * (row.rate - axial.rest_before) -
                                                        rest + axial.rest_ahead
@@ -380,8 +379,9 @@ bool JointSet::set_motor(int joint, double speed, double max_force) {
 bool JointSet::set_rest(int joint, double rest) {
     Axial& axial = axials_.at(joints_.at(joint).axial);
     if (!axial.has_spring) throw std::invalid_argument("the joint has no spring");
-    const bool other = axial.spring_rest != rest;
-    axial.spring_rest = rest;
+    double& rests = springs_[axial.spring_at].rest;
+    const bool other = rests != rest;
+    rests = rest;
     axial.rest_moves = false;
     return other;
 }
@@ -411,7 +411,7 @@ void JointSet::break_overloaded(int index, std::int64_t step) {
 double JointSet::spring_energy(int joint, double rest, std::span<const BodyState> bodies) const noexcept {
     if (states[joint].broken) return 0.0;
     const double turned = coordinate(joint, bodies) - rest;
-    return 0.5 * axials_[joints_[joint].axial].spring_stiffness * turned * turned;
+    return 0.5 * springs_[axials_[joints_[joint].axial].spring_at].stiffness * turned * turned;
 }
 
 double JointSet::spring_energy(std::span<const BodyState> bodies) const noexcept {
@@ -419,7 +419,7 @@ double JointSet::spring_energy(std::span<const BodyState> bodies) const noexcept
     for (int joint = 0; joint < count(); ++joint) {
         const int axial = joints_[joint].axial;
         if (axial < 0 || !axials_[axial].has_spring || axials_[axial].rest_moves) continue;
-        sum += spring_energy(joint, axials_[axial].spring_rest, bodies);
+        sum += spring_energy(joint, springs_[axials_[axial].spring_at].rest, bodies);
     }
     return sum;
 }

@@ -54,8 +54,8 @@ struct BearingRow {
     int holding = 0;                     // the block of what it holds
     double constant = 0.0, share = 0.0;  // N s or N m s; 1 or m
 };
-/// A spring of a free coordinate that acts as a force, by the block of its joint's own rows.
-struct JointSpringKick {
+/// A spring of a free coordinate, by the block of its joint's own rows.
+struct JointSpring {
     int block = 0;
     double stiffness = 0.0, rest = 0.0;
 };
@@ -155,8 +155,8 @@ public:
     bool follows() const noexcept { return !some_.followed.empty(); }
     /// After a solve: a joint whose own rows carried more than its strength holds nothing from the next step on.
     void break_overloaded(int joint, std::int64_t step);
-    /// In compositions, which hold rows rigidly, springs of free coordinates are forces: see joint_spring_kicks.hpp.
-    std::span<const JointSpringKick> spring_kicks() const noexcept { return spring_kicks_; }
+    /// Those of all free coordinates.
+    std::span<const JointSpring> springs() const noexcept { return springs_; }
     /// Blocks that have a rotor, see rotors.hpp.
     std::span<const int> rotors() const noexcept { return some_.rotors; }
     /// Energy of the spring of a joint's free coordinate about `rest` [J]; of a broken joint none.
@@ -210,9 +210,10 @@ private:
         std::array<bool, 2> rubs{};
         std::array<double, 2> friction{};  // N s, N m s
         double speed = 0.0, impulse = 0.0;
-        double lower = 0.0, upper = 0.0, restitution = 0.0, spring_rest = 0.0, spring_stiffness = 0.0;
-        double spring_impulse = 0.0;
-        bool rest_moves = false;  // then, over the step before and this one, m/s or rad/s:
+        double lower = 0.0, upper = 0.0, restitution = 0.0, spring_impulse = 0.0;
+        int spring_at = -1;         // in springs_
+        bool spring_pulls = false;  // as a force, without a row
+        bool rest_moves = false;    // then, over the step before and this one, m/s or rad/s:
         double rest_before = 0.0, rest_ahead = 0.0;
         Regularisation limit, spring;
     };
@@ -277,7 +278,7 @@ private:
         std::vector<int> stops;   // joints with a row that only pushes one way
         std::vector<int> rotors;  // blocks
     } some_;
-    std::vector<JointSpringKick> spring_kicks_;
+    std::vector<JointSpring> springs_;
     LargeArray<JointBlock> blocks_;
 };
 

@@ -19,7 +19,7 @@ void pull_by_springs(JointSet& joints, const LargeArray<BodyConstants>& constant
                      std::span<const BodyState> bodies, Take&& take) {
     static const BodyState world;
     const auto state = [&](int body) -> const BodyState& { return body < 0 ? world : bodies[body]; };
-    for (const JointSpringKick& spring : joints.spring_kicks()) {
+    for (const JointSpring& spring : joints.springs()) {
         const JointBlock& block = joints.blocks()[spring.block];
         const AxialRow row =
             axial_row(joints.constants(block.joint), state(block.first), state(block.second));
