@@ -146,6 +146,20 @@ def test_steps_replayed_as_a_graph_are_those_launched_one_by_one(monkeypatch: py
     assert ends() == replayed
 
 
+def test_a_solver_whose_package_is_missing_says_so_and_blames_no_model(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def without(*_: Any, **__: Any) -> None:
+        raise ImportError("No module named 'mujoco_warp'")
+
+    newton = pytest.importorskip("newton")
+    monkeypatch.setattr(newton.solvers.SolverMuJoCo, "__init__", without)
+    with pytest.raises(
+        NotSupported, match=r"needs a package that is not installed: No module named 'mujoco_warp'"
+    ):
+        peer_scenes.fall_error(run("mujoco"), H)
+
+
 def test_nothing_is_said_on_standard_output(capfd: pytest.CaptureFixture[str]) -> None:
     """Warp tells of its devices and of every kernel it compiles, MuJoCo of what is not finite."""
     peer_scenes.fall_error(run("mujoco"), H)

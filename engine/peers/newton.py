@@ -184,7 +184,11 @@ class _World:
         self._set_going()
         try:
             self.solver = make(self.model, **self._settings(options["of"]))
-        except (ValueError, NotImplementedError, ImportError) as error:
+        except ImportError as error:
+            raise NotSupported(
+                f"newton ({task.configuration.name}) needs a package that is not installed: {error}"
+            ) from None
+        except (ValueError, NotImplementedError) as error:
             raise NotSupported(
                 f"newton ({task.configuration.name}) refuses the model: {' '.join(str(error).split())[:200]}"
             ) from None
