@@ -14,6 +14,7 @@ from spook_tracker.engine import (
     WORLD,
     AngularVelocity,
     Box,
+    ConstraintForce,
     Energy,
     Final,
     Hinge,
@@ -23,6 +24,7 @@ from spook_tracker.engine import (
     Material,
     Method,
     MethodError,
+    Plane,
     Position,
     Prismatic,
     RigidBody,
@@ -36,12 +38,15 @@ from spook_tracker.engine import (
 
 HALF = Method(half_step_velocities=True)
 CORRECTED = Method(half_step_velocities=True, corrections=2)
+FAR_FLOOR = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, -10.0))
 MASS, MOMENT, ARM, ROTOR = 2.0, 0.05, 0.4, 0.7  # kg, kg m², m, kg m²
 
 
-def pendulum(**hinge: Any) -> Scene:
-    """A bob on a hinge, let go level."""
-    bob = RigidBody(name="bob", mass=MASS, inertia=(MOMENT, MOMENT, MOMENT), position=(ARM, 0.0, 0.0))
+def pendulum(floor: bool = False, **hinge: Any) -> Scene:
+    """A bob on a hinge, let go level; maybe above a floor that it does not reach."""
+    bob = RigidBody(
+        name="bob", mass=MASS, inertia=(MOMENT, MOMENT, MOMENT), shape=Sphere(0.05), position=(ARM, 0.0, 0.0)
+    )
     joint = Hinge(
         name="joint",
         between=(WORLD, "bob"),
@@ -50,13 +55,16 @@ def pendulum(**hinge: Any) -> Scene:
         compliance=0.0,
         **hinge,
     )
-    return Scene(bodies=(bob,), constraints=(joint,), gravity=(0.0, 0.0, -9.81))
+    return Scene(
+        bodies=(bob, *([FAR_FLOOR] if floor else [])), constraints=(joint,), gravity=(0.0, 0.0, -9.81)
+    )
 
 
 @pytest.mark.parametrize(
-    ("method", "order"), [(Method(), 1.0), (HALF, 2.0), (Method(solver="iterative"), 1.0)]
+    ("method", "order"), [(Method(), 1.0), (HALF, 2.0), (CORRECTED, 2.0), (Method(solver="iterative"), 1.0)]
 )
-def test_a_pendulum_falls_by_the_sum_of_its_inertias(method: Method, order: float) -> None:
+@pytest.mark.parametrize("floor", [False, True])
+def test_a_pendulum_falls_by_the_sum_of_its_inertias(method: Method, order: float, floor: bool) -> None:
     inertia = MOMENT + MASS * ARM**2 + ROTOR
     reference = solve_ivp(
         lambda _, s: [s[1], MASS * 9.81 * ARM * math.cos(s[0]) / inertia], (0.0, 1.0), [0.0, 0.0], rtol=1e-11
@@ -65,7 +73,7 @@ def test_a_pendulum_falls_by_the_sum_of_its_inertias(method: Method, order: floa
     for steps in (100, 200):
         seen = {"angle": Final(quantity=JointCoordinate("joint"))}
         run = simulate(
-            pendulum(armature=ROTOR), time_step=1 / steps, duration=1.0, method=method, observe=seen
+            pendulum(floor, armature=ROTOR), time_step=1 / steps, duration=1.0, method=method, observe=seen
         )
         errors.append(abs(float(run["angle"]) - reference))
     assert errors[-1] < 0.02
@@ -87,10 +95,17 @@ SPEEDS = (1.0, 4.0, 0.2)  # rad/s, rad/s, m/s
 
 
 @pytest.mark.parametrize(
-    ("method", "order", "least"),
-    [(Method(), 1.0, 2e-2), (CORRECTED, 2.0, 3e-4), (Method(composition="order4"), 4.0, 1e-6)],
+    ("method", "order", "least", "floor"),
+    [
+        (Method(), 1.0, 2e-2, True),
+        (CORRECTED, 2.0, 3e-4, False),
+        (CORRECTED, 2.0, 3e-4, True),
+        (Method(composition="order4"), 4.0, 1e-6, False),
+    ],
 )
-def test_an_arm_whose_axes_turn_goes_as_by_runge_kutta(method: Method, order: float, least: float) -> None:
+def test_an_arm_whose_axes_turn_goes_as_by_runge_kutta(
+    method: Method, order: float, least: float, floor: bool
+) -> None:
     mujoco = pytest.importorskip("mujoco")
     model = mujoco.MjModel.from_xml_string(ARM_OF_THREE)
     data = mujoco.MjData(model)
@@ -105,6 +120,7 @@ def test_an_arm_whose_axes_turn_goes_as_by_runge_kutta(method: Method, order: fl
                 name=f"b{k}",
                 mass=float(model.body_mass[k + 1]),
                 inertia=tuple(model.body_inertia[k + 1]),
+                shape=Sphere(0.01) if floor else None,
                 position=tuple(data.xipos[k + 1]),
                 velocity=tuple(speed[3:]),
                 angular_velocity=tuple(speed[:3]),
@@ -120,6 +136,8 @@ def test_an_arm_whose_axes_turn_goes_as_by_runge_kutta(method: Method, order: fl
                 armature=float(model.dof_armature[k]),
             )
         )
+    if floor:
+        bodies.append(FAR_FLOOR)
     scene = Scene(bodies=tuple(bodies), constraints=tuple(joints), gravity=(0.0, 0.0, -9.81))
     for _ in range(5000):
         mujoco.mj_step(model, data)
@@ -255,3 +273,248 @@ def test_a_composition_refuses_a_spring_that_loses_energy() -> None:
     scene = pendulum(spring=JointSpring(stiffness=9.0))
     with pytest.raises(MethodError, match=r"the spring of 'joint' as a force .* give it damping=0"):
         simulate(scene, time_step=0.01, duration=0.1, method=Method(composition="order4"))
+
+
+def bar_and_ball(rotor: float, spin: float, ball_speed: float) -> tuple[Scene, float, float]:
+    """A bar about the axis y that turns as it is met; and both speeds after an elastic impact."""
+    elastic = Material(restitution=1.0)
+    bar = RigidBody(
+        name="bar",
+        mass=2.0,
+        shape=Box((1.0, 0.1, 0.1)),
+        position=(0.5, 0.0, 0.0),
+        inertia=(0.01, 0.2, 0.2),
+        velocity=(0.0, 0.0, 0.5 * spin),
+        angular_velocity=(0.0, -spin, 0.0),
+        material=elastic,
+    )
+    ball = RigidBody(
+        name="ball",
+        mass=0.5,
+        shape=Sphere(0.05),
+        position=(0.8, 0.0, 0.1 - 1e-9),
+        velocity=(0.0, 0.0, ball_speed),
+        material=elastic,
+    )
+    joint = Hinge(
+        name="joint",
+        between=(WORLD, "bar"),
+        at=(0.0, 0.0, 0.0),
+        axis=(0.0, -1.0, 0.0),
+        compliance=0.0,
+        armature=rotor,
+    )
+    inertia = 0.2 + 2.0 * 0.25 + rotor
+    impulse = 2.0 * (0.8 * spin - ball_speed) / (1 / 0.5 + 0.8**2 / inertia)
+    scene = Scene(bodies=(bar, ball), constraints=(joint,))
+    return scene, ball_speed + impulse / 0.5, spin - 0.8 * impulse / inertia
+
+
+@pytest.mark.parametrize("method", [Method(), HALF, Method(solver="iterative")])
+@pytest.mark.parametrize("rotor", [0.0, 5.0])
+def test_a_rotor_that_turns_gives_its_momentum_to_what_is_met(method: Method, rotor: float) -> None:
+    scene, ball, bar = bar_and_ball(rotor, spin=2.0, ball_speed=-1.0)
+    seen = {"ball": Final(quantity=Velocity("ball")), "bar": Final(quantity=AngularVelocity("bar"))}
+    run = simulate(scene, time_step=1e-3, duration=2e-3, method=method, observe=seen)
+    assert float(run["ball"][2]) == pytest.approx(ball, rel=1e-8)
+    assert -float(run["bar"][1]) == pytest.approx(bar, rel=1e-5)
+
+
+@pytest.mark.parametrize("method", [Method(), HALF])
+@pytest.mark.parametrize("rotor", [0.0, 5.0])
+def test_no_sample_lies_in_the_middle_of_an_impact(method: Method, rotor: float) -> None:
+    """Half steps read the mean of two velocities: where one is of before the impact, energy seemed to go and to come back."""
+    scene, _, _ = bar_and_ball(rotor, spin=2.0, ball_speed=-1.0)
+    ball = replace(scene.bodies[1], position=(0.8, 0.0, 0.1033))
+    run = simulate(
+        replace(scene, bodies=(scene.bodies[0], ball)),
+        time_step=1e-3,
+        duration=8e-3,
+        method=method,
+        observe={"energy": Trace(quantity=Energy()), "ball": Final(quantity=Velocity("ball"))},
+    )
+    assert float(run["ball"][2]) > 2.0
+    assert np.ptp(run["energy"]) < 1e-5 * run["energy"][0]
+
+
+def test_an_overlap_at_the_start_is_parted_as_without_a_rotor() -> None:
+    def height(rotor: float) -> float:
+        box = RigidBody(name="box", mass=1.0, shape=Box((1.0, 1.0, 1.0)), position=(0.0, 0.0, 0.499))
+        floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
+        rail = Prismatic(
+            name="rail", between=(WORLD, "box"), axis=(0.0, 0.0, 1.0), compliance=0.0, armature=rotor
+        )
+        scene = Scene(bodies=(floor, box), constraints=(rail,), gravity=(0.0, 0.0, -9.81))
+        seen = {"at": Final(quantity=Position("box"))}
+        return float(simulate(scene, time_step=0.01, duration=1.0, observe=seen)["at"][2])
+
+    assert height(1e4) == pytest.approx(height(0.0), abs=1e-9)
+
+
+def test_what_slept_goes_on_as_if_it_had_lain_awake() -> None:
+    def angle(method: Method) -> tuple[float, int]:
+        bar = RigidBody(
+            name="bar",
+            mass=2.0,
+            shape=Box((1.0, 0.1, 0.1)),
+            position=(0.5, 0.0, 0.05),
+            material=Material(friction=0.5),
+        )
+        floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
+        joint = Hinge(
+            name="joint",
+            between=(WORLD, "bar"),
+            at=(0.0, 0.0, 0.05),
+            axis=(0.0, -1.0, 0.0),
+            compliance=0.0,
+            armature=0.5,
+        )
+        lift = Load(name="lift", body="bar")
+        scene = Scene(
+            bodies=(floor, bar),
+            constraints=(joint,),
+            forces=(lift,),
+            gravity=(0.0, 0.0, -9.81),
+            no_contact=(),
+        )
+        with start(scene, time_step=0.01, method=method, observe={"q": JointCoordinate("joint")}) as run:
+            run.step(300)
+            run.set_load("lift", force=(0.0, 0.0, 30.0))
+            run.step(20)
+            return float(run["q"]), run.result().counters.get("slept_steps", 0)
+
+    woken, slept = angle(Method(sleep_speed=0.02))
+    awake, _ = angle(Method())
+    assert slept > 100
+    assert woken == pytest.approx(awake, rel=1e-6) and awake > 0.05
+
+
+@pytest.mark.parametrize("method", [Method(), HALF])
+def test_a_rotor_may_turn_by_more_than_half_a_turn_a_step(method: Method) -> None:
+    wheel = RigidBody(
+        name="wheel",
+        mass=1.0,
+        inertia=(0.1, 0.1, 0.1),
+        position=(0.0, 0.0, 0.0),
+        angular_velocity=(0.0, 0.0, 500.0),
+    )
+    axle = Hinge(name="axle", between=(WORLD, "wheel"), axis=(0.0, 0.0, 1.0), compliance=0.0, armature=0.3)
+    seen = {
+        "angle": Final(quantity=JointCoordinate("axle")),
+        "spin": Final(quantity=AngularVelocity("wheel")),
+    }
+    run = simulate(
+        Scene(bodies=(wheel,), constraints=(axle,)),
+        time_step=1 / 60,
+        duration=1.0,
+        method=method,
+        observe=seen,
+    )
+    assert float(run["spin"][2]) == pytest.approx(500.0, rel=1e-9)
+    assert float(run["angle"]) == pytest.approx(500.0, rel=1e-9)
+
+
+def test_the_rotor_of_a_joint_that_breaks_keeps_its_energy() -> None:
+    box = RigidBody(name="box", mass=1.0, inertia=(0.1, 0.1, 0.1), position=(0.0, 0.0, 0.0))
+    rail = Prismatic(
+        name="rail", between=(WORLD, "box"), axis=(0.0, 0.0, 1.0), compliance=0.0, armature=2.0, strength=1.0
+    )
+    scene = Scene(bodies=(box,), constraints=(rail,), gravity=(5.0, 0.0, -9.81))
+    run = simulate(scene, time_step=1e-3, duration=1.0, observe={"energy": Trace(quantity=Energy())})
+    assert run.broken
+    assert np.ptp(run["energy"]) < 0.1  # J, of 60 that it falls by: order 1
+
+
+def parallelogram(cranks: float, rotor: float, angle: float) -> tuple[Scene, float, float]:
+    """Two cranks of 1 kg and that length, a coupler of 2 kg level; with a rotor in each of four hinges. Its inertia, and what pulls."""
+    turn = (math.cos(0.5 * angle), 0.0, math.sin(0.5 * angle), 0.0)
+    down = cranks * np.array([-math.sin(angle), 0.0, -math.cos(angle)])
+    bodies, joints = [], []
+    for k in (0, 1):
+        at = np.array([float(k), 0.0, 0.0])
+        bodies.append(
+            RigidBody(
+                name=f"crank {k}",
+                mass=1.0,
+                inertia=(0.02, 0.02, 0.01),
+                position=tuple(at + 0.5 * down),
+                orientation=turn,
+            )
+        )
+        joints.append((f"a{k}", (WORLD, f"crank {k}"), at))
+        joints.append((f"b{k}", (f"crank {k}", "coupler"), at + down))
+    bodies.append(
+        RigidBody(
+            name="coupler",
+            mass=2.0,
+            inertia=(0.1, 0.2, 0.2),
+            position=tuple(np.array([0.5, 0.0, 0.0]) + down),
+        )
+    )
+    scene = Scene(
+        bodies=tuple(bodies),
+        constraints=tuple(
+            Hinge(
+                name=name, between=between, at=tuple(at), axis=(0.0, 1.0, 0.0), compliance=0.0, armature=rotor
+            )
+            for name, between, at in joints
+        ),
+        gravity=(0.0, 0.0, -9.81),
+    )
+    inertia = 2.0 * (0.02 + 0.25 * cranks**2) + 2.0 * cranks**2 + 4.0 * rotor
+    return scene, inertia, 9.81 * cranks * (1.0 + 2.0)
+
+
+@pytest.mark.parametrize("rotor", [0.0, 0.3])
+def test_rotors_in_a_loop_are_held_at_the_order_of_the_composition(rotor: float) -> None:
+    scene, inertia, pull = parallelogram(0.5, rotor, 1.0)
+    reference = solve_ivp(
+        lambda _, s: [s[1], -pull * math.sin(s[0]) / inertia],
+        (0.0, 1.0),
+        [1.0, 0.0],
+        rtol=1e-13,
+        atol=1e-14,
+        method="DOP853",
+    ).y[0, -1]
+    seen = {"coupler": Final(quantity=Position("coupler"))}
+    errors = []
+    for steps in (20, 40):
+        run = simulate(
+            scene, time_step=1 / steps, duration=1.0, method=Method(composition="order4"), observe=seen
+        )
+        errors.append(abs(float(run["coupler"][2]) + 0.5 * math.cos(reference)))
+    assert errors[1] < 2e-6
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.3)
+
+
+def test_a_composition_shows_what_joints_carry_beside_springs() -> None:
+    """A cart on a rail that a spring pulls, a bob that hangs from it: both accelerate from rest."""
+    cart, bob, moment, arm, stiffness, stretched = 3.0, 1.0, 0.05, 0.6, 40.0, 0.25
+    bodies = (
+        RigidBody(name="cart", mass=cart, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0)),
+        RigidBody(name="bob", mass=bob, inertia=(moment, moment, moment), position=(0.0, 0.0, -arm)),
+    )
+    twist = 6.0  # N m/rad
+    joints = (
+        Prismatic(
+            name="rail", between=(WORLD, "cart"), axis=(1.0, 0.0, 0.0), compliance=0.0,
+            spring=JointSpring(stiffness=stiffness, rest=stretched, damping=0.0),
+        ),
+        Hinge(
+            name="pin", between=("cart", "bob"), at=(0.0, 0.0, 0.0), axis=(0.0, -1.0, 0.0), compliance=0.0,
+            spring=JointSpring(stiffness=twist, rest=0.2, damping=0.0),
+        ),
+    )  # fmt: skip
+    x, phi = np.linalg.solve(
+        [[cart + bob, bob * arm], [bob * arm, moment + bob * arm**2]], [stiffness * stretched, twist * 0.2]
+    )
+    run = simulate(
+        Scene(bodies=bodies, constraints=joints, gravity=(0.0, 0.0, -9.81)),
+        time_step=0.01,
+        duration=0.01,
+        method=Method(composition="order4"),
+        observe={"pin": Trace(quantity=ConstraintForce("pin"))},
+    )
+    force = run["pin"][0]
+    assert abs(force[0]) == pytest.approx(abs(bob * (x + arm * phi)), rel=1e-6)
+    assert force[2] == pytest.approx(bob * 9.81, rel=1e-9)

@@ -234,3 +234,29 @@ def test_a_stop_whose_rebound_ends_at_the_other_end_is_counted() -> None:
 
     assert abs(float(run["v"][-1, 0])) < 1.0
     assert run.counters["stopped_impacts"] > 0
+
+
+@pytest.mark.parametrize("restitution", [1.0, 0.5])
+@pytest.mark.parametrize("gap", [0.0, 1e-9, 1e-4, 0.005])
+def test_half_steps_may_begin_with_an_impact(restitution: float, gap: float) -> None:
+    """Half a step back from the start was half of what the impact of the first step gives: it met the floor twice as fast."""
+    material = Material(restitution=restitution)
+    floor = RigidBody(
+        name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=material
+    )
+    ball = RigidBody(
+        name="ball",
+        mass=1.0,
+        shape=Sphere(0.1),
+        position=(0.0, 0.0, 0.1 + gap),
+        velocity=(0.0, 0.0, -1.0),
+        material=material,
+    )
+    run = simulate(
+        Scene(bodies=(floor, ball)),
+        time_step=0.01,
+        duration=0.03,
+        method=HALF,
+        observe={"speed": Trace(quantity=Velocity("ball"))},
+    )
+    assert run["speed"][:, 2] == pytest.approx([-1.0, restitution, restitution, restitution], rel=1e-9)

@@ -44,7 +44,16 @@ void RigidSystem::impact() {
     for (const int i : constrained_)
         if (contacts_->toi_fraction(i) > 0.0) share_[i] = 1.0 - contacts_->toi_fraction(i);
     const auto has_contact_rows = [this](int k) { return k >= 0 && contacts_->has_rows(k); };
+    const auto add_to_before = [this](double sign) {
+        if (!half_step_) return;
+        for (const int i : constrained_) {
+            live_.before[i].velocity += sign * live_.bodies[i].velocity;
+            live_.before[i].angular_momentum += sign * live_.bodies[i].angular_momentum;
+        }
+    };
+    add_to_before(1.0);
     take_velocities(true, [this](int k) { return !contacts_->has_rows(k); });
+    add_to_before(-1.0);  // less what it has changed: see read_half_step()
     for (std::size_t k = 0; k < constrained_.size(); ++k)
         if (contacts_->has_rows(static_cast<int>(k)))
             scratch_.velocities[constrained_[k]] = mixed_.velocity[k];

@@ -25,14 +25,11 @@ void RigidSystem::integrate() {
                 displace(constants_[constrained_[k]], h_, {extra[k][0], extra[k][1], extra[k][2]},
                          {extra[k][3], extra[k][4], extra[k][5]}, live_.bodies[constrained_[k]]);
     }
-    const auto comes_late = [this](int body) {  // those of an event did not go with one velocity
-        return touching_ && body >= 0 && contacts_->toi_fraction(body) > 0.0;
-    };
     for (const int k : joints_.rotors()) {
         const JointBlock& block = joints_.blocks()[k];
         JointState& state = joints_.states[block.joint];
         if (rests(k)) state.rotor = state.rotor_lead = 0.0;
-        else turn_rotor(joints_, k, live_.bodies, h_, !comes_late(block.first) && !comes_late(block.second));
+        else turn_rotor(joints_, k, live_.bodies, h_);
     }
 }
 

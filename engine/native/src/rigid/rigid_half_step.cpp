@@ -85,32 +85,39 @@ void RigidSystem::start_half_step() {
     matrix_.clear_counters();
 }
 
-/// The same with contacts, which have no accelerations to ask for: half of what a whole step would change. Where they last
-/// and surfaces are flat that is the same; an impact in it, or a gap that closes, is of order 1 in any case.
+/// The same with contacts, which have no accelerations to ask for: half of what a whole step would change once its impacts
+/// are over. So a step is solved twice from the same places, and the first takes the impacts.
 void RigidSystem::start_half_step_touching() {
     const RigidState start = live_;
     const MixedSystem mixed = mixed_;
+    const auto rotors = joints_.rotors();
+    const auto rotor = [this](int k) -> double& { return joints_.states[joints_.blocks()[k].joint].rotor; };
+    const auto start_from = [&](const LargeArray<BodyState>& from) {
+        live_ = start;
+        live_.bodies = from;
+        mixed_ = mixed;
+        contacts_ = fresh_contacts_;
+        std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
+        rounds_ = pgs_iterations_ = 0;
+        residual_ = 0.0;
+    };
+    find_velocities();
+    LargeArray<BodyState> struck = live_.bodies;
+    for (int i = 0; i < bodies(); ++i)
+        if (!constants_[i].particle) refresh(constants_[i], struck[i]);
+    start_from(struck);
     find_velocities();
     const LargeArray<BodyState> whole = live_.bodies;
-    std::vector<double> rotors;
-    for (const int k : joints_.rotors()) {
-        const double now = rotor_speed(joints_, k, start.bodies);
-        rotors.push_back(
-            now - 0.5 * (joints_.states[joints_.blocks()[k].joint].rotor + rotor_change(joints_, k) - now));
-    }
-    live_ = start;
-    mixed_ = mixed;
-    contacts_ = fresh_contacts_;
-    std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
+    std::vector<double> gained;  // by rotors
+    for (const int k : rotors) gained.push_back(rotor_change(joints_, k));
+    start_from(start.bodies);
     for (std::size_t i = 0; i < rotors.size(); ++i)
-        joints_.states[joints_.blocks()[joints_.rotors()[i]].joint].rotor = rotors[i];
-    rounds_ = pgs_iterations_ = 0;
-    residual_ = 0.0;
+        rotor(rotors[i]) = rotor_speed(joints_, rotors[i], live_.bodies) - 0.5 * gained[i];
     for (int i = 0; i < bodies(); ++i) {
         if (!constants_[i].moves()) continue;
         BodyState& s = live_.bodies[i];
-        s.velocity -= 0.5 * (whole[i].velocity - s.velocity);
-        s.angular_momentum -= 0.5 * (whole[i].angular_momentum - s.angular_momentum);
+        s.velocity -= 0.5 * (whole[i].velocity - struck[i].velocity);
+        s.angular_momentum -= 0.5 * (whole[i].angular_momentum - struck[i].angular_momentum);
         if (!constants_[i].particle) refresh(constants_[i], s);
     }
 }
@@ -265,18 +272,12 @@ void RigidSystem::correct_curvature() {
     }
 }
 
-/// Velocities at the sample: the mean of those half a step before and after.
+/// Velocities at the sample: the mean of those half a step before and after, less what an impact within the step makes of
+/// them, which comes later: impact() has taken it from `before`.
 void RigidSystem::read_half_step() {
     for (int i = 0; i < bodies(); ++i) {
         if (!constants_[i].moves()) continue;
         BodyState& s = live_.bodies[i];
-        if (touching_ &&
-            contacts_->toi_fraction(i) > 0.0) {  // what an impact within the step makes of it comes later
-            s.velocity = live_.before[i].velocity + 0.5 * kick(i);
-            s.angular_momentum = live_.before[i].angular_momentum + 0.5 * twist(i);
-            refresh(constants_[i], s);
-            continue;
-        }
         s.velocity = 0.5 * (s.velocity + live_.before[i].velocity);
         s.angular_momentum = 0.5 * (s.angular_momentum + live_.before[i].angular_momentum);
         if (!constants_[i].particle) refresh(constants_[i], s);

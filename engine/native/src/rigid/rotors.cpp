@@ -58,14 +58,13 @@ double rotor_gap(const JointSet& joints, int index, std::span<const BodyState> f
     return way_of(joints, block, row_of(joints, block, from).coordinate, to, goes) - goes;
 }
 
-void turn_rotor(JointSet& joints, int index, std::span<const BodyState> bodies, double h,
-                bool evenly) noexcept {
+void turn_rotor(JointSet& joints, int index, std::span<const BodyState> bodies, double h) noexcept {
     const JointBlock& block = joints.blocks()[index];
     JointState& state = joints.states[block.joint];
     state.rotor += rotor_change(joints, index);
     const double rate = state.rotor - state.rotor_lead;
     state.rotor_lead = 0.0;
-    if (!evenly || state.broken) return;
+    if (state.broken) return;
     state.rotor_lead = way_of(joints, block, state.angle, bodies, h * rate) / h - rate;
 }
 

@@ -25,8 +25,7 @@ double rotor_gap(const JointSet& joints, int block, std::span<const BodyState> f
                  std::span<const BodyState> to, double time, double impulse) noexcept;
 /// Of all rotors where the bodies move so [J].
 double rotor_energy(const JointSet& joints, std::span<const BodyState> bodies) noexcept;
-/// Once bodies have moved by h, before overlaps are parted. `evenly`: with the velocities of the solve all the way.
-void turn_rotor(JointSet& joints, int block, std::span<const BodyState> bodies, double h,
-                bool evenly) noexcept;
+/// Once bodies have moved by h, before overlaps are parted.
+void turn_rotor(JointSet& joints, int block, std::span<const BodyState> bodies, double h) noexcept;
 
 }  // namespace spook
