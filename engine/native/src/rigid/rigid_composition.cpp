@@ -68,55 +68,48 @@ double RigidSystem::tension_rate(double allowed) {
     going = live_.bodies;
     read_composition();
     live_.bodies.swap(going);
+    const auto blocks = joints_.blocks();
+    const auto each_arm = [&](const auto& look) {  // (body, arm, force that pulls at it)
+        for (std::size_t k = 0; k < blocks.size(); ++k) {
+            if (blocks[k].axial) continue;
+            const JointSet::State& state = joints_.states[blocks[k].joint];
+            const double* rows = jacobian(static_cast<int>(k), true);
+            Vec3 force;  // on the second body
+            for (int i = 0; i < blocks[k].size; ++i, rows += 6)
+                force += (state.multiplier[i] / h_) * Vec3{rows[0], rows[1], rows[2]};
+            for (const bool second : {false, true}) {
+                const int b = second ? blocks[k].second : blocks[k].first;
+                if (b < 0 || solver_index_[b] < 0 || constants_[b].particle) continue;
+                look(b, second ? state.second_reach : state.first_reach, second ? force : -force);
+            }
+        }
+    };
     std::vector<double>& rates = scratch_.rates;
     rates.assign(constants_.size(), 0.0);
-    const auto blocks = joints_.blocks();
-    for (std::size_t k = 0; k < blocks.size(); ++k) {
-        if (blocks[k].axial) continue;
-        const JointSet::State& state = joints_.states[blocks[k].joint];
-        const double* rows = jacobian(static_cast<int>(k), true);
-        Vec3 force;  // on the second body
-        for (int i = 0; i < blocks[k].size; ++i, rows += 6)
-            force += (state.multiplier[i] / h_) * Vec3{rows[0], rows[1], rows[2]};
-        for (const bool second : {false, true}) {
-            const int b = second ? blocks[k].second : blocks[k].first;
-            if (b < 0 || !constants_[b].moves() || constants_[b].particle) continue;
-            const Vec3 arm = second ? state.second_reach : state.first_reach;
-            const double pull = (second ? 1.0 : -1.0) * dot(arm, force), length2 = dot(arm, arm);
-            if (!(pull > 0.0) || length2 == 0.0) continue;
-            const Vec3 inertia = constants_[b].inertia;
-            // Of the two axes across the arm the easier one; the third, along a slender body, turns freely.
-            const double across = inertia.x + inertia.y + inertia.z -
-                                  std::max({inertia.x, inertia.y, inertia.z}) -
-                                  std::min({inertia.x, inertia.y, inertia.z});
-            // A body goes sideways by turning about its joint: near its centre that is a turn, however light it is.
-            rates[b] += pull * (1.0 / across + 1.0 / std::max(constants_[b].mass * length2, across));
-        }
-    }
+    each_arm([&](int b, Vec3 arm, Vec3 force) {
+        const double pull = dot(arm, force), length2 = dot(arm, arm);
+        if (!(pull > 0.0) || length2 == 0.0) return;
+        const Vec3 inertia = constants_[b].inertia;
+        // Of the two axes across the arm the easier one; the third, along a slender body, turns freely.
+        const double across = inertia.x + inertia.y + inertia.z -
+                              std::max({inertia.x, inertia.y, inertia.z}) -
+                              std::min({inertia.x, inertia.y, inertia.z});
+        // A body goes sideways by turning about its joint: near its centre that is a turn, however light it is.
+        rates[b] += pull * (1.0 / across + 1.0 / std::max(constants_[b].mass * length2, across));
+    });
     const double most = *std::max_element(rates.begin(), rates.end());
     if (!(most > allowed)) return most;
 
     // Each body by itself would shake so; joints may tie light ones to heavy ones. The fastest turning that joints allow, by power
     // iteration of M⁻¹ K, with K of the forces on its arms, from a start in which light bodies turn most.
     stiffness_.assign(constrained_.size(), Mat3{});
-    for (std::size_t k = 0; k < blocks.size(); ++k) {
-        if (blocks[k].axial) continue;
-        const JointSet::State& state = joints_.states[blocks[k].joint];
-        const double* rows = jacobian(static_cast<int>(k), true);
-        Vec3 force;
-        for (int i = 0; i < blocks[k].size; ++i, rows += 6)
-            force += (state.multiplier[i] / h_) * Vec3{rows[0], rows[1], rows[2]};
-        for (const bool second : {false, true}) {
-            const int b = second ? blocks[k].second : blocks[k].first;
-            if (b < 0 || solver_index_[b] < 0 || constants_[b].particle) continue;
-            const Vec3 arm = second ? state.second_reach : state.first_reach, pull = second ? force : -force;
-            Mat3& held = stiffness_[solver_index_[b]];
-            for (int i = 0; i < 3; ++i)
-                for (int j = 0; j < 3; ++j)
-                    held(i, j) +=
-                        (i == j ? dot(pull, arm) : 0.0) - 0.5 * (pull[i] * arm[j] + arm[i] * pull[j]);
-        }
-    }
+    each_arm([&](int b, Vec3 arm, Vec3 force) {
+        Mat3& held = stiffness_[solver_index_[b]];
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j)
+                held(i, j) +=
+                    (i == j ? dot(force, arm) : 0.0) - 0.5 * (force[i] * arm[j] + arm[i] * force[j]);
+    });
     const int row_blocks = static_cast<int>(blocks.size());
     std::vector<Vec3> turn;
     for (const int i : constrained_) {
@@ -124,7 +117,7 @@ double RigidSystem::tension_rate(double allowed) {
         const double light = constants_[i].particle ? 0.0 : 1.0 / (own.x + own.y + own.z);
         turn.push_back(light * Vec3{1.0 - 0.3 * (i % 4), 0.4 * (i % 3) - 0.5, 0.7 - 0.25 * (i % 5)});
     }
-    double fastest = 0.0, before = 0.0;
+    double fastest = most;
     for (int round = 0; round < ROUNDS; ++round) {
         std::fill(right_.begin(), right_.end(), 0.0);
         for (std::size_t k = 0; k < constrained_.size(); ++k) {
@@ -143,9 +136,8 @@ double RigidSystem::tension_rate(double allowed) {
             size += dot(turn[k], live_.bodies[i].inertia * turn[k]);
         }
         size = std::sqrt(size);
-        if (!(size > 0.0) || !std::isfinite(size)) return round == 0 ? most : std::min(most, ALIKE * fastest);
-        if (round > 0) fastest = std::max(round + 1 < ROUNDS ? 0.0 : before, size);
-        before = size;
+        if (!(size > 0.0) || !std::isfinite(size)) break;
+        if (round > 0) fastest = size;  // the first is of the start
         for (Vec3& each : turn) each = (1.0 / size) * each;
     }
     return std::min(most, ALIKE * fastest);

@@ -102,10 +102,10 @@ void RigidSystem::start_half_step_touching() {
         residual_ = 0.0;
     };
     find_velocities();
-    LargeArray<BodyState> struck = live_.bodies;
+    LargeArray<BodyState> once = live_.bodies;
     for (int i = 0; i < bodies(); ++i)
-        if (!constants_[i].particle) refresh(constants_[i], struck[i]);
-    start_from(struck);
+        if (!constants_[i].particle) refresh(constants_[i], once[i]);
+    start_from(once);
     find_velocities();
     const LargeArray<BodyState> whole = live_.bodies;
     std::vector<double> gained;  // by rotors
@@ -116,8 +116,8 @@ void RigidSystem::start_half_step_touching() {
     for (int i = 0; i < bodies(); ++i) {
         if (!constants_[i].moves()) continue;
         BodyState& s = live_.bodies[i];
-        s.velocity -= 0.5 * (whole[i].velocity - struck[i].velocity);
-        s.angular_momentum -= 0.5 * (whole[i].angular_momentum - struck[i].angular_momentum);
+        s.velocity -= 0.5 * (whole[i].velocity - once[i].velocity);
+        s.angular_momentum -= 0.5 * (whole[i].angular_momentum - once[i].angular_momentum);
         if (!constants_[i].particle) refresh(constants_[i], s);
     }
 }
