@@ -16,6 +16,7 @@ from spook_tracker.engine import (
     AngularVelocity,
     Ball,
     Box,
+    CentralGravity,
     ConstraintForce,
     Energy,
     Final,
@@ -205,6 +206,41 @@ def test_the_force_on_the_tip_carries_the_top_round() -> None:
 
     assert np.abs(run["force"][:, 2] - spinning_top.MASS * spinning_top.GRAVITY).max() < 1e-7
     assert np.abs(run["force"][:, :2] - inwards).max() < 1e-7
+
+
+@pytest.mark.parametrize("name", METHODS)
+@pytest.mark.parametrize("pull", ["spring", "centre"])
+def test_a_body_without_joints_goes_round_its_circle_in_time(pull: str, name: str) -> None:
+    """Beside a swing, which makes the rows; a spring of no length and a central field both ask for w² of the circle."""
+    method, order = METHODS[name]
+    rate, radius = 1.3, 0.8  # rad/s, m
+    free = RigidBody(
+        name="free",
+        mass=2.0,
+        inertia=INERTIA,
+        position=(radius, 0.0, 0.0),
+        velocity=(0.0, rate * radius, 0.0),
+    )
+    rod = RigidBody(name="rod", mass=1.0, inertia=INERTIA, position=(0.0, 0.0, 3.0))
+    swing = Hinge(name="swing", between=(WORLD, "rod"), at=(1.0, 0.0, 3.0), axis=(0.0, 1.0, 0.0))
+    forces = {
+        "spring": Spring(name="pull", between=("free", (0.0, 0.0, 0.0)), stiffness=2.0 * rate**2),
+        "centre": CentralGravity(name="pull", strength=rate**2 * radius**3),
+    }
+    scene = Scene(bodies=(free, rod), constraints=(swing,), forces=(forces[pull],))
+    ends = {"x": Trace(quantity=Position("free")), "v": Trace(quantity=Velocity("free"))}
+
+    def error(steps: int) -> float:
+        run = simulate(scene, time_step=2.0 / steps, steps=steps, method=method, observe=ends)
+        angle = rate * run.sample_times["x"][:, None]
+        circle = np.hstack((np.cos(angle), np.sin(angle), 0.0 * angle))
+        along = np.hstack((-np.sin(angle), np.cos(angle), 0.0 * angle))
+        return max(
+            float(np.abs(run["x"] - radius * circle).max()),
+            float(np.abs(run["v"] - rate * radius * along).max()),
+        )
+
+    assert math.log2(error(10) / error(20)) > order - 0.3
 
 
 @pytest.mark.parametrize("name", METHODS)

@@ -74,7 +74,7 @@ void RigidSystem::add_geometric_stiffness() {
 void RigidSystem::find_tensions() {
     stiffness_.assign(constrained_.size(), Mat3{});
     if (islands_.empty()) find_islands();
-    if (!force_.empty()) apply_forces();
+    if (!force_.empty()) find_forces();
     const auto blocks = joints_.blocks();
     for (int round = 0; round < 3; ++round) {
         if (round > 0) add_geometric_stiffness();

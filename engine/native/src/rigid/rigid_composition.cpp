@@ -197,7 +197,7 @@ void RigidSystem::composed_step(double h, int depth) {
 void RigidSystem::kick_all(double span) {
     if (!load_follows_.empty())
         find_loads(0.0);  // springs alone: a composition has nothing that follows time
-    if (!force_.empty()) apply_forces();
+    if (!force_.empty()) find_forces();
     for (int i = 0; i < bodies(); ++i) {
         const BodyConstants& body = constants_[i];
         if (!body.moves()) continue;

@@ -43,7 +43,7 @@ void RigidSystem::make_room_for_half_step() {
 void RigidSystem::start_half_step() {
     const std::size_t rows = static_cast<std::size_t>(rows_);
     if (half_step_) {
-        if (!force_.empty()) apply_forces();
+        if (!force_.empty()) find_forces();
         const auto back = [this](int i, Vec3 velocity, Vec3 momentum) {
             BodyState& s = live_.bodies[i];
             s.velocity -= 0.5 * (velocity - s.velocity);
