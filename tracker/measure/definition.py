@@ -20,7 +20,7 @@ import struct
 import sys
 import threading
 import types
-from collections.abc import Callable, Mapping, Set
+from collections.abc import Callable, Iterator, Mapping, Set
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -166,23 +166,16 @@ def _is_wording(kind: type, field: str) -> bool:
 def _describe_class(kind: type, seen: _Seen) -> Described:
     if not seen.owns(kind.__module__):
         return ("class", _inside(kind.__module__), kind.__qualname__)
-    tree = _module_tree(kind.__module__)
-    for node in ast.walk(tree) if tree else ():
-        if isinstance(node, ast.ClassDef) and node.name == kind.__name__:
-            return ("class", _canonical(node))
-    return ("class", kind.__qualname__)
+    node = _classes(kind.__module__).get(kind.__name__)
+    return ("class", kind.__qualname__ if node is None else _definition(node))
 
 
 def _describe_function(function: types.FunctionType, seen: _Seen) -> Described:
     if not seen.owns(function.__module__ or ""):
         return ("function", _inside(function.__module__ or ""), function.__qualname__)
     code = function.__code__
-    nodes = _nodes_of(function)
-    body: Described = tuple(_canonical(node) for node in nodes) or (
-        "bytecode",
-        code.co_code.hex(),
-        _plain(code),
-    )
+    nodes = _functions(function.__module__).get((code.co_name, code.co_firstlineno), ())
+    body: Described = tuple(map(_definition, nodes)) or ("bytecode", code.co_code.hex(), _plain(code))
     captured = tuple(_describe(_cell(cell), seen) for cell in function.__closure__ or ())
     defaults = _describe((function.__defaults__, function.__kwdefaults__), seen)
     reached = []
@@ -230,21 +223,40 @@ def _module_tree(module: str) -> ast.Module | None:
         return None  # no source: defined in a session or a frozen application
 
 
-def _nodes_of(function: types.FunctionType) -> list[ast.AST]:
-    """The definitions that start on the function's first line; several lambdas there count together."""
-    tree = _module_tree(function.__module__)
-    if tree is None:
-        return []
-    line, name = function.__code__.co_firstlineno, function.__code__.co_name
-    found: list[ast.AST] = []
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Lambda) and name == "<lambda>" and node.lineno == line:
-            found.append(node)
-        elif isinstance(node, ast.FunctionDef) and node.name == name:
-            first = min([node.lineno, *(decorator.lineno for decorator in node.decorator_list)])
-            if first == line:
-                found.append(node)
+@functools.lru_cache(maxsize=256)
+def _functions(module: str) -> Mapping[tuple[str, int], list[ast.AST]]:
+    """What a module defines, by name and first line; several lambdas of a line count together."""
+    found: dict[tuple[str, int], list[ast.AST]] = {}
+    for node in _nodes(module):
+        if isinstance(node, ast.Lambda):
+            place = "<lambda>", node.lineno
+        elif isinstance(node, ast.FunctionDef):
+            place = node.name, min([node.lineno, *(decorator.lineno for decorator in node.decorator_list)])
+        else:
+            continue
+        found.setdefault(place, []).append(node)
     return found
+
+
+@functools.lru_cache(maxsize=256)
+def _classes(module: str) -> Mapping[str, ast.AST]:
+    """The first class of each name that a module defines."""
+    found: dict[str, ast.AST] = {}
+    for node in _nodes(module):
+        if isinstance(node, ast.ClassDef):
+            found.setdefault(node.name, node)
+    return found
+
+
+def _nodes(module: str) -> Iterator[ast.AST]:
+    tree = _module_tree(module)
+    return ast.walk(tree) if tree else iter(())
+
+
+@functools.lru_cache(maxsize=4096)
+def _definition(node: ast.AST) -> Described:
+    """Of a function or class: what several reach is put in its canonical form once."""
+    return _canonical(node)
 
 
 SKIPPED_FIELDS = {"type_comment", "type_params", "kind", "ctx", "returns", "annotation"}
