@@ -45,6 +45,21 @@ def test_every_piece_is_answered_once():
     assert told([]) == {}
 
 
+def who_worked(piece: tuple[str, int]) -> int:
+    time.sleep(0.02)
+    return os.getpid()
+
+
+def test_pieces_on_one_subject_go_to_one_process_while_there_are_others(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(crew, "WORTH", 0.0)  # the second process comes at once
+    pieces = [(subject, number) for subject in "abcdef" for number in range(4)]
+    who = dict(crew.answers(who_worked, pieces, 2, crew.Limits(), lambda piece: piece[0]))
+
+    assert who.keys() == set(pieces)
+    shared = {s for s in "abcdef" if len({who[s, number] for number in range(4)}) > 1}
+    assert len(shared) <= 1, "the last one is shared, when nothing else is left"
+
+
 def test_a_piece_that_comes_to_nothing_is_answered_by_none():
     """And not taken for one that is still worked at, which would be ended as hanging."""
     found = told(["none", "a", "none too", "b"], workers=1, seconds=30.0)

@@ -19,6 +19,7 @@ from typing import Literal, NoReturn
 
 import msgspec
 
+import spook_tracker.engine as ours
 import spook_tracker.tracker.measure.executors as executors
 import spook_tracker.tracker.measure.trajectory as motion
 import spook_tracker.tracker.measure.workers as crew
@@ -58,6 +59,7 @@ from spook_tracker.tracker.measure.question import (
 from spook_tracker.tracker.measure.questions import PEER_TIME_LIMIT as PEER_TIME_LIMIT
 from spook_tracker.tracker.measure.questions import Questions as Questions
 from spook_tracker.tracker.measure.questions import RunError as RunError
+from spook_tracker.tracker.measure.remembered import of_test
 from spook_tracker.tracker.measure.renames import with_aliases
 from spook_tracker.tracker.measure.request import Interrupted as Interrupted
 from spook_tracker.tracker.measure.request import Progress as Progress
@@ -223,6 +225,10 @@ def _tasks(tests: Mapping[str, ScalarTest], request: Request) -> Iterator[Task]:
             position += 1
 
 
+def _test_of(task: Task) -> str:
+    return task.test
+
+
 def perform(source: Questions, task: Task) -> Parts | crew.Lost:
     """Do one piece of work in this process; whatever it throws costs this piece alone."""
     try:
@@ -235,6 +241,8 @@ def perform(source: Questions, task: Task) -> Parts | crew.Lost:
 
 def _performed(source: Questions, task: Task) -> Parts:
     test, simulate = source.tests()[task.test], source.simulate()
+    if source.module() is ours:
+        simulate = of_test(task.test, simulate)
     first = task.index[0]
     if task.kind == "measure":
         return (measure(task.test, test, test.measurements[first], simulate),)
@@ -281,7 +289,7 @@ def _perform_all(
         found = executors.answers(request.executor, *at_work)
     elif request.workers:
         limits = crew.Limits(seconds=request.time_limit, memory=request.memory_limit)
-        found = crew.answers(partial(perform, source), tasks, request.workers, limits)
+        found = crew.answers(partial(perform, source), tasks, request.workers, limits, _test_of)
     for done, (task, parts) in enumerate(found, start=1):
         if isinstance(parts, crew.Lost):
             parts = _lost(task, tests[task.test], parts)

@@ -53,23 +53,39 @@ class Lost:
 
 
 def answers(
-    perform: Callable[[Piece], Answer], pieces: Sequence[Piece], workers: int, limits: Limits
+    perform: Callable[[Piece], Answer],
+    pieces: Sequence[Piece],
+    workers: int,
+    limits: Limits,
+    subject: Callable[[Piece], object] = lambda piece: None,
 ) -> Iterator[tuple[Piece, Answer | Lost]]:
     """Every piece with what `perform` made of it, or Lost, as they come. What `perform` raises is raised.
 
     `perform` and the pieces are sent to processes, so both must be picklable; `workers` is at least 1. One begins,
     the others join when the work has lasted a while: a question of milliseconds does not pay for two imports.
+    Pieces on one `subject` go to one process as long as there is other work: what it has found out serves the next.
     """
     left = deque(pieces)
     crew: list[_Worker[Piece, Answer]] = []
+
+    def next_for(worker: _Worker[Piece, Answer] | None) -> Piece:
+        own = () if worker is None else (subject(worker.piece),)
+        taken = {subject(other.piece) for other in crew if other is not worker}
+        found = next((piece for piece in left if subject(piece) in own), None)
+        if found is None:
+            found = next((piece for piece in left if subject(piece) not in taken), left[0])
+        left.remove(found)
+        return found
+
     since = math.inf  # when the first of them had read its program and began
     try:
         while left or crew:
             since = min([since, *(worker.begun for worker in crew)])
             wanted = workers if time.monotonic() >= since + WORTH else 1
             while left and len(crew) < wanted:
+                piece = next_for(None)
                 crew.append(_Worker(perform, limits))
-                crew[-1].give(left.popleft())
+                crew[-1].give(piece)
             moments = [worker.deadline for worker in crew]
             soonest = (
                 min([*moments, since + WORTH] if left and wanted < workers else moments) - time.monotonic()
@@ -81,7 +97,7 @@ def answers(
                     continue
                 piece, (answer,) = worker.piece, found
                 if left and not isinstance(answer, Lost):
-                    worker.give(left.popleft())
+                    worker.give(next_for(worker))
                 else:
                     crew.remove(worker)
                     worker.end()

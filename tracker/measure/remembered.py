@@ -1,0 +1,85 @@
+"""What a test has simulated is not simulated again: equal input gives equal bits.
+
+A measurement and its figure, and ladders that read two errors off one run, ask for the same simulations. Of our engine
+alone, whose law that is; a run that was ended by a clock is asked again.
+"""
+
+from __future__ import annotations
+
+import pickle
+import threading
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from spook_tracker.engine.result import Array, Result
+from spook_tracker.engine.scene import Scene
+from spook_tracker.scalar_tests.case import Simulate
+
+WORTH = 2e-3  # s that a run takes; what is shorter is run again sooner than it is found
+MOST_BYTES = 1 << 23  # of one run's observables
+HOW = ("time_limit", "time_stages")  # options that say how a run is watched, not what it is
+
+
+@dataclass
+class Remembered:
+    """Forwards to the engine what was not asked before."""
+
+    simulate: Simulate
+    kept: dict[object, list[tuple[bytes, Result]]] = field(
+        default_factory=dict
+    )  # by what is cheap to compare
+
+    def __call__(self, scene: Scene, **options: Any) -> Result:
+        if not isinstance(scene, Scene):
+            return self.simulate(scene, **options)
+        asked = {name: option for name, option in options.items() if name not in HOW}
+        place = (len(scene.bodies), *(asked.get(name) for name in ("time_step", "duration", "steps")))
+        known = self.kept.get(place)
+        if known and (found := dict(known).get(_bytes(scene, asked))) is not None:
+            return _copy(found)
+        result = self.simulate(scene, **options)
+        if result.status != "timed_out" and result.seconds > WORTH and _size(result) <= MOST_BYTES:
+            key = _bytes(scene, asked)
+            if key:
+                self.kept.setdefault(place, []).append((key, _copy(result)))
+        return result
+
+
+def _bytes(scene: Scene, asked: Mapping[str, Any]) -> bytes:
+    """All that a run is decided by, to the bit; nothing where it cannot be told, as of a function."""
+    try:
+        return pickle.dumps((scene, sorted(asked.items())))
+    except (AttributeError, TypeError, pickle.PicklingError):
+        return b""
+
+
+def _size(result: Result) -> int:
+    return sum(np.asarray(values).nbytes for values in result.observables.values())
+
+
+def _copy(result: Result) -> Result:
+    """With arrays of its own: who reads a result may write into it."""
+
+    def own(arrays: Mapping[str, Array]) -> dict[str, Array]:
+        return {name: np.array(values) for name, values in arrays.items()}
+
+    return replace(
+        result,
+        observables=own(result.observables),
+        sample_times=own(result.sample_times),
+        final_state=own(result.final_state),
+    )
+
+
+_of_thread = threading.local()  # an executor may answer in several threads at once
+
+
+def of_test(test: str, simulate: Simulate) -> Simulate:
+    """This simulator with what it has simulated for the test in this thread; what it did for another is forgotten."""
+    if getattr(_of_thread, "test", None) != (test, simulate):
+        _of_thread.test, _of_thread.simulate = (test, simulate), Remembered(simulate)
+    remembered: Simulate = _of_thread.simulate
+    return remembered
