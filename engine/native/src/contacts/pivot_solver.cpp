@@ -22,70 +22,84 @@ bool is_free(const RowBlock& block, int i) noexcept { return block.state[i] == R
 }  // namespace
 
 /// Whether the system's blocks tie the bodies they tied when it was analysed.
-bool PivotSolver::is_known(const MixedSystem& system) const noexcept {
-    if (static_cast<int>(system.mass.size()) != bodies_ || system.rows.size() != pattern_.size())
-        return false;
+bool PivotSolver::Graph::is_of(const MixedSystem& system) const noexcept {
+    if (static_cast<int>(system.mass.size()) != bodies || system.rows.size() != pattern.size()) return false;
     std::size_t beyond = 0;
-    for (std::size_t k = 0; k < pattern_.size(); ++k) {
+    for (std::size_t k = 0; k < pattern.size(); ++k) {
         const RowBlock& block = system.rows[k];
-        if (pattern_[k] != Pattern{block.first, block.second, block.size}) return false;
+        if (pattern[k] != Pattern{block.first, block.second, block.size}) return false;
         for (const FurtherBody& other : block.further) {
-            if (beyond == further_.size() || further_[beyond] != static_cast<int>(k) ||
-                further_[beyond + 1] != other.body)
+            if (beyond == further.size() || further[beyond] != static_cast<int>(k) ||
+                further[beyond + 1] != other.body)
                 return false;
             beyond += 2;
         }
     }
-    return beyond == further_.size();
+    return beyond == further.size();
 }
 
 bool PivotSolver::analyse(const MixedSystem& system) {
-    if (is_known(system)) return false;
+    if (graph_.is_of(system)) return false;
+    const auto known =
+        std::find_if(others_.begin(), others_.end(), [&](const Graph& graph) { return graph.is_of(system); });
+    if (known != others_.end()) {
+        std::swap(graph_, *known);
+        std::rotate(others_.begin(), known, known + 1);
+    } else {
+        if (graph_.bodies >= 0 && graph_.pattern.size() <= most_kept_rows) {
+            if (others_.size() < kept_graphs) others_.emplace_back();
+            std::rotate(others_.begin(), others_.end() - 1, others_.end());
+            std::swap(graph_, others_.front());
+        }
+        find_graph(system);
+        ++analyses_;
+    }
+    graph_.matrix.clear_counters();
+    last_ = {};
+    factored_ = false;
+    for (auto* each : {&solution_, &residual_, &state_, &right_}) each->assign(graph_.matrix.unknowns(), 0.0);
+    return true;
+}
+
+void PivotSolver::find_graph(const MixedSystem& system) {
     static thread_local struct {  // its memory outlives an analysis
         std::vector<int> sizes;
         std::vector<std::uint8_t> is_constraint;
         std::vector<BlockEdge> edges;
-    } graph;
-    auto& [sizes, is_constraint, edges] = graph;
-    const int bodies = static_cast<int>(system.mass.size());
-    bodies_ = -1;  // until the analysis is whole
-    pattern_.clear();
-    further_.clear();
+    } found;
+    auto& [sizes, is_constraint, edges] = found;
+    auto& [matrix, bodies, pattern, first_edge, second_edge, further, further_edge] = graph_;
+    bodies = -1;  // until the analysis is whole
+    const int count = static_cast<int>(system.mass.size());
+    pattern.clear();
+    further.clear();
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
         const RowBlock& block = system.rows[k];
-        pattern_.push_back({block.first, block.second, block.size});
+        pattern.push_back({block.first, block.second, block.size});
         for (const FurtherBody& other : block.further)
-            further_.push_back(static_cast<int>(k)), further_.push_back(other.body);
+            further.push_back(static_cast<int>(k)), further.push_back(other.body);
     }
-    sizes.assign(bodies, 6);
-    is_constraint.assign(bodies, 0);
+    sizes.assign(count, 6);
+    is_constraint.assign(count, 0);
     edges.clear();
-    first_edge_.assign(pattern_.size(), -1);
-    second_edge_.assign(pattern_.size(), -1);
-    for (std::size_t k = 0; k < pattern_.size(); ++k) {
-        const int block = bodies + static_cast<int>(k);
-        sizes.push_back(pattern_[k].size);
+    first_edge.assign(pattern.size(), -1);
+    second_edge.assign(pattern.size(), -1);
+    for (std::size_t k = 0; k < pattern.size(); ++k) {
+        const int block = count + static_cast<int>(k);
+        sizes.push_back(pattern[k].size);
         is_constraint.push_back(1);
-        if (pattern_[k].first >= 0)
-            first_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern_[k].first, block});
-        if (pattern_[k].second >= 0)
-            second_edge_[k] = static_cast<int>(edges.size()), edges.push_back({pattern_[k].second, block});
+        if (pattern[k].first >= 0)
+            first_edge[k] = static_cast<int>(edges.size()), edges.push_back({pattern[k].first, block});
+        if (pattern[k].second >= 0)
+            second_edge[k] = static_cast<int>(edges.size()), edges.push_back({pattern[k].second, block});
     }
-    further_edge_.clear();
-    for (std::size_t k = 0; k < further_.size(); k += 2) {
-        further_edge_.push_back(static_cast<int>(edges.size()));
-        edges.push_back({further_[k + 1], bodies + further_[k]});
+    further_edge.clear();
+    for (std::size_t k = 0; k < further.size(); k += 2) {
+        further_edge.push_back(static_cast<int>(edges.size()));
+        edges.push_back({further[k + 1], count + further[k]});
     }
-    matrix_.analyse(sizes, edges, is_constraint);
-    ++analyses_;
-    last_ = {};
-    bodies_ = bodies;
-    factored_ = false;
-    solution_.assign(matrix_.unknowns(), 0.0);
-    residual_.assign(matrix_.unknowns(), 0.0);
-    state_.assign(matrix_.unknowns(), 0.0);
-    right_.assign(matrix_.unknowns(), 0.0);
-    return true;
+    matrix.analyse(sizes, edges, is_constraint);
+    bodies = count;
 }
 
 void PivotSolver::measure(const MixedSystem& system) {
@@ -125,24 +139,24 @@ void PivotSolver::measure(const MixedSystem& system) {
 }
 
 bool PivotSolver::factor(const MixedSystem& system) {
-    for (int b = 0; b < bodies_; ++b) std::copy_n(system.mass[b].data(), 36, matrix_.diagonal(b));
+    for (int b = 0; b < graph_.bodies; ++b) std::copy_n(system.mass[b].data(), 36, graph_.matrix.diagonal(b));
     std::size_t beyond = 0;
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
         const RowBlock& block = system.rows[k];
         const int n = block.size;
-        double* diagonal = matrix_.diagonal(bodies_ + static_cast<int>(k));
+        double* diagonal = graph_.matrix.diagonal(graph_.bodies + static_cast<int>(k));
         std::fill_n(diagonal, n * n, 0.0);
         for (int i = 0; i < n; ++i) diagonal[i * n + i] = is_free(block, i) ? -block.softness[i] : -1.0;
         for (int end = 0; end < 2; ++end) {
-            const int edge = end == 0 ? first_edge_[k] : second_edge_[k];
+            const int edge = end == 0 ? graph_.first_edge[k] : graph_.second_edge[k];
             if (edge < 0) continue;
             const auto& jacobian = end == 0 ? block.first_jacobian : block.second_jacobian;
-            double* coupling = matrix_.coupling(edge);
+            double* coupling = graph_.matrix.coupling(edge);
             for (int a = 0; a < 6; ++a)
                 for (int i = 0; i < n; ++i) coupling[a * n + i] = is_free(block, i) ? jacobian[i][a] : 0.0;
         }
         for (const FurtherBody& other : block.further) {
-            double* coupling = matrix_.coupling(further_edge_[beyond++]);
+            double* coupling = graph_.matrix.coupling(graph_.further_edge[beyond++]);
             for (int a = 0; a < 6; ++a) coupling[a] = is_free(block, 0) ? other.jacobian[a] : 0.0;
         }
     }
@@ -151,22 +165,24 @@ bool PivotSolver::factor(const MixedSystem& system) {
         const auto [k, i, own] = bounded_[b];
         const bool free = is_free(system.rows[k], i);
         factored_free_[b] = free;
-        if (free) matrix_.diagonal(bodies_ + k)[i * system.rows[k].size + i] -= relief * own;
+        if (free) graph_.matrix.diagonal(graph_.bodies + k)[i * system.rows[k].size + i] -= relief * own;
     }
-    const bool finite = matrix_.factor(floor);
+    const bool finite = graph_.matrix.factor(floor);
     for (const auto& [k, i, own] :
          bounded_)  // the factor keeps its relief; residuals are of the true equations
         if (is_free(system.rows[k], i))
-            matrix_.diagonal(bodies_ + k)[i * system.rows[k].size + i] = -system.rows[k].softness[i];
+            graph_.matrix.diagonal(graph_.bodies + k)[i * system.rows[k].size + i] =
+                -system.rows[k].softness[i];
     return finite;
 }
 
 /// residual_ ← right side − true matrix × state_; the largest entry relative to its scale.
 double PivotSolver::residual() {
-    matrix_.residual(right_.data(), state_.data(), residual_.data());
+    graph_.matrix.residual(right_.data(), state_.data(), residual_.data());
     double force = 0.0, slip = 0.0;
-    for (int i = 0; i < 6 * bodies_; ++i) force = std::max(force, std::abs(residual_[i]));
-    for (int i = 6 * bodies_; i < matrix_.unknowns(); ++i) slip = std::max(slip, std::abs(residual_[i]));
+    for (int i = 0; i < 6 * graph_.bodies; ++i) force = std::max(force, std::abs(residual_[i]));
+    for (int i = 6 * graph_.bodies; i < graph_.matrix.unknowns(); ++i)
+        slip = std::max(slip, std::abs(residual_[i]));
     return std::max(force_ > 0.0 ? force / force_ : force, speed_ > 0.0 ? slip / speed_ : slip);
 }
 
@@ -174,8 +190,8 @@ double PivotSolver::refine(int rounds) {
     double before = unbounded, now = residual();
     for (int round = 0; round < rounds && now > 1e-16 && now < 0.25 * before; ++round) {
         before = now;
-        matrix_.solve(residual_.data());
-        for (int i = 0; i < matrix_.unknowns(); ++i) state_[i] += residual_[i];
+        graph_.matrix.solve(residual_.data());
+        for (int i = 0; i < graph_.matrix.unknowns(); ++i) state_[i] += residual_[i];
         now = residual();
     }
     return now;
@@ -183,18 +199,18 @@ double PivotSolver::refine(int rounds) {
 
 void PivotSolver::solve_free(MixedSystem& system, bool refined) {
     force_ = 0.0;
-    for (int b = 0; b < bodies_; ++b)
+    for (int b = 0; b < graph_.bodies; ++b)
         for (int a = 0; a < 6; ++a) {
             right_[6 * b + a] = system.momentum[b][a];
             force_ = std::max(force_, std::abs(system.momentum[b][a]));
         }
     for (std::size_t k = 0; k < system.rows.size(); ++k)
         std::copy_n(system.rows[k].right.data(), system.rows[k].size,
-                    right_.data() + matrix_.offset(bodies_ + static_cast<int>(k)));
+                    right_.data() + graph_.matrix.offset(graph_.bodies + static_cast<int>(k)));
     relieved_.clear();
     for (const auto& [k, i, own] : bounded_) {
         RowBlock& block = system.rows[k];
-        const int at = matrix_.offset(bodies_ + k) + i;
+        const int at = graph_.matrix.offset(graph_.bodies + k) + i;
         if (is_free(block, i)) {
             relieved_.push_back({at, relief * own});
             continue;
@@ -210,14 +226,14 @@ void PivotSolver::solve_free(MixedSystem& system, bool refined) {
         }
     }
     state_ = right_;
-    matrix_.solve(state_.data());
+    graph_.matrix.solve(state_.data());
     if (refined) {
         refine(refinements + 1);
         if (conjugate_directions()) refine(refinements + 1);
     }
-    for (int b = 0; b < bodies_; ++b) std::copy_n(state_.data() + 6 * b, 6, system.velocity[b].data());
+    for (int b = 0; b < graph_.bodies; ++b) std::copy_n(state_.data() + 6 * b, 6, system.velocity[b].data());
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
-        const double* y = state_.data() + matrix_.offset(bodies_ + static_cast<int>(k));
+        const double* y = state_.data() + graph_.matrix.offset(graph_.bodies + static_cast<int>(k));
         for (int i = 0; i < system.rows[k].size; ++i) system.rows[k].multiplier[i] = -y[i];
     }
     for (const auto& [k, i, own] : bounded_) {
@@ -249,7 +265,7 @@ bool PivotSolver::conjugate_directions() {
         Watch::look();
         solution_.assign(residual_.size(), 0.0);
         for (std::size_t k = 0; k < relieved_.size(); ++k) solution_[relieved_[k].at] = gradient_[k];
-        matrix_.solve(solution_.data());
+        graph_.matrix.solve(solution_.data());
         double product = 0.0;
         for (std::size_t k = 0; k < relieved_.size(); ++k)
             product -= gradient_[k] * solution_[relieved_[k].at];
@@ -415,7 +431,7 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
                     block.multiplier[i] < block.lower[i] ? RowState::at_lower : RowState::at_upper;
         }
     }
-    const BlockLdlt::Counters now = matrix_.counters();
+    const BlockLdlt::Counters now = graph_.matrix.counters();
     counters_.factorisations += now.factorisations - last_.factorisations;
     counters_.block_operations += now.block_operations - last_.block_operations;
     counters_.floored_pivots += now.floored_pivots - last_.floored_pivots;

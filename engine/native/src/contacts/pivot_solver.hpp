@@ -49,8 +49,8 @@ public:
     std::uint64_t analyses() const noexcept { return analyses_; }
 
 private:
-    bool is_known(const MixedSystem& system) const noexcept;
     bool analyse(const MixedSystem& system);
+    void find_graph(const MixedSystem& system);
     void measure(const MixedSystem& system);
     bool factor(const MixedSystem& system);
     void solve_free(MixedSystem& system, bool refined);
@@ -73,13 +73,21 @@ private:
         int first, second, size;
         bool operator==(const Pattern&) const = default;
     };
-    BlockLdlt matrix_;
+    struct Graph {  // which bodies the rows tie, and its elimination
+        BlockLdlt matrix;
+        int bodies = -1;
+        std::vector<Pattern> pattern;
+        std::vector<int> first_edge, second_edge;  // per row block, −1 if there is none
+        std::vector<int> further,
+            further_edge;  // rows over more bodies: block and body of each, and its edge
+
+        bool is_of(const MixedSystem& system) const noexcept;
+    };
+    Graph graph_;
+    std::vector<Graph>
+        others_;  // of the solves before, the latest first: a step solves several systems in turn
     BlockLdlt::Counters counters_{}, last_{};
     std::uint64_t analyses_ = 0;
-    int bodies_ = -1;
-    std::vector<Pattern> pattern_;
-    std::vector<int> first_edge_, second_edge_;  // per row block, −1 if there is none
-    std::vector<int> further_, further_edge_;  // rows over more bodies: block and body of each, and its edge
     std::vector<Bounded> bounded_;
     bool factored_ = false;
     std::vector<std::uint8_t> factored_free_, offends_;  // per bounded row

@@ -288,6 +288,10 @@ const PositionProjection* PositionProjector::project(const Solved& solved, const
         if (!again) initial_penetration.clear();
         return nullptr;
     }
+    const auto is_rounding = [this](const PenetrationRecord& record) {
+        return record.depth <= parted * bodies_->slack(record.contact);
+    };
+    if (again && std::all_of(search_.records.begin(), search_.records.end(), is_rounding)) return nullptr;
     for (const PenetrationRecord& record : search_.records) end.cache.add_sleepers(record.contact, woken);
     if (!again) ++counters.corrections;
     const bool fresh = again && keep_projected(end.poses);

@@ -195,8 +195,10 @@ inline constexpr int backoff = 5;       // rounds without fewer offenders before
 inline constexpr int max_restarts = 7;  // then Murty's rule
 inline constexpr int short_search = 4;  // rounds: too few for more offenders at its start than these
 inline constexpr int few_offenders = 4, offending_share = 25;  // and one row in so many
-inline constexpr double tightest = 1e-11;  // tolerance of a velocity, relative to the system's scale
-inline constexpr double loosest = 1e-7;    // where contradicting rigid contacts leave no exact answer
+inline constexpr double tightest = 1e-11;      // tolerance of a velocity, relative to the system's scale
+inline constexpr double loosest = 1e-7;        // where contradicting rigid contacts leave no exact answer
+inline constexpr std::size_t kept_graphs = 3;  // beside the one in use: of the last solves
+inline constexpr std::size_t most_kept_rows = 256;  // blocks: larger systems hardly come back
 }  // namespace tolerances::pivot_solver
 
 // position_projection.cpp
@@ -207,6 +209,8 @@ inline constexpr double joint_compliance_share = 1e-6;  // and a joint, of its r
 inline constexpr double joint_share = 1e-3;             // and of what the contacts do
 inline constexpr double min_joint_compliance =
     1e-12;  // of its row's own inertia: repeated joints share a load by it
+inline constexpr double parted =
+    0.01;  // of the slack: what a projection leaves is rounding, and is not parted again
 inline constexpr double over_relaxation = 1.25;  // of PGS that separates balls, not boxes
 inline constexpr double same_place = 0.1;        // of the larger body's radius: one point, seen again
 }  // namespace tolerances::position_projection
