@@ -60,7 +60,8 @@ public:
             }
         while (touching && stage.impact_needed(system)) {
             momenta(velocity);
-            stage.impact(system);
+            std::vector<Vec6> impulses;
+            stage.impact(system, impulses);
             for (std::size_t k = 0, u = 0; k < bodies.size(); ++k)
                 if (bodies[k].mass > 0.0) velocity[k] = system.velocity[u++];
         }

@@ -240,6 +240,7 @@ bool ContactStage::needs_stop_impact(const MixedSystem& system, std::size_t know
 /// which is hit beside a point: what is far from any does not know of it.
 void ContactStage::take_part(MixedSystem& system, const std::vector<std::size_t>& hit_points,
                              std::vector<RowBlock>& rows) const {
+    arrays_.impact.joints.clear();
     if (system.rows.empty()) return;
     const Islands& islands = connected(system, system.rows.size());
     const auto island = [&](const RowBlock& block) {
@@ -255,6 +256,7 @@ void ContactStage::take_part(MixedSystem& system, const std::vector<std::size_t>
         if (!taking_part[island(given)]) continue;
         given.stop.answered = is_hit(given);
         given.stop.limit_reached = impact_rounds_ > most_rounds(points_.size());
+        arrays_.impact.joints.push_back(static_cast<std::size_t>(&given - system.rows.data()));
         RowBlock& block = rows.emplace_back(given);
         for (int i = 0; i < block.size; ++i) {
             const bool below = block.lower[i] == -unbounded, above = block.upper[i] == unbounded;
@@ -277,7 +279,7 @@ bool ContactStage::is_impact(const Point& point) const noexcept {
     return answered && point.approach < -point.rounding;
 }
 
-void ContactStage::impact(MixedSystem& system) {
+void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
     ++state_.counters.impacts;
     ++impact_rounds_;
     quality_ = {};
@@ -351,6 +353,15 @@ void ContactStage::impact(MixedSystem& system) {
     }
     system.velocity = hit.velocity;
     mark_rows(hit);
+    impulses.resize(system.rows.size());
+    for (std::size_t j = 0; j < joints; ++j) {
+        const RowBlock& block = hit.rows[j];
+        const double s = share[island(block)];
+        for (int i = 0; i < block.size; ++i) {
+            const double other = s < 1.0 ? plastic.rows[j].multiplier[i] : block.multiplier[i];
+            impulses[work.joints[j]][i] += other + s * (block.multiplier[i] - other);
+        }
+    }
     for (std::size_t j = 0; j < hit_points.size(); ++j) {
         Point& point = points_[hit_points[j]];
         const RowBlock& block = hit.rows[joints + j];

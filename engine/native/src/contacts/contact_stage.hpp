@@ -102,9 +102,9 @@ public:
     /// The impact. `system` holds mass, momentum M v₋ (v₋ with the lead of forces) and the rows of joints as for
     /// solve(), of which those take part that are connected to a point. Bilateral ones keep G v₊ + Sig lambda = 0,
     /// limits that touch do not close, those that are hit rebound, others, and motors, let go: right sides are not used.
-    /// Fills system.velocity with v after the impact. It never raises the kinetic energy (with
-    /// moving kinematic bodies: that of the rest).
-    void impact(MixedSystem& system);
+    /// Fills system.velocity with v after the impact, and adds its impulses to `impulses`, a row block of a joint each. It
+    /// never raises the kinetic energy (with moving kinematic bodies: that of the rest).
+    void impact(MixedSystem& system, std::vector<Vec6>& impulses);
 
     struct SolveEnd {
         bool finite = true;

@@ -39,11 +39,10 @@ void RigidSystem::lead_events() {
 /// Rows are those of the velocities before, and after it of those it leaves.
 void RigidSystem::impact() {
     fill_momenta(false);
-    contacts_->impact(mixed_);
+    contacts_->impact(mixed_, scratch_.impulses);
     judge_contacts();
     for (const int i : constrained_)
         if (contacts_->toi_fraction(i) > 0.0) share_[i] = 1.0 - contacts_->toi_fraction(i);
-    const auto has_contact_rows = [this](int k) { return k >= 0 && contacts_->has_rows(k); };
     const auto add_to_before = [this](double sign) {
         if (!half_step_) return;
         for (const int i : constrained_) {
@@ -57,12 +56,6 @@ void RigidSystem::impact() {
     for (std::size_t k = 0; k < constrained_.size(); ++k)
         if (contacts_->has_rows(static_cast<int>(k)))
             scratch_.velocities[constrained_[k]] = mixed_.velocity[k];
-    for (const int k : joints_.rotors()) {
-        const RowBlock& rows = mixed_.rows[k];
-        if (has_contact_rows(rows.first) || has_contact_rows(rows.second))
-            joints_.states[joints_.blocks()[k].joint].rotor +=
-                row_velocity(rows, rows.rotor, mixed_.velocity) - rows.right[rows.rotor];
-    }
     for (std::size_t k = 0; k < joints_.blocks().size(); ++k)
         if (const StopRow& stop = mixed_.rows[k].stop; stop.answered || stop.limit_reached) {
             JointSet::State& state = joints_.states[joints_.blocks()[k].joint];

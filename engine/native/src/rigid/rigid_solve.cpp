@@ -333,6 +333,7 @@ void RigidSystem::fill_rows(bool solved) {
             if (const int i = numbers.stop.row; i >= 0) numbers.stop.given += dot(jacobian[i], given);
         }
         for (int i = 0; i < rows.size; ++i) numbers.right[i] -= bend(at + static_cast<std::size_t>(i));
+        if (const int i = rows.rotor; i >= 0) numbers.right[i] -= rows.softness[i] * scratch_.impulses[k][i];
         rows.right = numbers.right;
         rows.lower = numbers.lower;
         rows.upper = numbers.upper;

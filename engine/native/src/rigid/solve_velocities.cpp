@@ -40,6 +40,7 @@ void RigidSystem::solve_mixed(bool touching) {
     const Stage solver = stages_.runs(Stage::solve_iterative) ? Stage::solve_iterative : Stage::pivot;
     ContactStage::SolveEnd end;
     scratch_.other_ends.clear();
+    scratch_.impulses.assign(blocks.size(), {});
     int corrected = 0;
     const auto to_correct = [&] { return curved_ && corrected++ < method_.corrections; };
     do {
@@ -74,9 +75,17 @@ void RigidSystem::solve_mixed(bool touching) {
         if (rests(static_cast<int>(k))) continue;
         JointSet::State& state = joints_.states[blocks[k].joint];
         double* multiplier = blocks[k].axial ? state.axial_multiplier.data() : state.multiplier.data();
-        std::copy_n(mixed_.rows[k].multiplier.data(), blocks[k].size, multiplier);
+        for (int i = 0; i < blocks[k].size; ++i)
+            multiplier[i] = mixed_.rows[k].multiplier[i] + scratch_.impulses[k][i];
         live_.stopped += mixed_.rows[k].stop.cut;
         if (breaks_ && !blocks[k].axial) joints_.break_overloaded(blocks[k].joint, live_.step);
+    }
+    std::size_t row = blocks.size();
+    scratch_.impulses.resize(row + scratch_.other_ends.size());
+    for (const int k : scratch_.other_ends) {
+        joints_.states[blocks[k].joint].axial_multiplier[mixed_.rows[k].stop.row] +=
+            mixed_.rows[row].multiplier[0] + scratch_.impulses[row][0];
+        ++row;
     }
     if (touching) take_velocities(false, [this](int k) { return !contacts_->has_rows(k); });
     else take_velocities(false, {});

@@ -25,6 +25,7 @@ struct StepScratch {
     std::vector<Begun> start_of_contacts;  // of a step with contacts
     // solve_velocities():
     std::vector<int> other_ends;  // blocks of the step's joints whose stops have a row for each end
+    std::vector<Vec6> impulses;   // of the step's impacts, per block of rows
     std::vector<double> rates;    // of tension, by body
     IslandSolver joint_solver;
     std::vector<std::size_t> rows;  // by island
