@@ -18,6 +18,7 @@ from spook_tracker.engine import (
     Maximum,
     Method,
     Momentum,
+    Particle,
     Penetration,
     Position,
     RigidBody,
@@ -178,3 +179,20 @@ def test_an_impact_ahead_in_the_step_gives_back_what_it_meets_with(psi: float, s
 
     assert gap[blow] > 1e-3
     assert v[blow + 1] == pytest.approx(back - half_kick, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "method", [Method(), Method(impacts="successive"), Method(half_step_velocities=True)]
+)
+def test_a_particle_beside_a_blow_falls_as_it_does_alone(method: Method) -> None:
+    """Forces act on what is free in halves in such a step, and a particle has no inertia to turn by."""
+    stone = Particle(name="stone", mass=2.0, position=(3.0, 0.0, 5.0), velocity=(0.5, 0.0, 1.0))
+    bouncing = (ground(Material(restitution=0.5)), ball(position=(0.0, 0.0, 1.1)))
+    observe = {"x": Trace(quantity=Position("stone")), "v": Trace(quantity=Velocity("stone"))}
+    beside, alone = (
+        simulate(Scene(bodies=bodies, gravity=DOWN), time_step=0.01, steps=60, method=method, observe=observe)
+        for bodies in ((*bouncing, stone), (stone,))
+    )
+    assert beside.completed and beside.counters["impacts"] > 0
+    for name in observe:
+        np.testing.assert_allclose(beside[name], alone[name], rtol=0.0, atol=1e-13)

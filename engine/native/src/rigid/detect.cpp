@@ -21,7 +21,7 @@ void RigidSystem::detect() {
         if (!constants_[i].moves()) continue;
         const Vec3 dv = kick(i);
         for (int k = 0; k < 3; ++k) scratch_.free_velocities[i][k] += dv[k];
-        if (dot(constants_[i].torque, constants_[i].torque) > 0.0 && !constants_[i].particle) {
+        if (dot(constants_[i].torque, constants_[i].torque) > 0.0) {
             const Vec3 dw = turned_by(constants_[i], s, twist(i));
             for (int k = 0; k < 3; ++k) scratch_.free_velocities[i][3 + k] += dw[k];
         }

@@ -354,7 +354,7 @@ double RigidSystem::driven(const Loop& loop) {
         const Vec6& p = push_[member];
         const Vec3 linear{p[0], p[1], p[2]}, twist{p[3], p[4], p[5]};
         sum += dot(linear, linear) / constants_[i].mass;
-        if (!constants_[i].particle) sum += dot(twist, turned_by(constants_[i], live_.bodies[i], twist));
+        sum += dot(twist, turned_by(constants_[i], live_.bodies[i], twist));
     }
     return sum;
 }

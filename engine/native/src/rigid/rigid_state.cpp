@@ -125,6 +125,7 @@ void displace(const BodyConstants& body, double h, Vec3 velocity, Vec3 angular_v
 }
 
 Vec3 turned_by(const BodyConstants& body, const BodyState& state, Vec3 angular_momentum) noexcept {
+    if (body.particle) return {};
     const Mat3 r = inertia_axes(body, state);
     const Vec3 p = transposed_times(r, angular_momentum);
     return r * Vec3{p.x / body.inertia.x, p.y / body.inertia.y, p.z / body.inertia.z};

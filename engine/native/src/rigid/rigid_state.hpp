@@ -67,7 +67,7 @@ void integrate(const BodyConstants& body, double h, BodyState& state) noexcept;
 void displace(const BodyConstants& body, double h, Vec3 velocity, Vec3 angular_velocity,
               BodyState& state) noexcept;
 
-/// I⁻¹ L in world axes at the state's orientation.
+/// I⁻¹ L in world axes at the state's orientation; of a particle zero.
 Vec3 turned_by(const BodyConstants& body, const BodyState& state, Vec3 angular_momentum) noexcept;
 
 /// Twice the kinetic energy of a body, J.
