@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -13,10 +16,12 @@ from spook_tracker.engine import (
     Energy,
     Hinge,
     JointCoordinate,
+    JointSpring,
     KineticEnergy,
     Limit,
     Method,
     Momentum,
+    Motor,
     Prismatic,
     RigidBody,
     Scene,
@@ -139,3 +144,31 @@ def test_a_stop_without_restitution_is_met_where_it_is(rate: int, speed: float, 
 
     assert result["angle"].ravel()[free + 1] == pytest.approx(upper, abs=1e-12)
     assert abs(result["w"][free + 2, 2]) < 1e-9 * speed
+
+
+@pytest.mark.parametrize("end", [1e3, 1e6, 1e9, 1e15, 1e300])
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
+@pytest.mark.parametrize(
+    "drives",
+    [
+        {"motor": Motor(speed=0.2, max_force=1.0), "spring": JointSpring(stiffness=30.0, rest=0.2)},
+        {"motor": Motor(speed=0.2, max_force=1.0), "friction": 0.1},
+        {"spring": JointSpring(stiffness=30.0, rest=0.2), "friction": 0.1},
+    ],
+)
+def test_a_limit_too_far_to_matter_does_not_matter(drives: Any, solver: Any, end: float) -> None:
+    """What stands for no limit at all was taken for the size of the speeds: at 1e9 rad a spring pulled no more."""
+    arm = RigidBody(name="arm", mass=1.0, inertia=(0.1, 0.1, 0.1), position=(0.0, 0.0, 0.0))
+    free = Hinge(name="joint", between=(WORLD, "arm"), at=(0.0, 0.0, 0.3), axis=(0.0, 1.0, 0.0), **drives)
+    held = replace(free, limit=Limit(lower=-end, upper=end))
+    found = [
+        simulate(
+            Scene(bodies=(arm,), constraints=(joint,), gravity=(1.0, 0.0, -9.81)),
+            time_step=0.005,
+            steps=20,
+            method=Method(solver=solver, residual_tolerance=1e-13),
+            observe=WATCH,
+        )["at"]
+        for joint in (free, held)
+    ]
+    np.testing.assert_allclose(found[1], found[0], rtol=0.0, atol=1e-9)

@@ -6,13 +6,18 @@
 #include <stdexcept>
 
 #include "rigid/rotors.hpp"
+#include "rigid/tolerances.hpp"
 #include "rigid/tyre_rows.hpp"
 
 namespace spook {
 
 namespace {
+
+using namespace tolerances::joint_set;
+
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
-}
+
+}  // namespace
 
 JointSet::JointSet(const RigidScene& scene, double time_step) : time_step_(time_step) {
     const bool composed = scene.method.composition > 2;
@@ -214,7 +219,9 @@ double JointSet::one_sided(double inwards, double violation, double rate, const 
     if (state.given > 0.0) some_given_ = true, violation += inwards * state.given;
     const double gap = inwards * violation, approach = -inwards * rate;
     const bool open = gap > 0.0, hit = approach > 0.0 && state.at_limit * inwards <= 0.0;
-    double value = open ? -violation / time_step_ : row.upsilon * rate - row.violation_gain * violation;
+    // A far end asks for no more than what is out of reach: solvers take what rows ask for the size of a system's speeds.
+    const double closing = std::min(gap / time_step_, OUT_OF_REACH + AS_FAST * std::abs(rate));
+    double value = open ? -inwards * closing : row.upsilon * rate - row.violation_gain * violation;
     stop.touching = !open || state.met * inwards > 0.0;
     stop.rebound = 0.0;
     stop.hit = approach > state.rebounds && (open ? time_step_ * approach > gap : hit);
