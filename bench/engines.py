@@ -51,7 +51,7 @@ COMPILED = (
 FACT_LIMIT = 5.0  # s of one simulation
 # Of every engine, ours included: short runs are timed three times, what takes longer than this many seconds twice, visiting
 # all rungs before the second; most of the time goes into models that are built anew for each.
-REPEATS = Repeats(most=3, seconds=0.05, fewest=2, stages_up_to=0.02, runs=5)
+REPEATS = Repeats(most=3, seconds=0.05, fewest=2, stages_up_to=0.02, counts_from=0.05, runs=5)
 ANSWERED = ("value", "out_of_limit", "unsettled", "not_supported")  # the rest are failures
 CAUSES = Path(__file__).parents[1] / "docs" / "engine-causes.toml"
 LIMIT = re.compile(r"time limit of ([\d.]+) s was reached|the ([\d.]+) s for this question")

@@ -7,6 +7,7 @@ from types import SimpleNamespace
 
 import pytest
 
+import spook_tracker.tracker.measure.timing as timing
 from spook_tracker.tracker.document.order import error_in_time, in_range, observed_order, time_at_error
 from spook_tracker.tracker.document.run_document import Timing
 from spook_tracker.tracker.measure.question import Outcome
@@ -36,17 +37,18 @@ def runs(**seconds: float):
 
 def test_repeats_are_interleaved_and_all_kept():
     engine = Clockwork()
-    slow, fast = interleaved(runs(slow=0.04, fast=0.01), engine, 5)
+    slow, fast = interleaved(runs(slow=0.012, fast=0.01), engine, 5)
     assert engine.calls == [("slow", True), ("fast", True), *[("slow", False), ("fast", False)] * 5]
-    assert slow.seconds == (0.04,) * 5
+    assert slow.seconds == (0.012,) * 5
     assert (fast.runs_per_repeat, fast.stage_seconds) == (1, {"solve_path": 0.005})
 
 
 def test_short_runs_are_repeated_until_the_clock_resolves_them():
     engine = Clockwork()
-    (short, shortest) = interleaved(runs(a=5e-4, b=1e-9), engine, 3)
+    (short, cold, shortest) = interleaved(runs(a=2.5e-4, b=1.5e-3, c=1e-9), engine, 3)
 
     assert (short.runs_per_repeat, len(short.seconds)) == (4, 3)
+    assert cold.runs_per_repeat == 2, "the first of each repeat finds cold caches, and does not count"
     assert shortest.runs_per_repeat == MOST_RUNS
 
 
@@ -56,6 +58,32 @@ def test_long_runs_are_repeated_less_often_but_never_once():
 
     assert len(long.seconds) == len(long.calibration) == 2
     assert len(engine.calls) == 2, "the first one counts, too"
+
+
+def test_each_repeat_has_the_lesser_of_what_the_kernel_took_before_and_after_it(monkeypatch):
+    """It is taken again once a moment is over: several short repeats are beside the same."""
+    took, clock = iter([5.0, 4.0, 6.0, 3.0, 7.0]), iter(range(100))
+    monkeypatch.setattr(timing, "calibrate", lambda: next(took))
+    monkeypatch.setattr(timing, "time", SimpleNamespace(perf_counter=lambda: float(next(clock))))
+    (slow,) = interleaved(runs(slow=0.02), Clockwork(), 3, expected=[1e-3])
+
+    assert slow.calibration == (4.0, 4.0, 6.0)
+    monkeypatch.setattr(timing, "BESIDE", 1e9)
+    short = interleaved(runs(a=1e-3, b=1e-3), Clockwork(), 3, expected=[1e-3] * 2)
+    assert [one.calibration for one in short] == [(3.0,) * 3] * 2
+
+
+def test_the_first_run_of_what_is_expected_to_take_long_counts_and_has_no_clock_of_stages():
+    """But one of them is to tell its stages, and a short one finds cold caches when it comes first."""
+    engine = Clockwork()
+    asked = runs(first=0.02, staged=0.02, short=1e-3)
+    first, staged, short = interleaved(asked, engine, 5, expected=[0.04, 0.04, 0.04], staged={1})
+
+    assert [len(timing.seconds) for timing in (first, staged, short)] == [3, 3, 5]
+    assert [len(timing.calibration) for timing in (first, staged, short)] == [3, 3, 5]
+    assert [set(timing.stage_seconds) for timing in (first, staged, short)] == [set(), {"solve_path"}, set()]
+    assert [name for name, _ in engine.calls].count("first") == 3
+    assert [name for name, _ in engine.calls].count("staged") == 4
 
 
 def test_where_patience_is_short_long_runs_are_timed_once_and_stages_are_left_out():
@@ -133,14 +161,14 @@ def test_a_scene_is_compiled_once_however_often_it_is_timed():
     (timing,) = interleaved(
         [lambda s: [s(SimpleNamespace(status="completed")) for _ in range(2)]],
         lambda scene, **options: engine.run(scene),
-        4,
+        3,
         prepare=engine.prepare,
     )
 
-    assert timing.seconds == (0.02,) * 4 and timing.cpu_seconds == (0.02,) * 4
+    assert timing.seconds == (0.02,) * 3 and timing.cpu_seconds == (0.02,) * 3
     assert engine.compiled == 2 and engine.ran == 2 * (
-        1 + 4
-    )  # the first, with the clock of stages, and four repeats
+        1 + 3
+    )  # the first, with the clock of stages, and three repeats
 
 
 def test_a_prepared_run_that_fails_when_it_is_run_again_has_failed():

@@ -9,7 +9,7 @@ its error and fails while it is timed has the class of that failure: a crash is 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -110,11 +110,22 @@ def timed_series(
             runs = [_run_of(ladder, place) for place in here]
             numbers = [places.index(place) for place in here]
             expected = [errors[place[:3]].points[place[3]].seconds for place in here]
-            timings = interleaved(runs, simulate, repeats, partial(_begin, numbers), prepare, expected)
+            staged = {min(alike, key=lambda number: expected[number]) for alike in _by_configuration(here)}
+            timings = interleaved(
+                runs, simulate, repeats, partial(_begin, numbers), prepare, expected, staged
+            )
             at(NOWHERE)
             found |= zip(here, timings, strict=True)
             found |= {place: found[first] for place, first in first_of.items()}
     return _all_pairs(tests, errors, found)
+
+
+def _by_configuration(places: Sequence[Place]) -> Iterable[list[int]]:
+    """The numbers of the rungs of each configuration: the shortest of them tells its stages, however long it is."""
+    found: dict[int, list[int]] = {}
+    for number, place in enumerate(places):
+        found.setdefault(place[2], []).append(number)
+    return found.values()
 
 
 def _begin(places: Sequence[int], number: int) -> None:

@@ -3,14 +3,14 @@
 Every repeat visits all runs once before the next repeat begins, so that a slow minute of the machine falls on
 all of them alike. The minimum is the estimate; every repeat is kept, because the spread says what a
 difference means. Beside each stands the processor time, which leaves out what the machine spent elsewhere, and
-what the calibration kernel took just before it.
+what the calibration kernel took just before or just after it, whichever is less.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -25,11 +25,14 @@ from spook_tracker.tracker.measure.question import Outcome, ask, sentence
 if TYPE_CHECKING:
     from spook_tracker.engine.scene import Scene
 
-RESOLVED = 2e-3  # s that one repeat should last, far above the clock's grain
+RESOLVED = 1e-3  # s that one repeat should last, far above the clock's grain
+COLD_UP_TO = 2e-3  # s: after the kernel a shorter run finds cold caches, so that each repeat has a second one
 MOST_RUNS = 200  # in one repeat
-POINT_BUDGET = 0.2  # s for all repeats of one run: what takes longer is steadier, too
+POINT_BUDGET = 0.06  # s for all repeats of one run: what takes longer is steadier, too
 FEWEST_REPEATS = 2
-STAGES_UP_TO = 0.2  # s: of longer runs the first counts as a repeat, so it has no clock of stages
+STAGES_UP_TO = 0.2  # s of a run whose stages are timed
+COUNTS_FROM = 5e-3  # s: of longer runs the first counts as a repeat
+BESIDE = 2e-3  # s: so long the machine is what the calibration kernel has found it to be
 
 Timed = Callable[["Stopwatch"], object]
 Prepare = Callable[..., Any]  # as `engine.prepare`: compiles, and what it gives runs again and again
@@ -43,6 +46,7 @@ class Repeats(NamedTuple):
     seconds: float = POINT_BUDGET
     fewest: int = FEWEST_REPEATS
     stages_up_to: float = STAGES_UP_TO  # s
+    counts_from: float = COUNTS_FROM  # s
     runs: int = MOST_RUNS  # in one repeat, where each costs a model that is built anew
 
 
@@ -107,6 +111,31 @@ class _Lane:
             self.cpu += [_undisturbed(own)] if len(own) == len(whole) else []
 
 
+@dataclass
+class _Kernel:
+    """The calibration kernel, taken between repeats: interference only ever makes it slower."""
+
+    seconds: float = math.nan
+    taken: float = -math.inf  # when
+    beside: list[tuple[_Lane, int]] = field(default_factory=list)  # repeats since then
+
+    def now(self) -> float:
+        """What it takes, or took a moment ago; repeats that it comes after have it, too, where it is less."""
+        if time.perf_counter() - self.taken >= BESIDE:
+            self.seconds = calibrate()
+            self.taken = time.perf_counter()
+            for lane, repeat in self.beside:
+                lane.kernel[repeat] = min(lane.kernel[repeat], self.seconds)
+            self.beside.clear()
+        return self.seconds
+
+    def keep(self, lane: _Lane, kernel: float, taken: Sequence[Taken | Outcome]) -> None:
+        """A repeat of a lane."""
+        lane.keep(kernel, taken)
+        if lane.failed is None:
+            self.beside.append((lane, len(lane.kernel) - 1))
+
+
 def once(run: Timed, simulate: Simulate, time_limit: float | None = None) -> float | None:
     """Seconds of one run, None if it failed."""
     taken = _both(run, simulate, time_limit)
@@ -148,46 +177,53 @@ def interleaved(
     begin: Callable[[int], None] = lambda number: None,
     prepare: Prepare | None = None,
     expected: Sequence[float] = (),
+    staged: Collection[int] = (),
 ) -> list[Timing | Outcome]:
     """A timing of each run, for those that fail what came of them; instructions and stages where they can be had.
 
     `begin` is told the number of the run whose turn it is. The first run of each warms the caches, tells how often
-    it can be repeated, and has the clock of stages on. One that is `expected` to take long [s] goes without that clock:
-    if it does, it has no cold caches to speak of and counts as the first repeat. With `prepare` its scenes are compiled
-    there, and only run from then on.
+    it can be repeated, and has the clock of stages on. One that is `expected` to take long [s] goes without that clock,
+    unless it is among the numbers `staged`: if it does, it has no cold caches to speak of and counts as the first
+    repeat. With `prepare` its scenes are compiled there, and only run from then on.
     """
     often = Repeats(repeats) if isinstance(repeats, int) else repeats
     lanes: list[_Lane] = []
+    beside = _Kernel()
     clock = True  # until a run comes without one: an engine has it for all its stages or for none
     for number, run in enumerate(runs):
         begin(number)
-        kernel = calibrate()
-        clocked = clock and not (number < len(expected) and expected[number] > often.stages_up_to)
+        known = number < len(expected)
+        long = expected[number] if known else 0.0
+        clocked = clock and long <= (often.stages_up_to if number in staged else often.counts_from)
+        counts = long > often.counts_from and not clocked
+        kernel = math.nan if known and clocked else beside.now()
         watch = Stopwatch(simulate, {"time_stages": True} if clocked else {}, prepare=prepare)
         first = _taken(run, watch)
         if isinstance(first, Outcome):
             lanes.append(_Lane(run=run, runs=0, repeats=0, failed=first))
             continue
         grain = max(first[0], 1e-9)
-        affordable = int(often.seconds / max(grain, RESOLVED))
+        affordable = int(often.seconds / max(first[1] or grain, RESOLVED))  # however busy the machine is
         fresh = _Lane(
             run=run,
-            runs=min(often.runs, max(1, math.ceil(RESOLVED / grain))),
+            runs=min(often.runs, max(1 + (grain < COLD_UP_TO), math.ceil(RESOLVED / grain))),
             repeats=max(often.fewest, min(often.most, affordable)),
             programs=watch.programs,
             stage_seconds=_stages(watch) if clocked else {},
         )
         clock = clock and (not clocked or bool(fresh.stage_seconds))
         lanes.append(fresh)
-        if grain > often.seconds and not fresh.stage_seconds:
-            fresh.keep(kernel, [first])
+        if not (fresh.stage_seconds or math.isnan(kernel)) and grain > (
+            often.counts_from if counts else often.seconds
+        ):
+            beside.keep(fresh, kernel, [first])
     for _ in range(often.most):
         for number, lane in enumerate(lanes):
             if lane.failed is None and len(lane.kernel) < lane.repeats:
                 begin(number)
-                kernel = calibrate()
+                kernel = beside.now()
                 again = _again(lane.programs) if lane.programs else lane.run
-                lane.keep(kernel, [_both(again, simulate) for _ in range(lane.runs)])
+                beside.keep(lane, kernel, [_both(again, simulate) for _ in range(lane.runs)])
     timings: list[Timing | Outcome] = []
     for number, lane in enumerate(lanes):
         begin(number)
