@@ -14,11 +14,13 @@ from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import pytest
 from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.document.errors import DatabaseError, DocumentError
 from spook_tracker.tracker.document.json_form import encode
+from spook_tracker.tracker.document.run_document import Channel, DrawnSolid, Trajectory
 from spook_tracker.tracker.measure.other_tools import of_other_tools
 from spook_tracker.tracker.measure.short_form import is_short, whole
 from spook_tracker.tracker.store.border import checked, decoded
@@ -139,3 +141,16 @@ def test_keys_are_text_from_outside_like_any_other(place: str) -> None:
     cleaned = json.loads(encode(decoded(json.dumps(said).encode())))
     assert "\\u0000" not in json.dumps(cleaned)
     assert "\\ud800" not in json.dumps(cleaned)
+
+
+def test_a_motion_of_many_bodies_is_no_long_text() -> None:
+    """A robot of 44 bodies could be measured and not be recorded: its motion was counted as text in JSON."""
+    data = os.urandom(100_000)
+    channel = Channel(name="position", unit="m", width=1, low=0.0, step=1e-4, data=data)
+    motion = Trajectory(
+        test="robot", name="example", time_step=0.01, step=0.01, count=2, bodies=1,
+        solids=(DrawnSolid(kind="sphere", position=(0.0, 0.0, 0.0), orientation=(1.0, 0.0, 0.0, 0.0), size=(1.0,)),),
+        body_of_solid=(0,), channels=(channel,),
+    )  # fmt: skip
+    document = msgspec.structs.replace(run(), trajectories=(motion,))
+    assert checked(document) == decoded(encode(document)) == document

@@ -76,8 +76,8 @@ def convert(parts: Writable, kind: type[Part]) -> Part:
 
 
 def builtins(part: Writable) -> Writable:
-    """A part as dictionaries, tuples, texts and numbers, numbers as JSON carries them."""
-    found: Writable = msgspec.to_builtins(part, enc_hook=plain)
+    """A part as dictionaries, tuples, texts, bytes and numbers, numbers as JSON carries them."""
+    found: Writable = msgspec.to_builtins(part, enc_hook=plain, builtin_types=(bytes,))
     return found
 
 

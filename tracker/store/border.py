@@ -38,6 +38,8 @@ ESCAPE = re.compile(rb"\\(?:u([0-9a-fA-F]{4})|.)", re.DOTALL)  # one escape of a
 
 
 def _cleaned(part: Writable, place: str) -> Writable:
+    if isinstance(part, bytes):  # of a motion: no text, and as long as it has to be
+        return part
     if isinstance(part, str):
         if len(part) > MAX_TEXT:
             raise DocumentError(f"{place}: a text of {len(part)} characters; at most {MAX_TEXT} are stored")
