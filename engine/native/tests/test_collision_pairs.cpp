@@ -1,8 +1,12 @@
 // Contact points of every pair of shapes against closed forms, from tiny to huge, and in degenerate positions.
 #include <cstring>
+#include <memory>
 #include <random>
+#include <vector>
 
 #include "collision/narrow_phase.hpp"
+#include "collision/polytope.hpp"
+#include "collision/shape_cast.hpp"
 #include "expect.hpp"
 
 using namespace spook;
@@ -270,6 +274,70 @@ void random_boxes_keep_their_promises() {
     EXPECT(touching > 5000);
 }
 
+/// A prism over five to twelve corners, pulled and sheared in all directions.
+Primitive sheared_prism(std::mt19937_64& random) {
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    const int n = 5 + static_cast<int>(random() % 8);
+    Mat3 pull = Mat3::identity();
+    for (double& x : pull.m) x += 0.4 * unit(random);
+    std::vector<Vec3> corners;
+    std::vector<int> loops, counts;
+    for (const double z : {-0.7, 0.7})
+        for (int k = 0; k < n; ++k)
+            corners.push_back(pull * Vec3{std::cos(2.0 * M_PI * k / n), std::sin(2.0 * M_PI * k / n), z});
+    for (int k = n - 1; k >= 0; --k) loops.push_back(k);
+    for (int k = 0; k < n; ++k) loops.push_back(n + k);
+    counts = {n, n};
+    for (int k = 0; k < n; ++k) {
+        const int next = (k + 1) % n;
+        for (const int corner : {k, next, n + next, n + k}) loops.push_back(corner);
+        counts.push_back(4);
+    }
+    return Primitive::convex(std::make_shared<const Polytope>(corners, loops, counts));
+}
+
+void solids_are_as_far_apart_as_their_best_axis_says() {
+    std::mt19937_64 random(9);
+    std::uniform_real_distribution<double> unit(-1.0, 1.0);
+    auto vector = [&] { return Vec3{unit(random), unit(random), unit(random)}; };
+    int apart = 0, overlapping = 0, edges = 0;
+    for (int trial = 0; trial < 3000; ++trial) {
+        const Primitive one = sheared_prism(random), two = sheared_prism(random);
+        const Pose here = turned({}, vector(), 3.0 * unit(random)),
+                   there =
+                       turned((1.0 + 1.5 * std::abs(unit(random))) * vector(), vector(), 3.0 * unit(random));
+        double faces = -1e300, best = -1e300;
+        // Of two edges only where they are what lies nearest along the axis.
+        const auto look = [&](Vec3 n, const Vec3* on = nullptr, const Vec3* other = nullptr) {
+            double lowest = 1e300, highest = -1e300;
+            for (const Vec3& c : one.hull->corners) lowest = std::min(lowest, dot(n, apply(here, c)));
+            for (const Vec3& c : two.hull->corners) highest = std::max(highest, dot(n, apply(there, c)));
+            if (on && dot(n, apply(here, *on)) > lowest + 1e-12) return;
+            if (other && dot(n, apply(there, *other)) < highest - 1e-12) return;
+            best = std::max(best, lowest - highest);
+        };
+        for (const Polytope::Face& face : one.hull->faces) look(-(here.rotation * face.normal));
+        for (const Polytope::Face& face : two.hull->faces) look(there.rotation * face.normal);
+        faces = best;
+        for (const Polytope::Edge& a : one.hull->edges)
+            for (const Polytope::Edge& b : two.hull->edges) {
+                const Vec3 &from = one.hull->corners[a.from], &other_from = two.hull->corners[b.from];
+                const Vec3 axis = cross(here.rotation * (one.hull->corners[a.to] - from),
+                                        there.rotation * (two.hull->corners[b.to] - other_from));
+                if (norm(axis) < 1e-3) continue;
+                for (const double sign : {-1.0, 1.0}) look((sign / norm(axis)) * axis, &from, &other_from);
+            }
+        const Separation found = spook::separation(one, here, two, there);
+        EXPECT_NEAR(found.gap, best, 1e-12);
+        ++(best > 0.0 ? apart : overlapping);
+        edges += best > faces;
+        const Separation near =
+            spook::separation(one, here, two, there, 0.2);  // no further than it must look
+        EXPECT(faces > 0.2 ? near.gap > 0.2 && near.gap <= best + 1e-12 : near.gap == found.gap);
+    }
+    EXPECT(apart > 500 && overlapping > 500 && edges > 500);
+}
+
 /// The distance from the capsule's core to the box, by sampling: never below what the pair says.
 void random_capsules_match_sampling() {
     std::mt19937_64 random(8);
@@ -314,6 +382,7 @@ int main() {
     faces_of_boxes();
     edges_of_boxes();
     random_boxes_keep_their_promises();
+    solids_are_as_far_apart_as_their_best_axis_says();
     random_capsules_match_sampling();
     return report();
 }

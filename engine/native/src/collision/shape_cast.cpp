@@ -100,8 +100,8 @@ Separation round_hull(const Primitive& round, const Pose& at, const Primitive& h
 }
 
 Separation solids(const Primitive& first, const Pose& at_first, const Primitive& second,
-                  const Pose& at_second) noexcept {
-    const SolidAxes axes = solid_axes(Solid(first, at_first), Solid(second, at_second), 1e300);
+                  const Pose& at_second, double far) noexcept {
+    const SolidAxes axes = solid_axes(Solid(first, at_first), Solid(second, at_second), far);
     const SolidAxes::Best* best = &axes.first_face;
     if (axes.second_face.gap > best->gap) best = &axes.second_face;
     if (axes.edges.gap > best->gap) best = &axes.edges;
@@ -129,9 +129,9 @@ Separation from_plane(const Primitive& shape, const Pose& at, const Primitive& p
 }  // namespace
 
 Separation separation(const Primitive& first, const Pose& at_first, const Primitive& second,
-                      const Pose& at_second) noexcept {
+                      const Pose& at_second, double far) noexcept {
     if (first.kind > second.kind) {
-        Separation swapped = separation(second, at_second, first, at_first);
+        Separation swapped = separation(second, at_second, first, at_first, far);
         swapped.normal = -swapped.normal;
         return swapped;
     }
@@ -156,7 +156,7 @@ Separation separation(const Primitive& first, const Pose& at_first, const Primit
         return {near.height - first.radius, at_second.rotation * near.normal};
     }
     if (second.kind == ShapeKind::hull)
-        return first.faceted() ? solids(first, at_first, second, at_second)
+        return first.faceted() ? solids(first, at_first, second, at_second, far)
                                : round_hull(first, at_first, second, at_second);
     if (first.kind == ShapeKind::box) return box_box(first, at_first, second, at_second);
     if (second.kind == ShapeKind::box) return round_box(first, at_first, second, at_second);
@@ -195,6 +195,12 @@ double turning_arm(const Primitive& shape, const Pose& part) noexcept {
 
 namespace {
 
+/// How fast a body's spin can move its shape along any direction, m/s; `far` bounds how far away it may act.
+double turning_speed(const Mover& mover, double far) noexcept {
+    return norm(mover.spin) *
+           (mover.shape.kind == ShapeKind::plane ? far : turning_arm(mover.shape, mover.part));
+}
+
 /// How fast a body's spin can move its shape along n, m/s, now and at any later time: a spin about n moves nothing
 /// along it, and neither does a capsule that rolls about its own axis. `far` bounds how far away it may act.
 double turning_speed(const Mover& mover, Vec3 n, double far) noexcept {
@@ -218,6 +224,8 @@ double time_of_impact(const Mover& first, const Mover& second, double duration, 
                  second_far = far + turning_arm(first.shape, first.part);
     const Vec3 approach = second.velocity - first.velocity;
     // A ball beside its body's centre is one that joints may lead straight on: it only seems to circle away.
+    const double fastest =
+        norm(approach) + turning_speed(first, first_far) + turning_speed(second, second_far);
     const auto on_arm = [](const Mover& mover) {
         return mover.shape.kind == ShapeKind::sphere && norm(mover.part.position) > 0.0;
     };
@@ -225,7 +233,8 @@ double time_of_impact(const Mover& first, const Mover& second, double duration, 
     double time = 0.0;
     constexpr int rounds = 200;  // a factor of two each where a round surface is met at a slant
     for (int round = 0; round < rounds; ++round) {
-        const Separation apart = separation(first.shape, first.at(time), second.shape, second.at(time));
+        const Separation apart = separation(first.shape, first.at(time), second.shape, second.at(time),
+                                            fastest * (duration - time));
         const double turning =
             turning_speed(first, apart.normal, first_far) + turning_speed(second, apart.normal, second_far);
         const double closing = dot(apart.normal, approach), left = duration - time;

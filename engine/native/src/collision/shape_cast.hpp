@@ -7,13 +7,13 @@ namespace spook {
 
 /// A lower bound of the distance of two shapes along a fixed direction: no point of the first lies nearer to the
 /// second along `normal` (unit, from second to first) than `gap` [m]. Positive exactly if they are apart; minus
-/// the least overlap among the directions tried if not.
+/// the least overlap among the directions tried if not. Of two solids that a face parts by more than `far`, no more is sought.
 struct Separation {
     double gap = 0.0;
     Vec3 normal;
 };
 Separation separation(const Primitive& first, const Pose& at_first, const Primitive& second,
-                      const Pose& at_second) noexcept;
+                      const Pose& at_second, double far = 1e300) noexcept;
 
 /// A shape on a body that moves on steadily from `body`: velocity [m/s] of its centre, spin [rad/s], world axes.
 struct Mover {

@@ -9,8 +9,15 @@
 
 #include "collision/narrow_phase.hpp"
 #include "collision/segment.hpp"
+#include "collision/tolerances.hpp"
 
 namespace spook {
+
+namespace {
+
+using namespace tolerances::solid_pairs;
+
+}  // namespace
 
 Solid::Solid(const Primitive& primitive, const Pose& at) noexcept
     : shape(primitive.kind == ShapeKind::hull ? *primitive.hull : cube()), rotation(at.rotation) {
@@ -58,33 +65,88 @@ struct Inward {
 
 }  // namespace
 
+namespace {
+
+Vec3 middle(const Solid& solid) noexcept {
+    Vec3 sum;
+    for (int k = 0; k < solid.count(); ++k) sum += solid.corners[k];
+    return (1.0 / solid.count()) * sum;
+}
+
+/// Edges whose directions can part two solids by more than some gap: the ball in each, of radius rho about its middle, lies
+/// inside, so that along n they are apart by n . way - rho - rho' at most, and the directions of an edge lie between the
+/// normals beside it.
+class Promising {
+public:
+    int edges[3 * Polytope::most_corners], count = 0;
+    double inner = 1e300;  // rho, m
+
+    /// `way`: from the other's middle to this one's, m; turned round for the second solid.
+    Promising(const Solid& solid, Vec3 middle, Vec3 way) noexcept : solid_(solid) {
+        for (int k = 0; k < static_cast<int>(solid.shape.faces.size()); ++k) {
+            const Vec3 n = solid.normal(k);
+            along_[k] = -dot(n, way);
+            inner = std::min(inner, dot(n, solid.corner_of(solid.face(k), 0) - middle));
+        }
+    }
+    /// `needed`: the gap and both radii, m.
+    bool reaches(int edge, double needed) const noexcept {
+        const auto [from, to, left, right] = solid_.shape.edges[static_cast<std::size_t>(edge)];
+        const double most = std::max(along_[left], along_[right]);
+        if (!(needed > 0.0) || !(most > 0.0)) return !(most < needed);
+        const double cosine = dot(solid_.face(left).normal, solid_.face(right).normal);
+        return !(most * most < 0.5 * (1.0 + cosine) * needed * needed);
+    }
+    void choose(double needed) noexcept {
+        for (int k = 0; k < static_cast<int>(solid_.shape.edges.size()); ++k)
+            if (reaches(k, needed)) edges[count++] = k;
+    }
+
+private:
+    const Solid& solid_;
+    double along_[Polytope::most_faces];  // of each face, how far its inward normal goes along the way, m
+};
+
+}  // namespace
+
 SolidAxes solid_axes(const Solid& first, const Solid& second, double margin) noexcept {
     SolidAxes axes;
     axes.first_face = best_face(first, second, -1.0);
     axes.second_face = best_face(second, first, 1.0);
-    if (std::max(axes.first_face.gap, axes.second_face.gap) > margin) return axes;
+    const double face = std::max(axes.first_face.gap, axes.second_face.gap);
+    if (face > margin) return axes;
+    const Vec3 ours_middle = middle(first), their_middle = middle(second), way = ours_middle - their_middle;
+    Promising mine(first, ours_middle, way), other(second, their_middle, -way);
+    const double inner = mine.inner + other.inner, rounding = 1e-9 * (norm(way) + inner);
+    const double least = face - near_tie * std::min(first.thickness, second.thickness);
+    const auto needed = [&](double gap) { return gap + inner - rounding; };
+    mine.choose(needed(least));
+    other.choose(needed(least));
     const auto &ours = first.shape.edges, &theirs = second.shape.edges;
     const Inward inward(second);
     double beside[Polytope::most_faces];  // of each face of the second, its normal along `ba`
-    for (std::size_t i = 0; i < ours.size(); ++i) {
+    for (int m = 0; m < mine.count; ++m) {
+        const int i = mine.edges[m];
+        if (axes.edges.gap > least && !mine.reaches(i, needed(axes.edges.gap))) continue;
         const Vec3 a = first.normal(ours[i].left), b = first.normal(ours[i].right);
         const Vec3 along = first.corners[ours[i].to] - first.corners[ours[i].from], ba = cross(b, a);
         inward.along(ba, beside);
-        for (std::size_t j = 0; j < theirs.size(); ++j) {
+        for (int o = 0; o < other.count; ++o) {
+            const int j = other.edges[o];
             const double cba = beside[theirs[j].left], dba = beside[theirs[j].right];
             if (!(cba * dba < 0.0)) continue;
             const Vec3 c = inward[theirs[j].left], d = inward[theirs[j].right];
             const Vec3 dc = cross(d, c);
             const double adc = dot(a, dc), bdc = dot(b, dc);
             if (!(adc * bdc < 0.0 && cba * bdc > 0.0)) continue;
-            const Vec3 other = second.corners[theirs[j].to] - second.corners[theirs[j].from];
-            const Vec3 axis = cross(along, other);
+            const Vec3 edge = second.corners[theirs[j].to] - second.corners[theirs[j].from];
+            const Vec3 axis = cross(along, edge);
             const double length = norm(axis);
-            if (length <= 1e-4 * norm(along) * norm(other)) continue;  // parallel edges are covered by faces
+            if (length <= 1e-4 * norm(along) * norm(edge)) continue;  // parallel edges are covered by faces
             Vec3 n = (1.0 / length) * axis;
             if (dot(n, a + b) > 0.0) n = -n;  // away from the first's outside: from second to first
             const double gap = dot(n, first.corners[ours[i].from] - second.corners[theirs[j].from]);
-            if (gap > axes.edges.gap) axes.edges = {gap, n, static_cast<int>(i), static_cast<int>(j)};
+            if (gap > axes.edges.gap) axes.edges = {gap, n, i, j};
         }
     }
     return axes;

@@ -40,6 +40,12 @@ inline constexpr double level =
 inline constexpr double prefer_flat = 1e-5;
 inline constexpr double overlay_slop = 1e-7;  // of the thickness
 
+// solid_pairs.cpp
+namespace tolerances::solid_pairs {
+inline constexpr double near_tie =
+    0.01;  // of the smaller thickness: edges so much deeper than faces are found, too
+}
+
 // triangle.cpp
 namespace tolerances::triangle {
 inline constexpr double level = 1e-9;  // sine of a slope that is none

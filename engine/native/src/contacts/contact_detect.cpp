@@ -160,7 +160,8 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
                              second = detection_.collider(pair.second);
         const double reach = margins_.search()[first.body] + margins_.search()[second.body];
         const OpenPair open = opened(pair, separation(first.shape, detection_.pose(pair.first), second.shape,
-                                                      detection_.pose(pair.second)));
+                                                      detection_.pose(pair.second), reach));
+        if (open.apart.gap > reach && first.shape.faceted() && second.shape.faceted()) continue;
         const double size = std::max(bodies_->radius[first.body], bodies_->radius[second.body]);
         if (round_or_plane(first.shape) && round_or_plane(second.shape) && open.apart.gap > 1e-6 * size) {
             if (open.apart.gap <= reach)
