@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import combinations
@@ -228,7 +229,14 @@ def _spread(count: int) -> Array:
 
 
 def _hull(points: Array) -> ConvexHull:
-    """The hull of points; with more corners than ours holds, of those that reach furthest in directions spread evenly."""
+    return hull_of(points.tobytes())
+
+
+@functools.lru_cache(maxsize=1024)  # a model is loaded for each of its runs, and its meshes are most of that
+def hull_of(places: bytes) -> ConvexHull:
+    """The hull of points, as float64; with more corners than ours holds, of those that reach furthest in directions spread
+    evenly."""
+    points: Array = np.frombuffer(places).reshape(-1, 3)
     count = MOST_CORNERS
     while True:
         kept = points
