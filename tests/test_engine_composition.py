@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -10,23 +11,30 @@ from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
 from spook_tracker.engine import (
+    WORLD,
     AngularMomentum,
     CentralGravity,
     ConstraintForce,
     Distance,
     Energy,
     Final,
+    Hinge,
+    JointSpring,
+    Load,
     MaximumAbsolute,
     Method,
     MethodError,
     Particle,
     Position,
+    RigidBody,
+    Run,
     Scene,
     Spring,
     Trace,
     Velocity,
     Violation,
     simulate,
+    start,
 )
 
 G = 9.81
@@ -281,3 +289,63 @@ def test_what_cannot_be_read_is_no_answer(steps: int) -> None:
     run = simulate(scene, time_step=1e-9, steps=steps, method=Method(composition="order4"), observe=observe)
 
     assert run.status == "not_finite" and "'far'" in run.failure
+
+
+INERTIA, STIFFNESS, PUSH, REST = 0.3, 4.0, 6.0, 0.8  # kg m², N m/rad, N, rad
+
+
+def swing(kind: str) -> Scene:
+    """A bob of 1 kg at 1 m, level; as a particle, as a body on a hinge, and with a spring in the hinge."""
+    push = Load(name="push", body="bob")
+    if kind == "particle":
+        bob = Particle(name="bob", mass=1.0, position=(1.0, 0.0, 0.0))
+        rod = Distance(name="rod", between=((0.0, 0.0, 0.0), "bob"))
+        return Scene(bodies=(bob,), constraints=(rod,), forces=(push,), gravity=(0.0, 0.0, -G))
+    body = RigidBody(name="bob", mass=1.0, inertia=(INERTIA,) * 3, position=(1.0, 0.0, 0.0))
+    spring = JointSpring(stiffness=STIFFNESS, damping=0.0) if kind == "spring" else None
+    hinge = Hinge(name="rod", between=(WORLD, "bob"), at=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0), spring=spring)
+    return Scene(bodies=(body,), constraints=(hinge,), forces=(push,), gravity=(0.0, 0.0, -G))
+
+
+def swing_at(kind: str, change: float, end: float) -> np.ndarray:
+    """Its place by DOP853, in two pieces."""
+
+    def motion(push: float, rest: float) -> Callable[[float, np.ndarray], tuple[float, float]]:
+        def rates(_: float, state: np.ndarray) -> tuple[float, float]:
+            angle, rate = state
+            torque = G * math.cos(angle) - push * math.sin(angle)
+            torque -= STIFFNESS * (angle - rest) if kind == "spring" else 0.0
+            return rate, torque / (1.0 if kind == "particle" else 1.0 + INERTIA)
+
+        return rates
+
+    state = np.zeros(2)
+    later = (0.0, REST) if kind == "spring" else (PUSH, 0.0)
+    for (push, rest), span in (((0.0, 0.0), change), (later, end - change)):
+        state = solve_ivp(motion(push, rest), (0.0, span), state, method="DOP853", rtol=1e-12, atol=1e-13).y[
+            :, -1
+        ]
+    return np.array([math.cos(state[0]), 0.0, -math.sin(state[0])])
+
+
+@pytest.mark.parametrize("name", ORDERS)
+@pytest.mark.parametrize("kind", ["particle", "hinge", "spring"])
+def test_what_is_set_between_two_steps_acts_from_there_on(kind: str, name: str) -> None:
+    """Momenta wait for their last half kick until the next stage: it was made with what was set since."""
+
+    def change(run: Run) -> None:
+        if kind == "spring":
+            run.set_rest("rod", REST)
+        else:
+            run.set_load("push", force=(PUSH, 0.0, 0.0))
+
+    def error(steps: int) -> float:
+        with start(swing(kind), time_step=1.0 / steps, method=Method(composition=name)) as run:
+            run.step(steps // 2)
+            change(run)
+            run.step(steps // 2)
+            return float(np.abs(run.state["bob"][:3] - swing_at(kind, 0.5, 1.0)).max())
+
+    assert error(100) < 1e-6
+    coarse = 64 // ORDERS[name] // 2 * 2  # above rounding
+    assert math.log2(error(coarse) / error(2 * coarse)) > ORDERS[name] - 0.6

@@ -285,6 +285,15 @@ void ParticleComposition::solve_rigidly() {
     paths_.substitute(rows_);
 }
 
+/// Kicks up to where the step ended, by forces as they were: what is set from outside acts from there on.
+void ParticleComposition::catch_up() {
+    if (state_.pending == 0.0) return;
+    find_kicks();
+    const double part = state_.pending / h_;
+    for (std::size_t node = 0; node < nodes_.v.size(); ++node) nodes_.v[node] += part * nodes_.kick[node];
+    state_.pending = 0.0;
+}
+
 /// What is seen at the end of a step, without changing what goes on: velocities kicked and projected to the sample,
 /// forces from the accelerations there.
 void ParticleComposition::read(Seen& seen) {

@@ -21,6 +21,7 @@ public:
     /// What is seen at the end of a step, without changing what goes on: velocities kicked and projected to the
     /// sample, forces from the accelerations there.
     void read(Seen& seen);
+    void catch_up();
 
     std::int64_t newton_iterations() const noexcept { return state_.newton_iterations; }
     std::int64_t halved_steps() const noexcept { return state_.halved_steps; }

@@ -84,6 +84,7 @@ void ParticleSystem::place(std::span<const double> state) {
 
 void ParticleSystem::set_load(int body, Vec3 force) {
     if (!stages_.runs(Stage::apply_loads)) throw std::invalid_argument("loads need the stage apply_loads");
+    if (composition_) composition_->catch_up();
     const int node = nodes_.of_body[body];
     const Vec3 gravity = stages_.runs(Stage::apply_gravity) ? scene_.gravity : Vec3{};
     nodes_.steady_kick[node] = parts_.h * (gravity + nodes_.w[node] * force);

@@ -212,6 +212,13 @@ void RigidSystem::kick_all(double span) {
     });
 }
 
+/// What is set from outside acts from here on: up to here momenta are kicked as it was before.
+void RigidSystem::catch_up() {
+    if (live_.pending == 0.0) return;
+    kick_all(live_.pending);
+    live_.pending = 0.0;
+}
+
 /// Momenta += Gᵀ Λ with the Jacobians as assembled.
 void RigidSystem::push(const double* multipliers) {
     const auto blocks = joints_.blocks();

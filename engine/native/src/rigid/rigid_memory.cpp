@@ -69,7 +69,9 @@ void RigidSystem::set_load(int body, Vec3 force, Vec3 torque) {
     if (in_plane_) leave_plane();
     in_plane_ = false;
     const Load before = steady_.empty() ? Load{constants.force, constants.torque} : steady_[body];
-    if (!is_zero(force - before.force) || !is_zero(torque - before.torque)) mark_moving(body);
+    if (is_zero(force - before.force) && is_zero(torque - before.torque)) return;
+    mark_moving(body);
+    catch_up();
     const Vec3 gravity = stages_.runs(Stage::apply_gravity) ? gravity_ : Vec3{};
     constants.force = force;
     constants.torque = torque;

@@ -80,6 +80,7 @@ public:
         if (joints_.set_motor(joint, speed, max_force)) wake_joint(joint);
     }
     void set_rest(int joint, double rest) {
+        catch_up();
         if (joints_.set_rest(joint, rest)) wake_joint(joint);
     }
 
@@ -243,6 +244,7 @@ private:
     void guess(std::size_t stage, double span);
     void remember(std::size_t stage, double span);
     void forget(std::size_t stage);
+    void catch_up();
     void kick_all(double span);
     void push(const double* multipliers);
     double violations_ahead(double tau);
