@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import (
+    Ball,
     Box,
     Capsule,
     CentralGravity,
@@ -294,6 +295,55 @@ def test_uniform_motion_cannot_be_noticed(seed: int) -> None:
 
     assert np.abs(there[:, :3] - here[:, :3] - 50 * TIME_STEP * boost).max() < 1e-11
     assert np.abs(there[:, 7:10] - here[:, 7:10] - boost).max() < 1e-10
+
+
+FAR = RigidBody(
+    name="far",
+    mass=1.0,
+    shape=Sphere(0.2),
+    position=(100.0, 0.0, 0.2),
+    material=Material(restitution=0.5),
+)
+
+
+@pytest.mark.parametrize("method", [Method(), Method(solver="iterative", iterations=1000)])
+def test_a_blow_far_away_is_nothing_to_what_lies_here(method: Method) -> None:
+    """Two bodies that a joint ties together drag on the ground; a ball bounces, or lies, a hundred metres away."""
+    soft = Material(friction=0.4)
+    ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=soft)
+    for seed in range(8):
+        rng = np.random.default_rng(seed)
+        pair = tuple(
+            RigidBody(
+                name=name,
+                mass=mass,
+                shape=Capsule(0.1, 0.3),
+                position=(x, 0.0, 0.12),
+                orientation=(0.7, 0.1, 0.7, 0.0),
+                velocity=tuple(rng.normal(size=3)),
+                material=soft,
+            )
+            for name, mass, x in (("first", 1.0, 0.0), ("second", 2.0, 0.6))
+        )
+        tie = Ball(name="tie", between=("first", "second"), at=(0.3, 0.05, 0.12))
+        ends = [
+            simulate(
+                Scene(
+                    bodies=(*pair, ground, replace(FAR, velocity=(0.0, 0.0, speed))),
+                    constraints=(tie,),
+                    gravity=(0.0, 0.0, -9.81),
+                ),
+                time_step=TIME_STEP,
+                steps=40,
+                method=method,
+            )
+            for speed in (0.0, -4.0)
+        ]
+        assert ends[1].counters["impacts"] > ends[0].counters["impacts"]
+        for name in ("first", "second"):
+            np.testing.assert_allclose(
+                ends[1].final_state[name], ends[0].final_state[name], rtol=0.0, atol=1e-9
+            )
 
 
 def left_when_shuffled(scene: Scene) -> float:
