@@ -3,7 +3,8 @@
 Each quantity says its shape, unit, axes and sign, and what it costs: `help(Violation)`.
 Sample k is the state after k steps, sample 0 the start; forces and contact forces belong to the step that
 ended there and are zero at sample 0. With half-step velocities, velocities and energies are those at the
-sample's time, the mean of the half steps before and after.
+sample's time, the mean of the half steps before and after; so are, where there are rigid bodies, forces of joints and
+contacts, at sample 0 too. Compositions show forces at the sample's time; of particles they are zero at sample 0.
 """
 
 from __future__ import annotations
