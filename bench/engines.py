@@ -202,6 +202,7 @@ def page(database: str, of_facts: str = "") -> str:
         *recorded.occasion_lines(database),
         *_asked_later(runs[OURS]),
         *_not_asked(samples[OURS]),
+        *_asked_in_part(samples),
         *([f"On another machine, and not timed here: {elsewhere}."] if elsewhere else []),
         f"An engine that is missing was not installed: `.ci/engines all` brings what can be had of `spook-tracker[{','.join(find.EXTRAS)}]`",
         f"and, through npm, of {', '.join(find.NODE.values())}, and builds {', '.join(find.BUILT)} from its source.",
@@ -281,6 +282,17 @@ def _asked_later(runs: Sequence[Any]) -> list[str]:
             break_on_hyphens=False,
         )
     ]
+
+
+def _asked_in_part(samples: Mapping[str, ranks.Samples]) -> list[str]:
+    """Engines whose time was over before they had been asked everything."""
+    tests = {
+        name: len({definition.test for definition, _ in told.values()}) for name, told in samples.items()
+    }
+    part = [f"{name} {count}" for name, count in tests.items() if count < tests[OURS]]
+    return (
+        [f"Asked only some of the {tests[OURS]} tests, for lack of time: {', '.join(part)}."] if part else []
+    )
 
 
 def _not_asked(samples: ranks.Samples) -> list[str]:
