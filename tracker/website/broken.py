@@ -49,9 +49,12 @@ class Broken:
 
 def broken(test: TestHistory) -> list[Broken]:
     """The series to look at, limits before what is only followed, the worst first; none where the test passes."""
+    state = test.state
+    if state not in ("fail", "watch"):
+        return []
     found = []
     for trend in test.trends:
-        if trend.state == test.state and test.state in ("fail", "watch"):
+        if trend.state == state:
             hits = [hit for hit in hits_of(trend.told) if hit.standing == "detected"]
             found.append(Broken(trend, hits[-1] if hits else None))
 
