@@ -14,6 +14,8 @@ Rotation = tuple[float, float, float, float]  # unit quaternion (w, x, y, z), bo
 
 def number(owner: str, field: str, value: object) -> float:
     """A finite float, or a SceneError naming owner and field."""
+    if type(value) is float and math.isfinite(value):  # nearly always
+        return value
     try:
         if isinstance(value, bool | str | bytes):  # float() takes them, and "1" or True is a slip
             raise TypeError
@@ -64,6 +66,8 @@ def vector(owner: str, field: str, value: Any) -> Vector:
         x, y, z = value
     except (TypeError, ValueError):
         raise SceneError(f"{owner}: {field} must be three numbers, not {value!r}") from None
+    if type(x) is type(y) is type(z) is float and math.isfinite(x + y + z):
+        return x, y, z
     return (number(owner, field, x), number(owner, field, y), number(owner, field, z))
 
 
@@ -76,14 +80,14 @@ def direction(owner: str, field: str, value: object) -> Vector:
     return (x / length, y / length, z / length)
 
 
-def rotation(owner: str, field: str, value: object) -> Rotation:
+def rotation(owner: str, field: str, value: Any) -> Rotation:
     """Four finite floats (w, x, y, z), scaled to unit length."""
     try:
-        w, x, y, z = (number(owner, field, component) for component in value)  # type: ignore[attr-defined]
-    except (TypeError, ValueError) as error:
-        if isinstance(error, SceneError):
-            raise
+        w, x, y, z = value
+    except (TypeError, ValueError):
         raise SceneError(f"{owner}: {field} must be a quaternion (w, x, y, z), not {value!r}") from None
+    if not (type(w) is type(x) is type(y) is type(z) is float and math.isfinite(w + x + y + z)):
+        w, x, y, z = (number(owner, field, component) for component in (w, x, y, z))
     square = w * w + x * x + y * y + z * z
     length = math.sqrt(square) if 1e-280 < square < 1e280 else math.hypot(w, x, y, z)
     if length == 0.0:
