@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable, Mapping, Sequence
+from functools import cached_property
 
 from spook_tracker.tracker.document.json_form import encode
 from spook_tracker.tracker.document.kept import Kept
@@ -53,13 +54,19 @@ class DocumentHistory:
         return {key: SeriesHistory(newest[key], tuple(points[key])) for key in sorted(chosen)}
 
     def series_of(self, engine: str) -> Mapping[str, SeriesHistory]:
-        ours = {
-            key: SeriesHistory(
-                found.definition, tuple(p for p in found.points if p.run.engine.name == engine)
-            )
-            for key, found in self.series(evidence=False).items()
-        }
-        return {key: found for key, found in ours.items() if found.points}
+        return self._by_engine.get(engine, {})
+
+    @cached_property
+    def _by_engine(self) -> Mapping[str, Mapping[str, SeriesHistory]]:
+        """The series of each engine: a page is about one, a table about all of them."""
+        found: dict[str, dict[str, SeriesHistory]] = {}
+        for key, series in self.series(evidence=False).items():
+            points: dict[str, list[Point]] = {}
+            for point in series.points:
+                points.setdefault(point.run.engine.name, []).append(point)
+            for engine, own in points.items():
+                found.setdefault(engine, {})[key] = SeriesHistory(series.definition, tuple(own))
+        return found
 
     def _bare(self, run: RunDocument) -> list[Sample]:
         """The samples of a run without what stands behind them."""
