@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from typing import Any
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 from spook_tracker import engine
 from spook_tracker.engine import (
@@ -236,3 +238,98 @@ def test_three_hinges_through_light_bodies_are_a_ball_joint() -> None:
     ideal = end(None)
     coarse, fine = (float(np.abs(end(light) - ideal).max()) for light in (1e-5, 1e-7))
     assert fine < 1e-9 and coarse / fine == pytest.approx(100.0, rel=0.05)
+
+
+def parallelogram(cranks: float, rotor: float, angle: float) -> tuple[Scene, float, float]:
+    """Two cranks of 1 kg and that length, a coupler of 2 kg level; with a rotor in each of four hinges. Its inertia, and what pulls."""
+    turn = (math.cos(0.5 * angle), 0.0, math.sin(0.5 * angle), 0.0)
+    down = cranks * np.array([-math.sin(angle), 0.0, -math.cos(angle)])
+    bodies, joints = [], []
+    for k in (0, 1):
+        at = np.array([float(k), 0.0, 0.0])
+        bodies.append(
+            engine.RigidBody(
+                name=f"crank {k}",
+                mass=1.0,
+                inertia=(0.02, 0.02, 0.01),
+                position=tuple(at + 0.5 * down),
+                orientation=turn,
+            )
+        )
+        joints.append((f"a{k}", (WORLD, f"crank {k}"), at))
+        joints.append((f"b{k}", (f"crank {k}", "coupler"), at + down))
+    bodies.append(
+        engine.RigidBody(
+            name="coupler",
+            mass=2.0,
+            inertia=(0.1, 0.2, 0.2),
+            position=tuple(np.array([0.5, 0.0, 0.0]) + down),
+        )
+    )
+    scene = Scene(
+        bodies=tuple(bodies),
+        constraints=tuple(
+            Hinge(
+                name=name, between=between, at=tuple(at), axis=(0.0, 1.0, 0.0), compliance=0.0, armature=rotor
+            )
+            for name, between, at in joints
+        ),
+        gravity=(0.0, 0.0, -9.81),
+    )
+    inertia = 2.0 * (0.02 + 0.25 * cranks**2) + 2.0 * cranks**2 + 4.0 * rotor
+    return scene, inertia, 9.81 * cranks * (1.0 + 2.0)
+
+
+@pytest.mark.parametrize("rotor", [0.0, 0.3])
+def test_rotors_in_a_loop_are_held_at_the_order_of_the_composition(rotor: float) -> None:
+    scene, inertia, pull = parallelogram(0.5, rotor, 1.0)
+    reference = solve_ivp(
+        lambda _, s: [s[1], -pull * math.sin(s[0]) / inertia],
+        (0.0, 1.0),
+        [1.0, 0.0],
+        rtol=1e-13,
+        atol=1e-14,
+        method="DOP853",
+    ).y[0, -1]
+    seen = {"coupler": Final(quantity=Position("coupler"))}
+    errors = []
+    for steps in (20, 40):
+        run = simulate(
+            scene, time_step=1 / steps, duration=1.0, method=Method(composition="order4"), observe=seen
+        )
+        errors.append(abs(float(run["coupler"][2]) + 0.5 * math.cos(reference)))
+    assert errors[1] < 2e-6
+    assert math.log2(errors[0] / errors[1]) == pytest.approx(4.0, abs=0.3)
+
+
+def test_a_composition_shows_what_joints_carry_beside_springs() -> None:
+    """A cart on a rail that a spring pulls, a bob that hangs from it: both accelerate from rest."""
+    cart, bob, moment, arm, stiffness, stretched = 3.0, 1.0, 0.05, 0.6, 40.0, 0.25
+    bodies = (
+        engine.RigidBody(name="cart", mass=cart, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0)),
+        engine.RigidBody(name="bob", mass=bob, inertia=(moment, moment, moment), position=(0.0, 0.0, -arm)),
+    )
+    twist = 6.0  # N m/rad
+    joints = (
+        Prismatic(
+            name="rail", between=(WORLD, "cart"), axis=(1.0, 0.0, 0.0), compliance=0.0,
+            spring=engine.JointSpring(stiffness=stiffness, rest=stretched, damping=0.0),
+        ),
+        Hinge(
+            name="pin", between=("cart", "bob"), at=(0.0, 0.0, 0.0), axis=(0.0, -1.0, 0.0), compliance=0.0,
+            spring=engine.JointSpring(stiffness=twist, rest=0.2, damping=0.0),
+        ),
+    )  # fmt: skip
+    x, phi = np.linalg.solve(
+        [[cart + bob, bob * arm], [bob * arm, moment + bob * arm**2]], [stiffness * stretched, twist * 0.2]
+    )
+    run = simulate(
+        Scene(bodies=bodies, constraints=joints, gravity=(0.0, 0.0, -9.81)),
+        time_step=0.01,
+        duration=0.01,
+        method=Method(composition="order4"),
+        observe={"pin": Trace(quantity=engine.ConstraintForce("pin"))},
+    )
+    force = run["pin"][0]
+    assert abs(force[0]) == pytest.approx(abs(bob * (x + arm * phi)), rel=1e-6)
+    assert force[2] == pytest.approx(bob * 9.81, rel=1e-9)

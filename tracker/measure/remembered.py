@@ -8,15 +8,18 @@ from __future__ import annotations
 
 import pickle
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import numpy as np
 
+from spook_tracker.engine.method import Method
+from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.result import Array, Result
 from spook_tracker.engine.scene import Scene
 from spook_tracker.scalar_tests.case import Simulate
+
+Option = float | bool | None | Method | Mapping[str, Observable]  # of a simulation
 
 WORTH = 2e-3  # s that a run takes; what is shorter is run again sooner than it is found
 MOST_BYTES = 1 << 23  # of one run's observables
@@ -27,12 +30,12 @@ HOW = ("time_limit", "time_stages")  # options that say how a run is watched, no
 class Remembered:
     """Forwards to the engine what was not asked before."""
 
-    simulate: Simulate
-    kept: dict[object, list[tuple[bytes, Result]]] = field(
+    simulate: Callable[..., Result]
+    kept: dict[tuple[Option, ...], list[tuple[bytes, Result]]] = field(
         default_factory=dict
     )  # by what is cheap to compare
 
-    def __call__(self, scene: Scene, **options: Any) -> Result:
+    def __call__(self, scene: Scene, **options: Option) -> Result:
         if not isinstance(scene, Scene):
             return self.simulate(scene, **options)
         asked = {name: option for name, option in options.items() if name not in HOW}
@@ -48,7 +51,7 @@ class Remembered:
         return result
 
 
-def _bytes(scene: Scene, asked: Mapping[str, Any]) -> bytes:
+def _bytes(scene: Scene, asked: Mapping[str, Option]) -> bytes:
     """All that a run is decided by, to the bit; nothing where it cannot be told, as of a function."""
     try:
         return pickle.dumps((scene, sorted(asked.items())))

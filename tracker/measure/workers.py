@@ -15,7 +15,7 @@ import threading
 import time
 import warnings
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from multiprocessing import connection as waiting
@@ -57,7 +57,7 @@ def answers(
     pieces: Sequence[Piece],
     workers: int,
     limits: Limits,
-    subject: Callable[[Piece], object] = lambda piece: None,
+    subject: Callable[[Piece], Hashable] = lambda piece: None,
 ) -> Iterator[tuple[Piece, Answer | Lost]]:
     """Every piece with what `perform` made of it, or Lost, as they come. What `perform` raises is raised.
 
