@@ -73,14 +73,14 @@ def observations(observe: Mapping[str, Observable]) -> list[_core.Observation]:
 
     Quantity k is the k-th of `distinct_quantities`: observables of equal quantities share one reading.
     """
-    quantities = distinct_quantities(observe)
+    places = {quantity: place for place, quantity in enumerate(distinct_quantities(observe))}
     found = []
     for name, what in observe.items():
         if type(what) not in _REDUCTIONS:
             raise MethodError(f"observe {name!r}: {what!r} is not a Trace, Final, Maximum, ... of a quantity")
         found.append(
             _core.Observation(
-                quantity=quantities.index(what.quantity),
+                quantity=places[what.quantity],
                 reduction=_REDUCTIONS[type(what)],
                 first=what.first,
                 last=-1 if what.last is None else what.last,
@@ -95,7 +95,7 @@ def distinct_quantities(observe: Mapping[str, Observable]) -> list[Any]:
     """The different quantities asked for, in order of first use."""
     if not isinstance(observe, Mapping):
         raise MethodError(f"observe must map names to a Trace, Final, Maximum, ..., not {observe!r}")
-    quantities: list[Any] = []
+    quantities: dict[Any, None] = {}
     for name, what in observe.items():
         if not isinstance(name, str):
             raise MethodError(
@@ -103,9 +103,8 @@ def distinct_quantities(observe: Mapping[str, Observable]) -> list[Any]:
             )
         if not isinstance(what, Observable):
             raise MethodError(f"observe {name!r}: {what!r} is not a Trace, Final, Maximum, ... of a quantity")
-        if what.quantity not in quantities:
-            quantities.append(what.quantity)
-    return quantities
+        quantities.setdefault(what.quantity)
+    return list(quantities)
 
 
 class Program:
