@@ -17,6 +17,7 @@ from spook_tracker.engine import (
     Energy,
     Hinge,
     KineticEnergy,
+    Load,
     Material,
     Method,
     MethodError,
@@ -28,6 +29,7 @@ from spook_tracker.engine import (
     Table,
     Trace,
     simulate,
+    start,
 )
 from tests.sleep_scenes import (
     FALLEN,
@@ -263,6 +265,33 @@ def test_a_kinematic_body_that_comes_along_wakes() -> None:
     run.step(30)
     assert asleep(run) == 0
     assert math.isclose(run.state["target"][7], 2.0, rel_tol=1e-9)
+
+
+@pytest.mark.parametrize("impacts", ["simultaneous", "successive"])
+@pytest.mark.parametrize("solver", SOLVERS)
+def test_a_sleeper_beside_what_bounces_has_no_speed_and_wakes_with_none(solver: str, impacts: str) -> None:
+    """Half of a step's forces went to sleepers in each step in which others touched: a box flew up when it woke."""
+    bouncy = Material(friction=0.5, restitution=0.9)
+    ball = RigidBody(name="ball", mass=1.0, shape=Sphere(0.2), position=(5.0, 0.0, 3.0), material=bouncy)
+    still = box("still", 0.0, 0.5, material=bouncy)
+    push = Load(name="push", body="still")
+    run = start(
+        scene(FLOOR, still, ball, forces=(push,)),
+        time_step=TIME_STEP,
+        method=sleepy(solver, impacts=impacts),
+        observe={"energy": Energy()},
+    )
+    run.step(60)
+    assert asleep(run) == 1
+    fell = float(run["energy"])
+    run.step(60)
+    assert asleep(run) == 1
+    assert float(run["energy"]) < fell + 1e-9
+    np.testing.assert_array_equal(run.state["still"][7:], 0.0)
+    run.set_load("push", force=(0.0, 0.0, -1.0))
+    run.step(10)
+    np.testing.assert_allclose(run.state["still"][:3], (0.0, 0.0, 0.5), rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(run.state["still"][7:], 0.0, rtol=0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

@@ -23,7 +23,7 @@ void RigidSystem::lead_events() {
     leave_out_sleepers();
     for (int i : constrained_) {
         const double lead = contacts_->toi_fraction(i);
-        if (lead == 0.0) continue;
+        if (lead == 0.0 || asleep(i)) continue;
         BodyState& s = live_.bodies[i];
         const Vec3 twist = lead * h_ * constants_[i].torque;
         const Vec3 dv = lead * kick(i), dw = turned_by(constants_[i], s, twist);
@@ -42,7 +42,7 @@ void RigidSystem::impact() {
     contacts_->impact(mixed_, scratch_.impulses);
     judge_contacts();
     for (const int i : constrained_)
-        if (contacts_->toi_fraction(i) > 0.0) share_[i] = 1.0 - contacts_->toi_fraction(i);
+        if (contacts_->toi_fraction(i) > 0.0 && !asleep(i)) share_[i] = 1.0 - contacts_->toi_fraction(i);
     const auto add_to_before = [this](double sign) {
         if (!half_step_) return;
         for (const int i : constrained_) {
