@@ -97,8 +97,8 @@ struct SupportPair {
 struct ImpactArrays {
     MixedSystem hit, start, plastic;
     std::vector<FrictionPoint> friction, fresh, plastic_friction, first_friction;
-    std::vector<std::size_t> hit_points, pushed,
-        joints;  // points; rows against what moves as it is told, or along itself; blocks of the step's rows
+    std::vector<std::size_t> hit_points,
+        pushed;  // points; rows against what moves as it is told, or along itself
     std::vector<std::pair<int, int>> pairs;
     std::vector<Vec6> before, mixed, next;
     std::vector<std::array<double, 2>> returned;  // of the slip of each point, m/s
@@ -116,6 +116,7 @@ struct EnergySums {
 struct ContactArrays {
     EventSearch events;
     ImpactArrays impact;
+    std::vector<std::size_t> joints_hit;  // blocks of the step's rows that take part in the impact
     // Of a solve:
     std::vector<FrictionPoint> friction;
     std::vector<char> answered;       // per row: the round before found it an answer

@@ -236,38 +236,33 @@ bool ContactStage::needs_stop_impact(const MixedSystem& system, std::size_t know
     return true;
 }
 
-/// Points that close where nothing is approached and no stop is hit: what goes on elsewhere is nothing to their bodies.
-void ContactStage::leave_out_unhit(const MixedSystem& system, std::vector<std::size_t>& hit_points) const {
-    const Islands& islands = connected(system, system.rows.size());
-    std::vector<char>& is_struck = filled(arrays_.impact.touched, islands.count);
-    for (const std::size_t k : hit_points)
-        if (is_met(points_[k])) is_struck[island_of(islands, points_[k])] = 1;
-    for (const RowBlock& block : system.rows)
-        if (is_hit(block)) is_struck[islands.of_body[std::max(block.first, block.second)]] = 1;
-    std::erase_if(hit_points, [&](std::size_t k) { return !is_struck[island_of(islands, points_[k])]; });
-}
-
-/// The rows of joints as an impact sees them, of those that are connected to a point that is hit, or that have a stop
-/// which is hit beside a point: what is far from any does not know of it.
-void ContactStage::take_part(MixedSystem& system, const std::vector<std::size_t>& hit_points,
+/// Leaves out points that close where nothing is approached and no stop is hit: what goes on elsewhere is nothing to their
+/// bodies. Then the rows of joints as an impact sees them, of those that are connected to a point that is left, or that
+/// have a stop which is hit beside a point.
+void ContactStage::take_part(MixedSystem& system, std::vector<std::size_t>& hit_points,
                              std::vector<RowBlock>& rows) const {
-    arrays_.impact.joints.clear();
-    if (system.rows.empty()) return;
     const Islands& islands = connected(system, system.rows.size());
     const auto island = [&](const RowBlock& block) {
         return islands.of_body[std::max(block.first, block.second)];
     };
+    const auto is_met =
+        [&](const Point& point) {  // where impacts come in order, plastic ones have their turn
+            return come_in_order(point) ? point.approach < -point.rounding : is_impact(point);
+        };
     std::vector<char>&touched = filled(arrays_.impact.touched, islands.count),
     &taking_part = filled(arrays_.impact.taking_part, islands.count);
     for (const Point& point : points_) touched[island_of(islands, point)] = 1;
-    for (const std::size_t k : hit_points) taking_part[island_of(islands, points_[k])] = 1;
+    for (const std::size_t k : hit_points)
+        if (is_met(points_[k])) taking_part[island_of(islands, points_[k])] = 1;
     for (const RowBlock& block : system.rows)
         if (is_hit(block) && touched[island(block)]) taking_part[island(block)] = 1;
+    std::erase_if(hit_points, [&](std::size_t k) { return !taking_part[island_of(islands, points_[k])]; });
+    arrays_.joints_hit.clear();
     for (RowBlock& given : system.rows) {
         if (!taking_part[island(given)]) continue;
         given.stop.answered = is_hit(given);
         given.stop.limit_reached = impact_rounds_ > most_rounds(points_.size());
-        arrays_.impact.joints.push_back(static_cast<std::size_t>(&given - system.rows.data()));
+        arrays_.joints_hit.push_back(static_cast<std::size_t>(&given - system.rows.data()));
         RowBlock& block = rows.emplace_back(given);
         for (int i = 0; i < block.size; ++i) {
             const bool below = block.lower[i] == -unbounded, above = block.upper[i] == unbounded;
@@ -290,12 +285,6 @@ bool ContactStage::is_impact(const Point& point) const noexcept {
     return answered && point.approach < -point.rounding;
 }
 
-/// The same of impacts that come in order, among which plastic ones have their turn.
-bool ContactStage::is_met(const Point& point) const noexcept {
-    if (!come_in_order(point)) return is_impact(point);
-    return point.bounce >= 0.0 && point.approach < -point.rounding;
-}
-
 void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
     ++state_.counters.impacts;
     ++impact_rounds_;
@@ -306,7 +295,6 @@ void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
     if (in_order) find_earliest_impacts(system, hit_points);
     for (std::size_t k = 0; !in_order && k < points_.size(); ++k)
         if (points_[k].bounce >= 0.0) hit_points.push_back(k);
-    leave_out_unhit(system, hit_points);
     MixedSystem& hit = work.hit;
     hit.mass = system.mass;
     hit.momentum = system.momentum;
@@ -377,7 +365,7 @@ void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
         const double s = share[island(block)];
         for (int i = 0; i < block.size; ++i) {
             const double other = s < 1.0 ? plastic.rows[j].multiplier[i] : block.multiplier[i];
-            impulses[work.joints[j]][i] += other + s * (block.multiplier[i] - other);
+            impulses[arrays_.joints_hit[j]][i] += other + s * (block.multiplier[i] - other);
         }
     }
     for (std::size_t j = 0; j < hit_points.size(); ++j) {
@@ -423,7 +411,8 @@ void ContactStage::after_impact(const MixedSystem& system) {
     impact_needed_ = false;
     const bool again = impact_rounds_ <= most_rounds(points_.size());
     for (const Point& point : points_) {
-        if (come_in_order(point)) impact_needed_ |= again && is_met(point);
+        if (come_in_order(point))
+            impact_needed_ |= again && point.bounce >= 0.0 && point.approach < -point.rounding;
         else if (impact_rounds_ < simultaneous_rounds)  // what was hit already is not hit again
             impact_needed_ |= point.impact == 0.0 && point.toi >= 0.0 && is_impact(point);
     }

@@ -191,7 +191,6 @@ private:
     void find_open();
     void find_open_again();
     bool is_impact(const Point& point) const noexcept;
-    bool is_met(const Point& point) const noexcept;
     bool needs_plastic_impact();
     bool find_deferred_impacts(const std::vector<Vec6>& velocity);
     void look_at(const std::vector<IndexPair>& near);
@@ -238,8 +237,7 @@ private:
     double last_impact_time(const Point& point) const noexcept;
     double closing_time(const Point& point) const;
     void move_to_last_impact(Point& point);
-    void leave_out_unhit(const MixedSystem& system, std::vector<std::size_t>& hit_points) const;
-    void take_part(MixedSystem& system, const std::vector<std::size_t>& hit_points,
+    void take_part(MixedSystem& system, std::vector<std::size_t>& hit_points,
                    std::vector<RowBlock>& rows) const;
     void share_impact(MixedSystem& hit, std::size_t joints, const std::vector<std::size_t>& hit_points) const;
     void solve_impact(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,

@@ -14,10 +14,10 @@ void RigidSystem::integrate() {
     if (live_.whirling < 0) live_.whirling = find_whirling(constrained_);
     if (!constrained_are_moved_)
         for (int i : constrained_)
-            if (!asleep(i)) integrate_body(i);
+            if (!asleep(i)) spook::integrate(constants_[i], h_, live_.bodies[i]);
     constrained_are_moved_ = false;
-    for (int i : free_) integrate_body(i);
-    for (int i : driven_) integrate_body(i);
+    for (int i : free_) spook::integrate(constants_[i], h_, live_.bodies[i]);
+    for (int i : driven_) spook::integrate(constants_[i], h_, live_.bodies[i]);
     if (contacts_ && !contacts_->correction().empty()) {
         const std::vector<Vec6>& extra = contacts_->correction();
         for (std::size_t k = 0; k < constrained_.size(); ++k)
@@ -32,7 +32,5 @@ void RigidSystem::integrate() {
         else turn_rotor(joints_, k, live_.bodies, h_);
     }
 }
-
-void RigidSystem::integrate_body(int i) { spook::integrate(constants_[i], h_, live_.bodies[i]); }
 
 }  // namespace spook

@@ -321,7 +321,7 @@ bool RigidSystem::composed_stage(double tau, std::size_t stage) {
         if (!hold_stage(tau, span, stage)) return false;
         if (clock_) clock_->mark(Stage::solve_block);
     } else {
-        for (int i : constrained_) integrate_body(i);
+        for (int i : constrained_) spook::integrate(constants_[i], h_, live_.bodies[i]);
     }
     for (const std::vector<int>* some : {&free_, &driven_})
         for (int i : *some) spook::integrate(constants_[i], tau, live_.bodies[i]);

@@ -139,7 +139,7 @@ void RigidSystem::solve_locked() {
         BodyState& s = live_.bodies[body];
         s.velocity = v.linear;
         s.angular_momentum = s.inertia * v.angular;
-        if (at_once) integrate_body(body);
+        if (at_once) spook::integrate(constants_[body], h_, live_.bodies[body]);
     };
     bool finite = false;
     if (contacts_) {
@@ -220,7 +220,7 @@ void RigidSystem::take_block_solution() {
             s.angular_momentum = s.inertia * Vec3{x[0], x[1], x[2]};
             x += 3;
         }
-        if (at_once) integrate_body(i);
+        if (at_once) spook::integrate(constants_[i], h_, live_.bodies[i]);
     }
     constrained_are_moved_ = at_once;
 }

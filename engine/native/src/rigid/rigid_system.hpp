@@ -315,7 +315,6 @@ private:
         return force_.empty() ? f : f + force_[body];
     }
 
-    void integrate_body(int body);
     void integrate();
     void project_positions();
     void analyse_block();
