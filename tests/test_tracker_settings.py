@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gc
 import sys
+import traceback
 from pathlib import Path
 
 import click
@@ -11,6 +13,7 @@ from click.testing import CliRunner, Result
 
 from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.cli.settings import KINDS, NOT_MEANT, Settings, SettingsError, defaults, read
+from spook_tracker.tracker.document.toml_file import read_toml
 from spook_tracker.tracker.measure.run import Questions
 
 TOY = 'engine = "toy_engine"\ncatalogue = "toy_questions"\n'
@@ -195,6 +198,33 @@ def test_settings_that_no_number_and_no_address_can_be_are_one_sentence(content,
     assert said in done.stderr
     assert "defect" not in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+def test_no_finalizer_runs_where_a_nest_has_used_up_the_stack(tmp_path: Path) -> None:
+    depths, goes_on = [], [True]
+
+    class Garbage:  # there is always some
+        def __init__(self) -> None:
+            self.me = self
+
+        def __del__(self) -> None:
+            depths.append(sum(1 for _ in traceback.walk_stack(None)))
+            if goes_on:
+                Garbage()
+
+    (tmp_path / "nest.toml").write_text("x = " + "[" * 5000 + "]" * 5000)
+    thresholds = gc.get_threshold()
+    gc.set_threshold(20)
+    try:
+        Garbage()
+        with pytest.raises(ValueError, match="nested too deeply"):
+            read_toml(tmp_path / "nest.toml")
+    finally:
+        gc.set_threshold(*thresholds)
+        goes_on.clear()
+    gc.collect()
+    assert depths and max(depths) < 200
+    assert gc.isenabled()
 
 
 @pytest.mark.parametrize("option", ["--time-limit", "--limit"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import tomllib
 from datetime import date, datetime, time
 from pathlib import Path
@@ -12,10 +13,15 @@ DEEPEST = 50  # tables in tables
 
 def read_toml(file: Path) -> dict[str, Toml]:
     """What a file holds. OSError, or ValueError of its text, its TOML, its depth and its numbers."""
+    text, collects = file.read_text(encoding="utf-8"), gc.isenabled()
+    gc.disable()  # a finalizer that ran where brackets have used up the stack would fail
     try:
-        said: dict[str, Toml] = tomllib.loads(file.read_text(encoding="utf-8"))
+        said: dict[str, Toml] = tomllib.loads(text)
     except RecursionError:
         raise ValueError("it is nested too deeply") from None
+    finally:
+        if collects:
+            gc.enable()
     waiting: list[tuple[Toml, str, int]] = [(said, "", 0)]
     while waiting:
         part, name, depth = waiting.pop()
