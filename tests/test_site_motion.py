@@ -306,7 +306,7 @@ def test_dragging_zooms_into_a_chart_and_writes_the_address(driver, site):
     wait_for(
         driver,
         f"(() => {{const top = {box}.querySelector('.nsewdrag').getBoundingClientRect().top, stood = window.stood === top;"
-        " window.stood = top; return stood})()",
+        " window.still = stood ? (window.still || 0) + 1 : 0; window.stood = top; return window.still >= 3})()",
     )
     where = driver.execute_script(
         f"const r = {box}.querySelector('.nsewdrag').getBoundingClientRect(); return [r.left, r.top, r.width, r.height]"
