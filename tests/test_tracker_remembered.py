@@ -86,6 +86,17 @@ def test_what_a_clock_ended_is_asked_again() -> None:
     assert engine.runs == 2
 
 
+def test_no_more_is_kept_than_a_worker_can_hold(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(remembered, "MOST_KEPT", 3 * 101 * 3 * 8)  # three traces of a place
+    engine = Counted()
+    asked = Remembered(engine)
+    for _ in range(2):
+        for height in range(5):
+            asked(falling(height), observe=TRACED, **STEPS)
+
+    assert engine.runs == 5 + 2
+
+
 def test_another_test_begins_with_nothing() -> None:
     engine = Counted()
     for name in ("one", "one", "two", "one"):

@@ -23,6 +23,7 @@ Option = float | bool | None | Method | Mapping[str, Observable]  # of a simulat
 
 WORTH = 2e-3  # s that a run takes; what is shorter is run again sooner than it is found
 MOST_BYTES = 1 << 23  # of one run's observables
+MOST_KEPT = 1 << 27  # bytes of those of all runs of a test, beside what a worker may use
 HOW = ("time_limit", "time_stages")  # options that say how a run is watched, not what it is
 
 
@@ -34,6 +35,7 @@ class Remembered:
     kept: dict[tuple[Option, ...], list[tuple[bytes, Result]]] = field(
         default_factory=dict
     )  # by what is cheap to compare
+    size: int = 0  # bytes
 
     def __call__(self, scene: Scene, **options: Option) -> Result:
         if not isinstance(scene, Scene):
@@ -44,10 +46,11 @@ class Remembered:
         if known and (found := dict(known).get(_bytes(scene, asked))) is not None:
             return _copy(found)
         result = self.simulate(scene, **options)
-        if result.status != "timed_out" and result.seconds > WORTH and _size(result) <= MOST_BYTES:
-            key = _bytes(scene, asked)
-            if key:
-                self.kept.setdefault(place, []).append((key, _copy(result)))
+        size = _size(result)
+        worth = result.status != "timed_out" and result.seconds > WORTH and size <= MOST_BYTES
+        if worth and self.size + size <= MOST_KEPT and (key := _bytes(scene, asked)):
+            self.kept.setdefault(place, []).append((key, _copy(result)))
+            self.size += size
         return result
 
 

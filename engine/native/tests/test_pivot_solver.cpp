@@ -159,6 +159,26 @@ void nothing_silent_about_nan() {
     EXPECT(!report.finite || !report.converged || std::isnan(system.velocity[0][2]));
 }
 
+/// Systems that a step solves in turn are analysed once each, with the bits that each has alone.
+void graphs_of_the_last_solves_are_kept() {
+    const auto corners = [](std::size_t count) {
+        MixedSystem system = four_corners(0.1);
+        system.rows.resize(count);
+        return system;
+    };
+    PivotSolver solver;
+    for (int turn = 0; turn < 5; ++turn)
+        for (std::size_t count = 1; count <= 4; ++count) {
+            MixedSystem system = corners(count), alone = corners(count);
+            EXPECT(solver.solve(system).converged);
+            PivotSolver().solve(alone);
+            EXPECT(system.velocity == alone.velocity);
+            for (std::size_t k = 0; k < count; ++k)
+                EXPECT(system.rows[k].multiplier == alone.rows[k].multiplier);
+        }
+    EXPECT(solver.analyses() == 4);
+}
+
 }  // namespace
 
 int main() {
@@ -166,6 +186,7 @@ int main() {
     four_rigid_corners_share_the_load();
     the_share_does_not_depend_on_where_the_search_begins();
     a_kept_factor_gives_the_same_answer();
+    graphs_of_the_last_solves_are_kept();
     a_contradiction_of_rounding_ends_the_search();
     nothing_silent_about_nan();
     return report();

@@ -223,9 +223,9 @@ double time_of_impact(const Mover& first, const Mover& second, double duration, 
     const double first_far = far + turning_arm(second.shape, second.part),
                  second_far = far + turning_arm(first.shape, first.part);
     const Vec3 approach = second.velocity - first.velocity;
-    // A ball beside its body's centre is one that joints may lead straight on: it only seems to circle away.
     const double fastest =
         norm(approach) + turning_speed(first, first_far) + turning_speed(second, second_far);
+    // A ball beside its body's centre is one that joints may lead straight on: it only seems to circle away.
     const auto on_arm = [](const Mover& mover) {
         return mover.shape.kind == ShapeKind::sphere && norm(mover.part.position) > 0.0;
     };

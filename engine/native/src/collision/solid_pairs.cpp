@@ -13,12 +13,6 @@
 
 namespace spook {
 
-namespace {
-
-using namespace tolerances::solid_pairs;
-
-}  // namespace
-
 Solid::Solid(const Primitive& primitive, const Pose& at) noexcept
     : shape(primitive.kind == ShapeKind::hull ? *primitive.hull : cube()), rotation(at.rotation) {
     const bool box = primitive.kind == ShapeKind::box;
@@ -31,6 +25,8 @@ Solid::Solid(const Primitive& primitive, const Pose& at) noexcept
 }
 
 namespace {
+
+using namespace tolerances::solid_pairs;
 
 /// The face of `one` that the other lies farthest beyond; `sign` turns its normal from second to first.
 SolidAxes::Best best_face(const Solid& one, const Solid& other, double sign) noexcept {
@@ -62,10 +58,6 @@ struct Inward {
         for (int k = 0; k < count; ++k) found[k] = x[k] * v.x + y[k] * v.y + z[k] * v.z;
     }
 };
-
-}  // namespace
-
-namespace {
 
 Vec3 middle(const Solid& solid) noexcept {
     Vec3 sum;

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "rigid/joint_pulls.hpp"
 #include "rigid/rigid_system.hpp"
 #include "rigid/tolerances.hpp"
 
@@ -46,27 +47,16 @@ bool is_taut(const JointBlock& block, const JointSet::State& state, bool second,
 
 /// h²/4 K of every constrained body, from the forces of the step before.
 void RigidSystem::add_geometric_stiffness() {
-    const auto blocks = joints_.blocks();
     std::fill(stiffness_.begin(), stiffness_.end(), Mat3{});
-    for (std::size_t k = 0; k < blocks.size(); ++k) {
-        if (blocks[k].axial) continue;
-        const JointSet::State& state = joints_.states[blocks[k].joint];
-        const double* rows = jacobian(static_cast<int>(k), true);
-        Vec3 impulse;  // on the second body
-        for (int i = 0; i < blocks[k].size; ++i, rows += 6)
-            impulse += state.multiplier[i] * Vec3{rows[0], rows[1], rows[2]};
-        for (const bool second : {false, true}) {
-            const int body = second ? blocks[k].second : blocks[k].first;
-            if (body < 0 || solver_index_[body] < 0 || constants_[body].particle) continue;
-            const Vec3 arm = second ? state.second_reach : state.first_reach;
-            const double pull = (second ? 1.0 : -1.0) * dot(arm, impulse), length2 = dot(arm, arm);
-            if (!(pull > 0.0) || length2 == 0.0) continue;
-            Mat3& held = stiffness_[solver_index_[body]];
-            for (int i = 0; i < 3; ++i)
-                for (int j = 0; j < 3; ++j)
-                    held(i, j) += 0.25 * h_ * pull * ((i == j ? 1.0 : 0.0) - arm[i] * arm[j] / length2);
-        }
-    }
+    const auto rows = [this](int k) { return jacobian(k, true); };
+    each_pull(joints_, solver_index_, constants_, rows, [this](int body, Vec3 arm, Vec3 impulse) {
+        const double pull = dot(arm, impulse), length2 = dot(arm, arm);
+        if (!(pull > 0.0) || length2 == 0.0) return;
+        Mat3& held = stiffness_[solver_index_[body]];
+        for (int i = 0; i < 3; ++i)
+            for (int j = 0; j < 3; ++j)
+                held(i, j) += 0.25 * h_ * pull * ((i == j ? 1.0 : 0.0) - arm[i] * arm[j] / length2);
+    });
 }
 
 /// The forces at the start, which the stiffness of the first step is made of. The first round knows none and moves

@@ -16,6 +16,7 @@
 #include <cstdio>
 #include <limits>
 
+#include "rigid/joint_pulls.hpp"
 #include "rigid/joint_spring_kicks.hpp"
 #include "rigid/rigid_system.hpp"
 #include "rigid/rotors.hpp"
@@ -68,26 +69,11 @@ double RigidSystem::tension_rate(double allowed) {
     going = live_.bodies;
     read_composition();
     live_.bodies.swap(going);
-    const auto blocks = joints_.blocks();
-    const auto each_arm = [&](const auto& look) {  // (body, arm, force that pulls at it)
-        for (std::size_t k = 0; k < blocks.size(); ++k) {
-            if (blocks[k].axial) continue;
-            const JointSet::State& state = joints_.states[blocks[k].joint];
-            const double* rows = jacobian(static_cast<int>(k), true);
-            Vec3 force;  // on the second body
-            for (int i = 0; i < blocks[k].size; ++i, rows += 6)
-                force += (state.multiplier[i] / h_) * Vec3{rows[0], rows[1], rows[2]};
-            for (const bool second : {false, true}) {
-                const int b = second ? blocks[k].second : blocks[k].first;
-                if (b < 0 || solver_index_[b] < 0 || constants_[b].particle) continue;
-                look(b, second ? state.second_reach : state.first_reach, second ? force : -force);
-            }
-        }
-    };
+    const auto rows = [this](int k) { return jacobian(k, true); };
     std::vector<double>& rates = scratch_.rates;
     rates.assign(constants_.size(), 0.0);
-    each_arm([&](int b, Vec3 arm, Vec3 force) {
-        const double pull = dot(arm, force), length2 = dot(arm, arm);
+    each_pull(joints_, solver_index_, constants_, rows, [&](int b, Vec3 arm, Vec3 impulse) {
+        const double pull = dot(arm, impulse) / h_, length2 = dot(arm, arm);
         if (!(pull > 0.0) || length2 == 0.0) return;
         const Vec3 inertia = constants_[b].inertia;
         // Of the two axes across the arm the easier one; the third, along a slender body, turns freely.
@@ -103,14 +89,15 @@ double RigidSystem::tension_rate(double allowed) {
     // Each body by itself would shake so; joints may tie light ones to heavy ones. The fastest turning that joints allow, by power
     // iteration of M⁻¹ K, with K of the forces on its arms, from a start in which light bodies turn most.
     stiffness_.assign(constrained_.size(), Mat3{});
-    each_arm([&](int b, Vec3 arm, Vec3 force) {
+    each_pull(joints_, solver_index_, constants_, rows, [&](int b, Vec3 arm, Vec3 impulse) {
+        const Vec3 force = (1.0 / h_) * impulse;
         Mat3& held = stiffness_[solver_index_[b]];
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j < 3; ++j)
                 held(i, j) +=
                     (i == j ? dot(force, arm) : 0.0) - 0.5 * (force[i] * arm[j] + arm[i] * force[j]);
     });
-    const int row_blocks = static_cast<int>(blocks.size());
+    const int row_blocks = static_cast<int>(joints_.blocks().size());
     std::vector<Vec3> turn;
     for (const int i : constrained_) {
         const Vec3 own = constants_[i].inertia;
