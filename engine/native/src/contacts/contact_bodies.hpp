@@ -6,6 +6,7 @@
 
 #include "collision/detection.hpp"
 #include "contacts/contact_material.hpp"
+#include "contacts/contact_options.hpp"
 #include "contacts/tolerances.hpp"
 #include "linear/shared_values.hpp"
 
@@ -64,6 +65,13 @@ struct ContactSurfaces {
     bool conveys = false;                            // some surface moves along itself
     bool oriented = false;                           // some friction differs with the direction
     bool resists_turning = false, rebounds = false;  // some surface does
+};
+
+/// What a scene says of contacts, and how they are to be solved.
+struct ContactModel {
+    ContactBodies bodies;
+    ContactSurfaces surfaces;
+    ContactOptions options;
 };
 
 }  // namespace spook

@@ -17,7 +17,6 @@ namespace {
 
 bool by_key(const Contact& a, const Contact& b) noexcept { return a.key < b.key; }
 bool round_or_plane(const Primitive& shape) noexcept { return !shape.faceted(); }
-using namespace tolerances::contact_detect;
 
 }  // namespace
 
@@ -48,64 +47,51 @@ bool ContactStage::reachable(const Contact& contact) const {
     const std::vector<double>& radius = detection_.radius();
     const Vec3 n = contact.point.normal;
     auto speed = [&](int b) {
-        const Vec6 free = sum(velocity_[b], dv_ext_[b]);
-        const double spin = std::max(norm(angular(velocity_[b])), norm(angular(free)));
-        return std::max(std::abs(dot(n, linear(velocity_[b]))), std::abs(dot(n, linear(free)))) +
+        const Vec6 free = sum(motion_.velocity[b], motion_.dv_ext[b]);
+        const double spin = std::max(norm(angular(motion_.velocity[b])), norm(angular(free)));
+        return std::max(std::abs(dot(n, linear(motion_.velocity[b]))), std::abs(dot(n, linear(free)))) +
                spin * radius[b];
     };
-    return contact.point.gap <= options_.time_step * (speed(contact.first) + speed(contact.second)) +
-                                    closed * bodies_->size(contact);
+    return contact.point.gap <= model_->options.time_step * (speed(contact.first) + speed(contact.second)) +
+                                    closed * model_->bodies.size(contact);
 }
 
 bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6>& velocity,
                           const std::vector<Vec6>& free_velocity) {
-    const std::size_t bodies = bodies_->count();
-    poses_ = poses;
-    velocity_ = velocity;
-    dv_ext_.resize(bodies);
-    for (std::size_t b = 0; b < bodies; ++b) dv_ext_[b] = sum(free_velocity[b], velocity[b], -1.0);
-    whole_dv_ext_ = dv_ext_;
-    drive_.begin(*bodies_, *surfaces_, velocity);
+    const std::size_t bodies = model_->bodies.count();
+    motion_.begin(poses, velocity, free_velocity);
     projector_.begin_step();
     // By island, of which there may be as many as bodies, however late; a copy of the stage has no room for them.
     arrays_.sums.reserve(bodies);
-    std::fill(toi_fraction_.begin(), toi_fraction_.end(), 0.0);
-    std::fill(event_time_.begin(), event_time_.end(), -1.0);
     std::fill(depth_.begin(), depth_.end(), 0.0);
     std::fill(predicted_sinking_.begin(), predicted_sinking_.end(), 0.0);
     correction_.clear();
     points_.clear();
-    extras_.clear();
     woken_.clear();
     impact_needed_ = plastic_first_ = false;
     iterating_ = ran_away_ = false;  // of a step that was taken back, or is over
     impact_rounds_ = 0;
-    if (surfaces_->rebounds || options_.impacts == ImpactOrder::successive)
+    if (model_->surfaces.rebounds || model_->options.impacts == ImpactOrder::successive)
         clock_.assign(bodies, 0.0), path_.assign(bodies, Vec6{}), in_order_.assign(bodies, 0);
 
-    margins_.begin(*bodies_, options_.time_step, velocity, free_velocity,
-                   options_.solver == SolverKind::iterative || options_.impacts == ImpactOrder::successive);
-    supported_.begin(bodies);
+    margins_.begin(model_->bodies, model_->options.time_step, velocity, free_velocity,
+                   model_->options.solver == SolverKind::iterative ||
+                       model_->options.impacts == ImpactOrder::successive);
     find_open();
-    supported_.find(*bodies_);
-    predicted_.resize(bodies);
-    for (std::size_t b = 0; b < bodies; ++b)
-        predicted_[b] = supported_[b] || bodies_->jointed[b] || bodies_->solver_index[b] < 0
-                            ? velocity[b]
-                            : free_velocity[b];
-    const std::size_t closed_points = points_.size();
+    motion_.predict(free_velocity);
+    const std::size_t closed_points = points_.all.size();
     if (!state_.initial_penetration_known) note_initial_penetrations();
-    if (find_impacts(predicted_, false) > 0) {
+    if (find_impacts(motion_.predicted, false) > 0) {
         find_events();
-        move_impacts_to_start(closed_points, predicted_);
+        move_impacts_to_start(closed_points, motion_.predicted);
     }
-    if (points_.empty()) {
+    if (points_.all.empty()) {
         state_.cache.points.clear();
         return false;
     }
-    state_.counters.contacts += points_.size();
-    apply_half_of_forces();
-    order_points();
+    state_.counters.contacts += points_.all.size();
+    motion_.apply_half_of_forces();
+    points_.order(state_.cache, model_->surfaces.resists_turning);
     measure_points();
     return true;
 }
@@ -113,8 +99,8 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
 /// Takes down how deep pairs overlap where the run begins: nothing but the scene has brought them there.
 void ContactStage::note_initial_penetrations() {
     state_.initial_penetration_known = true;
-    for (const Point& point : points_) {
-        const double excess = -point.contact.point.gap - elastic_depth(*bodies_, point);
+    for (const Point& point : points_.all) {
+        const double excess = -point.contact.point.gap - elastic_depth(model_->bodies, point);
         if (!(excess > 0.0)) continue;
         double& given = state_.initial_penetration[point.contact.key >> feature_bits];
         given = std::max(given, excess);
@@ -124,13 +110,13 @@ void ContactStage::note_initial_penetrations() {
 /// Pairs near enough to meet: the closed ones get points, the others are open. Pairs that have points are known.
 void ContactStage::find_open() {
     open_.clear();
-    look_at(detection_.near(poses_, margins_.search()));
+    look_at(detection_.near(motion_.poses, margins_.search()));
 }
 
 /// The same where the search has been widened for some bodies since: what is new is theirs.
 void ContactStage::find_open_again() {
     if (!detection_.near_again(margins_.grown(), margins_.search(), near_)) {
-        changed_.assign(bodies_->solver_index.size(), 1);
+        changed_.assign(model_->bodies.count(), 1);
         return find_open();
     }
     for (const int body : margins_.grown()) changed_[body] = 1;
@@ -141,12 +127,12 @@ void ContactStage::find_open_again() {
 }
 
 void ContactStage::look_at(const std::vector<IndexPair>& near) {
-    const double h = options_.time_step;
+    const double h = model_->options.time_step;
     known_.clear();
     open_.bodies.clear();
-    const std::size_t before = points_.size();
+    const std::size_t before = points_.all.size();
     const auto unmet = static_cast<std::ptrdiff_t>(open_.pairs.size());
-    for (const Point& point : points_) known_.push_back(point.contact.key >> feature_bits);
+    for (const Point& point : points_.all) known_.push_back(point.contact.key >> feature_bits);
     std::sort(known_.begin(), known_.end());
     for (std::size_t k = 0; k < near.size(); ++k) {
         const IndexPair& pair = near[k];
@@ -162,7 +148,7 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
         const OpenPair open = opened(pair, separation(first.shape, detection_.pose(pair.first), second.shape,
                                                       detection_.pose(pair.second), reach));
         if (open.apart.gap > reach && first.shape.faceted() && second.shape.faceted()) continue;
-        const double size = std::max(bodies_->radius[first.body], bodies_->radius[second.body]);
+        const double size = std::max(model_->bodies.radius[first.body], model_->bodies.radius[second.body]);
         if (round_or_plane(first.shape) && round_or_plane(second.shape) && open.apart.gap > 1e-6 * size) {
             if (open.apart.gap <= reach)
                 open_.pairs.push_back(open);  // clearly apart: no need for its points
@@ -171,7 +157,7 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
         scratch_.clear();
         detection_.collide_pair(pair, reach, scratch_);
         const bool touching = std::any_of(scratch_.begin(), scratch_.end(),
-                                          [this](const Contact& c) { return bodies_->is_closed(c); });
+                                          [this](const Contact& c) { return model_->bodies.is_closed(c); });
         // Any two shapes apart give a point, if they are near enough to meet; but not solids corner to corner, nor
         // where a triangle's neighbour comes first.
         const bool solids = (first.shape.faceted() && second.shape.faceted()) ||
@@ -185,26 +171,26 @@ void ContactStage::look_at(const std::vector<IndexPair>& near) {
             for (std::size_t at = i; at > 0 && by_key(scratch_[at], scratch_[at - 1]); --at)
                 std::swap(scratch_[at], scratch_[at - 1]);
         for (const Contact& contact : scratch_) {
-            const Pose &one = poses_[contact.first], &two = poses_[contact.second];
+            const Pose &one = motion_.poses[contact.first], &two = motion_.poses[contact.second];
             if (reachable(contact) &&
-                !is_turned_through(detection_, contact, one, two, velocity_, dv_ext_, h))
+                !is_turned_through(detection_, contact, one, two, motion_.velocity, motion_.dv_ext, h))
                 add_point(contact, one, two, -1.0);
         }
     }
-    for (std::size_t k = before; k < points_.size(); ++k) {
+    for (std::size_t k = before; k < points_.all.size(); ++k) {
         // As deep as a body will be when it meets the next part of what holds it.
-        const double depth = depth_at_toi(points_[k], false);
-        for (const int b : {points_[k].contact.first, points_[k].contact.second})
+        const double depth = depth_at_toi(points_.all[k], false);
+        for (const int b : {points_.all[k].contact.first, points_.all[k].contact.second})
             depth_[b] = std::max(depth_[b], depth);
     }
     if (skip_grazing(before)) std::sort(open_.pairs.begin() + unmet, open_.pairs.end(), OpenPairs::in_order);
-    for (std::size_t k = before; k < points_.size(); ++k) {
-        if (k + ahead < points_.size()) {
-            const Contact& later = points_[k + ahead].contact;
+    for (std::size_t k = before; k < points_.all.size(); ++k) {
+        if (k + ahead < points_.all.size()) {
+            const Contact& later = points_.all[k + ahead].contact;
             for (const int body : {later.first, later.second})
-                prefetch(velocity_[body]), prefetch(dv_ext_[body]);
+                prefetch(motion_.velocity[body]), prefetch(motion_.dv_ext[body]);
         }
-        supported_.note(points_[k], *bodies_, velocity_, dv_ext_);
+        motion_.supported.note(points_.all[k], model_->bodies, motion_.velocity, motion_.dv_ext);
     }
 }
 
@@ -217,42 +203,8 @@ OpenPair ContactStage::opened(const IndexPair& pair, const Separation& apart) co
 }
 
 void ContactStage::add_point(const Contact& contact, const Pose& first, const Pose& second, double toi) {
-    Point& point = points_.emplace_back();
-    point.contact = contact;
-    point.friction = surfaces_->pair(contact).friction;
-    point.first_arm = contact.point.position - first.position;
-    point.second_arm = contact.point.position - second.position;
-    point.tangent = world_tangent(contact.point.normal);
-    point.toi = toi;
-    point.begun = contact.point.gap;
-    if (surfaces_->oriented) orient(point, first, second);
+    points_.add(*model_, contact, first, second, toi);
     if (!state_.cache.asleep.empty()) state_.cache.add_sleepers(contact, woken_);
-}
-
-/// Where friction differs with the direction its bound is an ellipse about the direction's shadow on the surface. In
-/// rows stretched by mu over the smaller mu, and impulses shrunk by it, it is the smaller one's disc, and every solver
-/// sees that. The slip's work is the same in both, so what is opposite to the slip on the disc dissipates most on the
-/// ellipse, and energy is only lost. A direction that stands askew on the surface counts less, by the square of its
-/// shadow; no residual is told too small, rows being stretched, never shrunk.
-void ContactStage::orient(Point& point, const Pose& first, const Pose& second) {
-    const Contact& contact = point.contact;
-    const bool of_first = (*surfaces_)[contact.first].is_oriented();
-    const SurfaceMaterial& own = (*surfaces_)[of_first ? contact.first : contact.second];
-    const SurfaceMaterial& other = (*surfaces_)[of_first ? contact.second : contact.first];
-    const double mu = point.friction;
-    if (!own.is_oriented() || !(mu > 0.0)) return;
-    const Vec3 n = contact.point.normal, whole = (of_first ? first : second).rotation * own.direction;
-    const Vec3 shadow = whole - dot(whole, n) * n;
-    const double length = norm(shadow), across = std::sqrt(own.friction_across * other.friction);
-    if (length > vanishing) {
-        point.tangent = (1.0 / length) * shadow;
-        point.tangent = point.tangent - dot(point.tangent, n) * n;
-    }
-    const double along = std::sqrt(across * across + (mu * mu - across * across) * length * length);
-    point.friction = std::min(along, across);
-    ContactExtras& extras = extras_.own(point);
-    extras.axis_scale[0] = along / point.friction;
-    extras.axis_scale[1] = across / point.friction;
 }
 
 /// The overlap at which a pair counts as met, m. Bodies that sink while iterations have not settled meet the sides of the next
@@ -261,7 +213,7 @@ double ContactStage::slop(const OpenPair& open) const noexcept {
     const int a = open.first, b = open.second;
     const bool sides =
         have_sides(detection_.collider(open.pair.first).shape, detection_.collider(open.pair.second).shape);
-    return closed * std::max(bodies_->radius[a], bodies_->radius[b]) +
+    return closed * std::max(model_->bodies.radius[a], model_->bodies.radius[b]) +
            (sides ? 2.0 * std::max(predicted_sinking_[a], predicted_sinking_[b]) : 0.0);
 }
 
@@ -269,7 +221,7 @@ double ContactStage::slop(const OpenPair& open) const noexcept {
 /// round of time_of_impact(), without what that needs before.
 bool ContactStage::passes(const OpenPair& open, const std::vector<Vec6>& velocity) const {
     const int a = open.first, b = open.second;
-    if (event_time_[a] >= 0.0 || event_time_[b] >= 0.0) return false;
+    if (motion_.event_time[a] >= 0.0 || motion_.event_time[b] >= 0.0) return false;
     const double closing = dot(open.apart.normal, linear(velocity[b]) - linear(velocity[a]));
     double turning = 0.0;
     if (open.first_arm != 0.0 || open.second_arm != 0.0) {
@@ -279,9 +231,9 @@ bool ContactStage::passes(const OpenPair& open, const std::vector<Vec6>& velocit
         turning = first * open.first_arm + second * open.second_arm;
     }
     const double speed = std::max(0.0, closing) + turning;
-    if (!(speed * options_.time_step > open.apart.gap)) return open.apart.gap > 0.0;
+    if (!(speed * model_->options.time_step > open.apart.gap)) return open.apart.gap > 0.0;
     const double slop = this->slop(open);
-    return open.apart.gap > -0.5 * slop && !(speed * options_.time_step > open.apart.gap + slop);
+    return open.apart.gap > -0.5 * slop && !(speed * model_->options.time_step > open.apart.gap + slop);
 }
 
 }  // namespace spook

@@ -104,7 +104,7 @@ void ContactStage::share_impact(MixedSystem& hit, std::size_t joints,
     std::vector<std::pair<int, int>>& pairs =
         arrays_.impact.pairs;  // points of compounds do not come together
     const auto pair = [&](std::size_t k) {
-        const Contact& contact = points_[k].contact;
+        const Contact& contact = points_.all[k].contact;
         return std::pair{contact.first, contact.second};
     };
     pairs.clear();
@@ -124,7 +124,8 @@ void ContactStage::solve_impact(MixedSystem& hit, std::size_t joints, std::vecto
                                 FrictionModel model) {
     const std::vector<FrictionPoint>& fresh = arrays_.impact.first_friction = friction;
     const IslandRules rules = rules_of(model, true);
-    FrictionReport report = solve_islands(hit, friction, impact_solver_, options_, rules, state_.counters);
+    FrictionReport report =
+        solve_islands(hit, friction, impact_solver_, model_->options, rules, state_.counters);
     if (report.converged && is_broken(hit, joints)) {
         for (std::size_t k = joints; k < hit.rows.size(); ++k) {
             RowBlock& block = hit.rows[k];
@@ -133,7 +134,7 @@ void ContactStage::solve_impact(MixedSystem& hit, std::size_t joints, std::vecto
             block.softness[0] = impact_compliance * own_inertia(hit, block, 0);
         }
         friction = fresh;
-        report = solve_islands(hit, friction, impact_solver_, options_, rules, state_.counters);
+        report = solve_islands(hit, friction, impact_solver_, model_->options, rules, state_.counters);
     }
     bool settled = report.converged;
     std::vector<double>& asked = filled(arrays_.impact.asked, 0);
@@ -157,10 +158,12 @@ void ContactStage::solve_impact(MixedSystem& hit, std::size_t joints, std::vecto
             block.right[0] = right;
         }
         if (change <= left * fastest || again == most_again) break;
-        report = solve_islands(hit, friction, impact_solver_, options_, rules, state_.counters, &answered);
+        report =
+            solve_islands(hit, friction, impact_solver_, model_->options, rules, state_.counters, &answered);
         settled = settled && report.converged;
     }
-    const double enough = options_.solver == SolverKind::direct ? 0.0 : options_.residual_tolerance;
+    const double enough =
+        model_->options.solver == SolverKind::direct ? 0.0 : model_->options.residual_tolerance;
     if (report.finite && change > std::max(enough, tolerated * fastest)) ++state_.counters.unsettled;
     if (report.finite && !settled) judge_impact(quality_, judged(), hit, friction, model);
 }
@@ -172,14 +175,14 @@ bool ContactStage::needs_plastic_impact() {
     if (!late_impact_ || plastic_first_) return false;
     plastic_first_ = true;
     measure_points();
-    if (impact_needed_) order_points();
+    if (impact_needed_) points_.order(state_.cache, model_->surfaces.resists_turning);
     return impact_needed_;
 }
 
 /// Gives points to the impacts that were left out for an impact that does not come.
 bool ContactStage::find_deferred_impacts(const std::vector<Vec6>& velocity) {
     late_impact_ = false;
-    const std::size_t dissipated_energy = points_.size();
+    const std::size_t dissipated_energy = points_.all.size();
     if (find_impacts(velocity, true) == 0) return false;
     move_impacts_to_start(dissipated_energy, velocity);
     return true;
@@ -189,15 +192,15 @@ bool ContactStage::find_deferred_impacts(const std::vector<Vec6>& velocity) {
 const Islands& ContactStage::connected(const MixedSystem& system, std::size_t joints) const {
     arrays_.connected.begin(static_cast<int>(system.mass.size()));
     for (std::size_t k = 0; k < joints; ++k) arrays_.connected.tie(system.rows[k]);
-    for (const Point& point : points_)
-        arrays_.connected.tie(bodies_->solver_index[point.contact.first],
-                              bodies_->solver_index[point.contact.second]);
+    for (const Point& point : points_.all)
+        arrays_.connected.tie(model_->bodies.solver_index[point.contact.first],
+                              model_->bodies.solver_index[point.contact.second]);
     return arrays_.connected.find();
 }
 
 int ContactStage::island_of(const Islands& islands, const Point& point) const noexcept {
-    return islands.of_body[std::max(bodies_->solver_index[point.contact.first],
-                                    bodies_->solver_index[point.contact.second])];
+    return islands.of_body[std::max(model_->bodies.solver_index[point.contact.first],
+                                    model_->bodies.solver_index[point.contact.second])];
 }
 
 /// Whether a joint's stop takes part in impacts: it sends back what hits it, or plastic impacts are met as well.
@@ -208,13 +211,13 @@ bool ContactStage::is_hit(const RowBlock& block) const noexcept {
 /// Whether some stop is hit where contacts are to hear of it: what it sets in motion may push them, and
 /// Newton's law for it and resting rows for them would raise the energy. A stop alone is left to the resting stage.
 bool ContactStage::stop_is_hit(const MixedSystem& system) const {
-    if (points_.empty()) return false;
+    if (points_.all.empty()) return false;
     const auto hit = [this](const RowBlock& block) { return is_hit(block); };
     if (std::none_of(system.rows.begin(), system.rows.end(), hit)) return false;
-    if (impact_rounds_ > most_rounds(points_.size())) return false;
+    if (impact_rounds_ > most_rounds(points_.all.size())) return false;
     const Islands& islands = connected(system, system.rows.size());
     std::vector<char>& touched = filled(arrays_.impact.touched, islands.count);
-    for (const Point& point : points_) touched[island_of(islands, point)] = 1;
+    for (const Point& point : points_.all) touched[island_of(islands, point)] = 1;
     return std::any_of(system.rows.begin(), system.rows.end(), [&](const RowBlock& block) {
         return is_hit(block) && touched[islands.of_body[std::max(block.first, block.second)]];
     });
@@ -230,8 +233,8 @@ bool ContactStage::needs_stop_impact(const MixedSystem& system, std::size_t know
         plastic_first_ = true;  // keeps them
         find_deferred_impacts(next);
     }
-    if (points_.size() == known || !stop_is_hit(system)) return false;
-    order_points();
+    if (points_.all.size() == known || !stop_is_hit(system)) return false;
+    points_.order(state_.cache, model_->surfaces.resists_turning);
     measure_points();
     return true;
 }
@@ -251,17 +254,18 @@ void ContactStage::take_part(MixedSystem& system, std::vector<std::size_t>& hit_
         };
     std::vector<char>&touched = filled(arrays_.impact.touched, islands.count),
     &taking_part = filled(arrays_.impact.taking_part, islands.count);
-    for (const Point& point : points_) touched[island_of(islands, point)] = 1;
+    for (const Point& point : points_.all) touched[island_of(islands, point)] = 1;
     for (const std::size_t k : hit_points)
-        if (is_met(points_[k])) taking_part[island_of(islands, points_[k])] = 1;
+        if (is_met(points_.all[k])) taking_part[island_of(islands, points_.all[k])] = 1;
     for (const RowBlock& block : system.rows)
         if (is_hit(block) && touched[island(block)]) taking_part[island(block)] = 1;
-    std::erase_if(hit_points, [&](std::size_t k) { return !taking_part[island_of(islands, points_[k])]; });
+    std::erase_if(hit_points,
+                  [&](std::size_t k) { return !taking_part[island_of(islands, points_.all[k])]; });
     arrays_.joints_hit.clear();
     for (RowBlock& given : system.rows) {
         if (!taking_part[island(given)]) continue;
         given.stop.answered = is_hit(given);
-        given.stop.limit_reached = impact_rounds_ > most_rounds(points_.size());
+        given.stop.limit_reached = impact_rounds_ > most_rounds(points_.all.size());
         arrays_.joints_hit.push_back(static_cast<std::size_t>(&given - system.rows.data()));
         RowBlock& block = rows.emplace_back(given);
         for (int i = 0; i < block.size; ++i) {
@@ -289,12 +293,12 @@ void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
     ++state_.counters.impacts;
     ++impact_rounds_;
     quality_ = {};
-    const bool in_order = !clock_.empty() && impact_rounds_ <= most_rounds(points_.size());
+    const bool in_order = !clock_.empty() && impact_rounds_ <= most_rounds(points_.all.size());
     ImpactArrays& work = arrays_.impact;
     std::vector<std::size_t>& hit_points = filled(work.hit_points, 0);
     if (in_order) find_earliest_impacts(system, hit_points);
-    for (std::size_t k = 0; !in_order && k < points_.size(); ++k)
-        if (points_[k].bounce >= 0.0) hit_points.push_back(k);
+    for (std::size_t k = 0; !in_order && k < points_.all.size(); ++k)
+        if (points_.all[k].bounce >= 0.0) hit_points.push_back(k);
     MixedSystem& hit = work.hit;
     hit.mass = system.mass;
     hit.momentum = system.momentum;
@@ -308,8 +312,8 @@ void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
     auto& returned = work.returned;
     returned.assign(hit_points.size(), {});
     for (std::size_t j = 0; j < hit_points.size(); ++j) {
-        const Point& point = points_[hit_points[j]];
-        RowBlock block = row_block(point, point.friction > 0.0 ? 3 : 1);
+        const Point& point = points_.all[hit_points[j]];
+        RowBlock block = rows().row_block(point, point.friction > 0.0 ? 3 : 1);
         if (std::any_of(block.right.begin(), block.right.begin() + block.size,
                         [](double r) { return r != 0.0; }))
             pushed.push_back(hit.rows.size());
@@ -317,10 +321,10 @@ void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
         block.state[0] = point.approach < 0.0 ? RowState::free : RowState::at_lower;
         if (block.size == 3) {
             friction.push_back({static_cast<int>(hit.rows.size()), point.friction, 0.0, -1.0});
-            friction.back().anisotropic = extras_.of(point).is_anisotropic();
+            friction.back().anisotropic = points_.extras(point).is_anisotropic();
             const double slip = point.bounce > 0.0 && is_impact(point)
-                                    ? std::max((*surfaces_)[point.contact.first].tangential_restitution,
-                                               (*surfaces_)[point.contact.second].tangential_restitution)
+                                    ? std::max(model_->surfaces[point.contact.first].tangential_restitution,
+                                               model_->surfaces[point.contact.second].tangential_restitution)
                                     : 0.0;
             for (int i = 1; i < 3 && slip > 0.0; ++i)
                 block.right[i] -= returned[j][i - 1] =
@@ -330,7 +334,7 @@ void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
     }
     // No step before has anything to say about an impact: the box takes this one's own normal impulses.
     const FrictionModel model =
-        options_.friction == FrictionModel::box ? FrictionModel::scaled_box : options_.friction;
+        model_->options.friction == FrictionModel::box ? FrictionModel::scaled_box : model_->options.friction;
     share_impact(hit, joints, hit_points);
     work.start = hit, work.fresh = friction;
     solve_impact(hit, joints, friction, model);
@@ -369,7 +373,7 @@ void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
         }
     }
     for (std::size_t j = 0; j < hit_points.size(); ++j) {
-        Point& point = points_[hit_points[j]];
+        Point& point = points_.all[hit_points[j]];
         const RowBlock& block = hit.rows[joints + j];
         const double s = share[island(block)];
         double normal = block.multiplier[0];
@@ -380,43 +384,43 @@ void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
             impulse = (1.0 - s) * impulse_of(soft) + s * impulse;
         }
         point.impact += normal;
-        extras_.own(point).impact_impulse += impulse;
+        points_.own_extras(point).impact_impulse += impulse;
     }
     after_impact(system);
 }
 
 /// Impacts set bodies in motion that meet others within the same step.
 void ContactStage::after_impact(const MixedSystem& system) {
-    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b)
-        if (bodies_->solver_index[b] >= 0 && has_rows_[bodies_->solver_index[b]]) {
-            release_support(static_cast<int>(b), system.velocity[bodies_->solver_index[b]]);
-            velocity_[b] = system.velocity[bodies_->solver_index[b]];
+    for (std::size_t b = 0; b < model_->bodies.count(); ++b)
+        if (model_->bodies.solver_index[b] >= 0 && has_rows_[model_->bodies.solver_index[b]]) {
+            motion_.release_support(static_cast<int>(b), system.velocity[model_->bodies.solver_index[b]]);
+            motion_.velocity[b] = system.velocity[model_->bodies.solver_index[b]];
         }
-    std::vector<Vec6>& next = arrays_.impact.next = velocity_;
+    std::vector<Vec6>& next = arrays_.impact.next = motion_.velocity;
     for (std::size_t b = 0; b < next.size(); ++b)
-        if (bodies_->solver_index[b] >= 0 && !supported_[b] && !bodies_->jointed[b])
-            next[b] = sum(velocity_[b], dv_ext_[b]);
+        if (model_->bodies.solver_index[b] >= 0 && !motion_.supported[b] && !model_->bodies.jointed[b])
+            next[b] = sum(motion_.velocity[b], motion_.dv_ext[b]);
     changed_.assign(next.size(), 1);
-    if (margins_.outrun(*bodies_, options_.time_step, next, changed_)) find_open_again();
-    const std::size_t known = points_.size();
+    if (margins_.outrun(model_->bodies, model_->options.time_step, next, changed_)) find_open_again();
+    const std::size_t known = points_.all.size();
     const bool found = find_impacts(next, false) > 0;
     if (found) {
-        for (std::size_t k = known; k < points_.size(); ++k)
-            if (come_in_order(points_[k])) move_to_last_impact(points_[k]);
+        for (std::size_t k = known; k < points_.all.size(); ++k)
+            if (come_in_order(points_.all[k])) move_to_last_impact(points_.all[k]);
         move_impacts_to_start(known, next);
-        state_.counters.contacts += points_.size() - known;
-        order_points();
+        state_.counters.contacts += points_.all.size() - known;
+        points_.order(state_.cache, model_->surfaces.resists_turning);
     }
     measure_points();
     impact_needed_ = false;
-    const bool again = impact_rounds_ <= most_rounds(points_.size());
-    for (const Point& point : points_) {
+    const bool again = impact_rounds_ <= most_rounds(points_.all.size());
+    for (const Point& point : points_.all) {
         if (come_in_order(point))
             impact_needed_ |= again && point.bounce >= 0.0 && point.approach < -point.rounding;
         else if (impact_rounds_ < simultaneous_rounds)  // what was hit already is not hit again
             impact_needed_ |= point.impact == 0.0 && point.toi >= 0.0 && is_impact(point);
     }
-    if (!impact_needed_) lay_down();
+    if (!impact_needed_) motion_.lay_down(points_.all);
 }
 
 }  // namespace spook

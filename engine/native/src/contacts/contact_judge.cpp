@@ -171,10 +171,10 @@ void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints, co
     share.assign(bodies, 1.0);
     arrays_.shortened.begin(static_cast<int>(bodies));
     for (std::size_t k = 0; k < joints; ++k) arrays_.shortened.tie(system.rows[k]);
-    for (std::size_t k = 0; k < points_.size(); ++k)
+    for (std::size_t k = 0; k < points_.all.size(); ++k)
         if (pushes[k])
-            arrays_.shortened.tie(bodies_->solver_index[points_[k].contact.first],
-                                  bodies_->solver_index[points_[k].contact.second]);
+            arrays_.shortened.tie(model_->bodies.solver_index[points_.all[k].contact.first],
+                                  model_->bodies.solver_index[points_.all[k].contact.second]);
     const Islands& islands = arrays_.shortened.find();
     std::vector<EnergySums>& sums = arrays_.sums;
     sums.assign(islands.count, {});
@@ -182,28 +182,29 @@ void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints, co
         sums[islands.of_body[std::max(first, second)]].driven = true;
     };
     for (std::size_t k = 0; k < joints; ++k) driven(system.rows[k].first, system.rows[k].second);
-    for (std::size_t k = 0; k < points_.size(); ++k) {
-        const Point& point = points_[k];
-        if (pushes[k] &&
-            (drive_.acts_at(point.contact, *surfaces_) || surfaces_->pair(point.contact).compliance > 0.0))
-            driven(bodies_->solver_index[point.contact.first], bodies_->solver_index[point.contact.second]);
+    for (std::size_t k = 0; k < points_.all.size(); ++k) {
+        const Point& point = points_.all[k];
+        if (pushes[k] && (motion_.drive.acts_at(point.contact, model_->surfaces) ||
+                          model_->surfaces.pair(point.contact).compliance > 0.0))
+            driven(model_->bodies.solver_index[point.contact.first],
+                   model_->bodies.solver_index[point.contact.second]);
     }
     std::vector<Vec6>& free = arrays_.free_velocity;
     free = system.momentum;
     for (std::size_t u = 0; u < bodies; ++u)
         if (islands.of_body[u] >= 0) solve_six(factor_six(system.mass[u]), free[u]);
-    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b) {
-        const int u = bodies_->solver_index[b];
+    for (std::size_t b = 0; b < model_->bodies.count(); ++b) {
+        const int u = model_->bodies.solver_index[b];
         if (u < 0 || islands.of_body[u] < 0) continue;
         const Vec6 by_contacts = sum(system.velocity[u], free[u], -1.0),
-                   kick = sum(free[u], velocity_[b], -1.0);
+                   kick = sum(free[u], motion_.velocity[b], -1.0);
         EnergySums& own = sums[islands.of_body[u]];
         for (int i = 0; i < 6; ++i)
             for (int j = 0; j < 6; ++j) {
                 const double m = system.mass[u][6 * i + j];
                 if (m == 0.0) continue;
                 own.square += 0.5 * m * by_contacts[i] * by_contacts[j];
-                own.linear += m * by_contacts[i] * velocity_[b][j];
+                own.linear += m * by_contacts[i] * motion_.velocity[b][j];
                 own.fall += 0.5 * m * kick[i] * kick[j];
             }
     }

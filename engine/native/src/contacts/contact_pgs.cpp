@@ -18,23 +18,23 @@ using namespace tolerances::contact_pgs;
 
 /// Gives the PGS solver the points it does not have yet.
 void ContactStage::hand_over() {
-    const double h = options_.time_step;
-    for (std::size_t k = handed_over_; k < points_.size(); ++k)
-        pgs_.announce(bodies_->solver_index[points_[k].contact.first],
-                      bodies_->solver_index[points_[k].contact.second]);
+    const double h = model_->options.time_step;
+    for (std::size_t k = handed_over_; k < points_.all.size(); ++k)
+        pgs_.announce(model_->bodies.solver_index[points_.all[k].contact.first],
+                      model_->bodies.solver_index[points_.all[k].contact.second]);
     pgs_.arrange();
-    for (; handed_over_ < points_.size(); ++handed_over_) {
-        Point& point = points_[handed_over_];
-        if (handed_over_ + ahead < points_.size()) {
-            const Contact& later = points_[handed_over_ + ahead].contact;
+    for (; handed_over_ < points_.all.size(); ++handed_over_) {
+        Point& point = points_.all[handed_over_];
+        if (handed_over_ + ahead < points_.all.size()) {
+            const Contact& later = points_.all[handed_over_ + ahead].contact;
             for (const int body : {later.first, later.second})
-                prefetch(velocity_[body]), prefetch(dv_ext_[body]);
+                prefetch(motion_.velocity[body]), prefetch(motion_.dv_ext[body]);
         }
-        const PairMaterial material = surfaces_->pair(point.contact);
-        const ContactExtras& extras = extras_.of(point);
+        const PairMaterial material = model_->surfaces.pair(point.contact);
+        const ContactExtras& extras = points_.extras(point);
         PgsContact row;
-        row.first = bodies_->solver_index[point.contact.first];
-        row.second = bodies_->solver_index[point.contact.second];
+        row.first = model_->bodies.solver_index[point.contact.first];
+        row.second = model_->bodies.solver_index[point.contact.second];
         row.normal = point.contact.point.normal;
         row.tangent = extras.axis_scale[0] * point.tangent;
         row.across = extras.axis_scale[1] * cross(row.normal, point.tangent);
@@ -47,13 +47,13 @@ void ContactStage::hand_over() {
         row.normal_before = point.before;
         row.impulse[0] = point.solved ? point.normal : std::max(0.0, point.before);
         for (int i = 0; i < 2; ++i) row.impulse[i + 1] = point.tangents[i] / extras.axis_scale[i];
-        if (surfaces_->conveys || row.first < 0 || row.second < 0) {
+        if (model_->surfaces.conveys || row.first < 0 || row.second < 0) {
             const Vec3 directions[3] = {row.normal, row.tangent, row.across};
             for (int i = 0; i < 3; ++i)
-                row.right[i] = -relative_velocity(point, directions[i], drive_.prescribed());
-            for (int i = 1; i < 3; ++i) row.right[i] -= surface_speed(point, directions[i]);
+                row.right[i] = -relative_velocity(point, directions[i], motion_.drive.prescribed());
+            for (int i = 1; i < 3; ++i) row.right[i] -= motion_.surface_speed(point, directions[i]);
         }
-        row.right[0] += resting_right(point);
+        row.right[0] += rows().resting_right(point);
         pgs_.add(row);
     }
 }
@@ -61,11 +61,11 @@ void ContactStage::hand_over() {
 /// How much deeper into what supports them bodies would go with the velocities so far.
 void ContactStage::predict_sinking() {
     std::fill(predicted_sinking_.begin(), predicted_sinking_.end(), 0.0);
-    for (const Point& point : points_) {
+    for (const Point& point : points_.all) {
         if (point.toi >= 0.0) continue;
         const Contact& contact = point.contact;
         const double closing = -relative_velocity(point, contact.point.normal, next_);
-        const double sinking = options_.time_step * closing - std::max(0.0, contact.point.gap);
+        const double sinking = model_->options.time_step * closing - std::max(0.0, contact.point.gap);
         for (const int b : {contact.first, contact.second})
             predicted_sinking_[b] = std::max(predicted_sinking_[b], sinking);
     }
@@ -74,22 +74,22 @@ void ContactStage::predict_sinking() {
 /// Pairs that meet because of what the iterations have found so far get rows in the same solve.
 bool ContactStage::find_more(bool over) {
     const bool first = next_.empty();  // look of this step
-    if (first) next_ = velocity_;
+    if (first) next_ = motion_.velocity;
     // On the way bodies are skipped at the sides of others that they do meet in the end, and need not have changed since.
     const bool was_settling = std::exchange(iterating_, !over);
-    const bool all = first || (was_settling && over && bodies_->swings);
-    changed_.assign(bodies_->solver_index.size(), all);
+    const bool all = first || (was_settling && over && model_->bodies.swings);
+    changed_.assign(model_->bodies.count(), all);
     pgs_.visit_moved([&](int moving) {
-        const int b = bodies_->body_of[moving];
+        const int b = model_->bodies.body_of[moving];
         const Vec6& now = pgs_.velocity(moving);
         changed_[b] = all || next_[b] != now;
         next_[b] = now;
     });
-    if (margins_.outrun(*bodies_, options_.time_step, next_, changed_)) find_open_again();
-    if (bodies_->swings) predict_sinking();
-    const std::size_t known = points_.size();
+    if (margins_.outrun(model_->bodies, model_->options.time_step, next_, changed_)) find_open_again();
+    if (model_->bodies.swings) predict_sinking();
+    const std::size_t known = points_.all.size();
     const bool turned = find_turned(next_);
-    const std::size_t dissipated_energy = points_.size();
+    const std::size_t dissipated_energy = points_.all.size();
     if (find_impacts(next_, true) > 0) move_impacts_to_start(dissipated_energy, next_);
     else if (!turned) return false;
     take_in(known);
@@ -98,9 +98,9 @@ bool ContactStage::find_more(bool over) {
 
 /// Hands the points found since `known` to the PGS solver, with what they did in the step before.
 void ContactStage::take_in(std::size_t known) {
-    state_.counters.contacts += points_.size() - known;
-    for (std::size_t k = known; k < points_.size(); ++k) {
-        Point& point = points_[k];
+    state_.counters.contacts += points_.all.size() - known;
+    for (std::size_t k = known; k < points_.all.size(); ++k) {
+        Point& point = points_.all[k];
         const CachedContact* const old = state_.cache.find(point.contact.key);
         if (old == nullptr) continue;
         point.before = std::max(0.0, old->normal);
@@ -115,13 +115,14 @@ ContactStage::PgsEnd ContactStage::judge_pgs(MixedSystem& system) {
     quality_.body = -1;
     quality_.by = 0.0;
     if (!system.rows.empty()) pgs_.write(system);
-    const RowsResidual contact = pgs_.worst(focus * options_.unsettled_residual, options_.unsettled_residual),
-                       joint = rows_residual(system, {}, options_.friction);
+    const RowsResidual contact = pgs_.worst(focus * model_->options.unsettled_residual,
+                                            model_->options.unsettled_residual),
+                       joint = rows_residual(system, {}, model_->options.friction);
     quality_.residual = std::max(contact.residual, joint.residual);
     if (contact.row >= 0 && contact.residual >= joint.residual) {
-        const Contact& pair = points_[contact.row].contact;
+        const Contact& pair = points_.all[contact.row].contact;
         blame(quality_, judged(), contact.residual,
-              std::max(bodies_->solver_index[pair.first], bodies_->solver_index[pair.second]));
+              std::max(model_->bodies.solver_index[pair.first], model_->bodies.solver_index[pair.second]));
     } else if (!system.rows.empty()) {
         const RowBlock& block = system.rows[joint.row];
         blame(quality_, judged(), joint.residual, std::max(block.first, block.second));
@@ -133,26 +134,26 @@ ContactStage::PgsEnd ContactStage::judge_pgs(MixedSystem& system) {
 /// contact that it stems from, each iteration's may be larger than the one before.
 bool ContactStage::runs_away(const MixedSystem& system) const {
     double speed = 0.0, had = 0.0, has = 0.0;  // of what moves as it is told, or along itself
-    for (std::size_t b = 0; drive_.any() && b < drive_.prescribed().size(); ++b)
-        speed = std::max(speed, norm(linear(drive_.prescribed()[b])) +
-                                    bodies_->radius[b] * norm(angular(drive_.prescribed()[b])));
-    for (const Point& point : points_)
-        if (surfaces_->conveys)
-            speed =
-                std::max({speed, std::abs(surface_speed(point, point.tangent)),
-                          std::abs(surface_speed(point, cross(point.contact.point.normal, point.tangent)))});
+    for (std::size_t b = 0; motion_.drive.any() && b < motion_.drive.prescribed().size(); ++b)
+        speed = std::max(speed, norm(linear(motion_.drive.prescribed()[b])) +
+                                    model_->bodies.radius[b] * norm(angular(motion_.drive.prescribed()[b])));
+    for (const Point& point : points_.all)
+        if (model_->surfaces.conveys)
+            speed = std::max(
+                {speed, std::abs(motion_.surface_speed(point, point.tangent)),
+                 std::abs(motion_.surface_speed(point, cross(point.contact.point.normal, point.tangent)))});
     const auto energy = [](const Mat6& mass, const Vec6& v) {
         double sum = 0.0;
         for (int i = 0; i < 6; ++i)
             for (int j = 0; j < 6; ++j) sum += 0.5 * v[i] * mass[6 * i + j] * v[j];
         return sum;
     };
-    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b) {
-        if (bodies_->solver_index[b] < 0) continue;
-        const Mat6& mass = system.mass[bodies_->solver_index[b]];
-        had += energy(mass, velocity_[b]) + energy(mass, sum(velocity_[b], dv_ext_[b])) +
+    for (std::size_t b = 0; b < model_->bodies.count(); ++b) {
+        if (model_->bodies.solver_index[b] < 0) continue;
+        const Mat6& mass = system.mass[model_->bodies.solver_index[b]];
+        had += energy(mass, motion_.velocity[b]) + energy(mass, sum(motion_.velocity[b], motion_.dv_ext[b])) +
                mass[0] * speed * speed;
-        has += energy(mass, pgs_.velocity(bodies_->solver_index[b]));
+        has += energy(mass, pgs_.velocity(model_->bodies.solver_index[b]));
     }
     return !(has <= too_much * had);
 }
@@ -160,17 +161,17 @@ bool ContactStage::runs_away(const MixedSystem& system) const {
 /// The islands of the points, and which of them have points from `known` on: no solve has answered those yet.
 const ContactStage::Unanswered& ContactStage::find_unanswered(std::size_t bodies, std::size_t known) {
     arrays_.connected.begin(static_cast<int>(bodies));
-    for (const Point& point : points_)
-        arrays_.connected.tie(bodies_->solver_index[point.contact.first],
-                              bodies_->solver_index[point.contact.second]);
+    for (const Point& point : points_.all)
+        arrays_.connected.tie(model_->bodies.solver_index[point.contact.first],
+                              model_->bodies.solver_index[point.contact.second]);
     const Islands& islands = arrays_.connected.find();
     Unanswered& found = unanswered_;
     found.open.assign(islands.count, 0);
     found.points.assign(islands.count, 0);
     found.island.clear();
     found.largest = 0;
-    for (std::size_t k = 0; k < points_.size(); ++k) {
-        found.island.push_back(island_of(islands, points_[k]));
+    for (std::size_t k = 0; k < points_.all.size(); ++k) {
+        found.island.push_back(island_of(islands, points_.all[k]));
         ++found.points[found.island[k]];
         if (k >= known) found.open[found.island[k]] = 1;
     }
@@ -183,13 +184,13 @@ const ContactStage::Unanswered& ContactStage::find_unanswered(std::size_t bodies
 /// nearly all of them at a fraction of the cost, and the next solve starts from where they end. Islands that an earlier
 /// solve has answered, and no new point ties to others, stay as they are to the last bit.
 void ContactStage::warm_start_by_pgs(MixedSystem& system, std::size_t known, int round) {
-    if (surfaces_->resists_turning) return;  // PGS over contacts knows no such friction
-    if (points_.size() <= few_points && round < many_rounds) return;
+    if (model_->surfaces.resists_turning) return;  // PGS over contacts knows no such friction
+    if (points_.all.size() <= few_points && round < many_rounds) return;
     if (find_unanswered(system.mass.size(), known).largest <= few_points && round < many_rounds) return;
     double speed = 0.0;
     for (const Vec6& v : system.velocity) speed = std::max(speed, norm(linear(v)));
     system.rows.clear();
-    pgs_.start(system, options_.friction);
+    pgs_.start(system, model_->options.friction);
     next_.clear();
     handed_over_ = 0;
     hand_over();
@@ -202,33 +203,34 @@ void ContactStage::warm_start_by_pgs(MixedSystem& system, std::size_t known, int
     if (!report.finite) return;
     warm_started_ = true;
     const Unanswered& islands = find_unanswered(system.mass.size(), known);
-    for (std::size_t k = 0; k < points_.size(); ++k) {
+    for (std::size_t k = 0; k < points_.all.size(); ++k) {
         if (!islands.open[islands.island[k]]) continue;
-        Point& point = points_[k];
+        Point& point = points_.all[k];
         const double* impulse = pgs_.impulse(static_cast<int>(k));
         point.solved = true;
         point.normal = impulse[0];
-        for (int i = 0; i < 2; ++i) point.tangents[i] = impulse[i + 1] * extras_.of(point).axis_scale[i];
+        for (int i = 0; i < 2; ++i) point.tangents[i] = impulse[i + 1] * points_.extras(point).axis_scale[i];
     }
 }
 
 ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
-    pgs_.start(system, options_.friction);
+    pgs_.start(system, model_->options.friction);
     next_.clear();
     late_impact_ = false;
     handed_over_ = 0;
     hand_over();
     iterating_ = false;
-    const std::size_t begun = points_.size();
+    const std::size_t begun = points_.all.size();
     FrictionReport report;
     quality_ = {};
     for (bool again = true; again;) {
         again = false;
         double last = unbounded;
-        for (int turn = 0; turn < most_turns || pgs_.work() < most_turns * options_.iterations; ++turn) {
-            report =
-                pgs_.run(options_.iterations, options_.residual_tolerance,
-                         focus * options_.unsettled_residual, [this](bool over) { return find_more(over); });
+        for (int turn = 0; turn < most_turns || pgs_.work() < most_turns * model_->options.iterations;
+             ++turn) {
+            report = pgs_.run(model_->options.iterations, model_->options.residual_tolerance,
+                              focus * model_->options.unsettled_residual,
+                              [this](bool over) { return find_more(over); });
             state_.counters.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
             PgsEnd end;
             if (report.finite) end = judge_pgs(system);
@@ -236,7 +238,7 @@ ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
             const bool grows =
                 quality_.residual > std::exchange(last, quality_.residual) && system.rows.empty();
             if (!report.finite || (grows && runs_away(system))) {
-                points_.resize(begun);  // what was met on that way is not
+                points_.all.resize(begun);  // what was met on that way is not
                 find_open();
                 ran_away_ = true;
                 return {{}, true};
@@ -250,19 +252,19 @@ ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
             break;
         }
         late_impact_ = false;  // it was one by velocities on the way
-        for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b)
-            if (bodies_->solver_index[b] >= 0) next_[b] = pgs_.velocity(bodies_->solver_index[b]);
-        changed_.assign(bodies_->solver_index.size(), 1);
-        const std::size_t known = points_.size();
+        for (std::size_t b = 0; b < model_->bodies.count(); ++b)
+            if (model_->bodies.solver_index[b] >= 0) next_[b] = pgs_.velocity(model_->bodies.solver_index[b]);
+        changed_.assign(model_->bodies.count(), 1);
+        const std::size_t known = points_.all.size();
         if (find_impacts(next_, true) > 0) move_impacts_to_start(known, next_);
         if (needs_plastic_impact() || needs_stop_impact(system, begun, next_)) return {};
         if (late_impact_) find_deferred_impacts(next_);
-        again = points_.size() > known;
+        again = points_.all.size() > known;
         if (again) take_in(known);
     }
-    if (report.finite && passes_other_ends(system, system.rows.size(), options_.time_step))
+    if (report.finite && passes_other_ends(system, system.rows.size(), model_->options.time_step))
         return {{.ends_passed = true}};
-    const std::size_t blocks = system.rows.size() + points_.size();
+    const std::size_t blocks = system.rows.size() + points_.all.size();
     const bool unsettled = quality_.body >= 0;
     const bool unfinished = report.finite && !report.converged && !system.rows.empty() &&
                             blocks <= (unsettled ? few_jointed : few_rows);
@@ -276,31 +278,34 @@ ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
         if (quality_.body < 0) blame_sunk(quality_, judged());
         std::vector<char>& pushes = arrays_.pushes;
         pushes.clear();
-        for (std::size_t k = 0; k < points_.size(); ++k) {
+        for (std::size_t k = 0; k < points_.all.size(); ++k) {
             const double* z = pgs_.impulse(static_cast<int>(k));
             pushes.push_back(std::any_of(z, z + 3, [](double each) { return each != 0.0; }));
         }
         shorten_unsettled(system, system.rows.size(), pushes, share);
     }
     mark_rows(system);  // by joints; of contacts those that push, or did in an impact
-    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b)
-        if (bodies_->solver_index[b] >= 0 && event_time_[b] >= 0.0) has_rows_[bodies_->solver_index[b]] = 1;
+    for (std::size_t b = 0; b < model_->bodies.count(); ++b)
+        if (model_->bodies.solver_index[b] >= 0 && motion_.event_time[b] >= 0.0)
+            has_rows_[model_->bodies.solver_index[b]] = 1;
     state_.cache.points.clear();
-    for (std::size_t k = 0; k < points_.size(); ++k) {
-        const Point& point = points_[k];
+    for (std::size_t k = 0; k < points_.all.size(); ++k) {
+        const Point& point = points_.all[k];
         double impulse[3];
         std::copy_n(pgs_.impulse(static_cast<int>(k)), 3, impulse);
         if (!share.empty())
             for (double& z : impulse)
-                z *= share[std::max(bodies_->solver_index[point.contact.first],
-                                    bodies_->solver_index[point.contact.second])];
+                z *= share[std::max(model_->bodies.solver_index[point.contact.first],
+                                    model_->bodies.solver_index[point.contact.second])];
         const Vec3 across = cross(point.contact.point.normal, point.tangent);
-        const double* const axis_scale = extras_.of(point).axis_scale;
-        cache_contact(system, point, impulse[0],
-                      (impulse[1] * axis_scale[0]) * point.tangent + (impulse[2] * axis_scale[1]) * across);
+        const double* const axis_scale = points_.extras(point).axis_scale;
+        const Vec3 along =
+            (impulse[1] * axis_scale[0]) * point.tangent + (impulse[2] * axis_scale[1]) * across;
+        cache_contact(rows(), system, point, impulse[0], along, state_.cache.points);
+        state_.counters.stopped += motion_.is_stopped(point, impulse[0]);
         if (impulse[0] == 0.0 && impulse[1] == 0.0 && impulse[2] == 0.0) continue;
         for (const int body : {point.contact.first, point.contact.second})
-            if (bodies_->solver_index[body] >= 0) has_rows_[bodies_->solver_index[body]] = 1;
+            if (model_->bodies.solver_index[body] >= 0) has_rows_[model_->bodies.solver_index[body]] = 1;
     }
     if (report.finite) correct_events(system);
     order_by_key(state_.cache.points, unordered_, places_);

@@ -8,7 +8,7 @@ namespace spook {
 
 void ContactStage::put_to_sleep(const std::vector<int>& bodies) {
     for (const int body : bodies) detection_.set_asleep(body, true);
-    state_.cache.put_to_sleep(bodies, bodies_->solver_index.size());
+    state_.cache.put_to_sleep(bodies, model_->bodies.count());
 }
 
 void ContactStage::wake(const std::vector<int>& bodies) {
@@ -18,7 +18,7 @@ void ContactStage::wake(const std::vector<int>& bodies) {
 
 void ContactStage::sleep_through() {
     woken_.clear();
-    points_.clear();
+    points_.all.clear();
     correction_.clear();
 }
 
@@ -26,7 +26,7 @@ void ContactStage::sleep_through() {
 void ContactStage::lie_as(const State& state) {
     woken_.clear();
     if (state_.cache.asleep.empty() && state.cache.asleep.empty()) return;
-    for (std::size_t b = 0; b < bodies_->solver_index.size(); ++b) {
+    for (std::size_t b = 0; b < model_->bodies.count(); ++b) {
         const int body = static_cast<int>(b);
         if (const bool slept = state.cache.sleeps(body); slept != state_.cache.sleeps(body))
             detection_.set_asleep(body, slept);

@@ -52,16 +52,15 @@
 #include "contacts/contact_bodies.hpp"
 #include "contacts/contact_cache.hpp"
 #include "contacts/contact_islands.hpp"
-#include "contacts/contact_options.hpp"
-#include "contacts/external_drive.hpp"
+#include "contacts/contact_points.hpp"
+#include "contacts/contact_rows.hpp"
 #include "contacts/open_pairs.hpp"
 #include "contacts/pgs_solver.hpp"
 #include "contacts/position_projection.hpp"
 #include "contacts/search_margins.hpp"
 #include "contacts/solve_islands.hpp"
 #include "contacts/solve_quality.hpp"
-#include "contacts/step_contact.hpp"
-#include "contacts/supported_bodies.hpp"
+#include "contacts/step_motion.hpp"
 #include "linear/large_array.hpp"
 
 namespace spook {
@@ -80,7 +79,7 @@ public:
     bool possible() const noexcept { return detection_.possible(); }
 
     /// Impacts of this body are met at the start of the step, like the stops of its joints, never at their own time.
-    void leave_at_start(int body) noexcept { bodies_->ball[body] = 0; }
+    void leave_at_start(int body) noexcept { model_->bodies.ball[body] = 0; }
 
     /// Finds this step's contacts. `velocity` is v and `free_velocity` v + h M⁻¹ f, one per body of the scene.
     /// False if there is none: nothing else need be called in this step, but meets() where there are joints.
@@ -97,7 +96,7 @@ public:
     bool impact_needed(const MixedSystem& system) const { return impact_needed_ || stop_is_hit(system); }
 
     /// The part of the step's forces that acts on `body` before the impact, or before the last one that hit it.
-    double toi_fraction(int body) const noexcept { return toi_fraction_[body]; }
+    double toi_fraction(int body) const noexcept { return motion_.toi_fraction[body]; }
 
     /// The impact. `system` holds mass, momentum M v₋ (v₋ with the lead of forces) and the rows of joints as for
     /// solve(), of which those take part that are connected to a point. Bilateral ones keep G v₊ + Sig lambda = 0,
@@ -148,8 +147,8 @@ public:
     const std::vector<int>& woken() const noexcept { return woken_; }
     /// A step that all bodies sleep through.
     void sleep_through();
-    const ContactBodies& bodies() const noexcept { return *bodies_; }
-    const ContactSurfaces& surfaces() const noexcept { return *surfaces_; }
+    const ContactBodies& bodies() const noexcept { return model_->bodies; }
+    const ContactSurfaces& surfaces() const noexcept { return model_->surfaces; }
 
     /// What a later step depends on: copying it back goes back.
     struct State {
@@ -187,7 +186,6 @@ private:
     using Point = StepContact;
     void add_point(const Contact& contact, const Pose& first, const Pose& second, double toi);
     void lie_as(const State& state);
-    void orient(Point& point, const Pose& first, const Pose& second);
     void find_open();
     void find_open_again();
     bool is_impact(const Point& point) const noexcept;
@@ -205,21 +203,9 @@ private:
     bool add_toi_point_at_start(const OpenPair& open, double time, const std::vector<Vec6>& velocity);
     void move_impacts_to_start(std::size_t from, const std::vector<Vec6>& velocity);
     void find_events();
-    bool is_free(std::size_t b) const noexcept { return !supported_[b] && !bodies_->jointed[b]; }
-    void apply_forces_until(std::size_t body, double part);
-    void apply_half_of_forces();
-    void lay_down();
-    bool moves_along_forces(int body) const;
-    void release_support(int body, const Vec6& velocity);
-    Vec3 free_fall_correction(int body, Vec3 after) const;
-    void order_points();
     void measure_points();
-    void measure(Point& point) const;
     bool reachable(const Contact& contact) const;
-    RowBlock row_block(const Point& point, int rows) const;
-    void add_turning_rows(const Point& point, RowBlock& block) const;
-    void add_friction(const Point& point, int block, std::vector<FrictionPoint>& friction) const;
-    double surface_speed(const Point& point, Vec3 direction) const noexcept;
+    ContactRows rows() const noexcept { return {*model_, motion_, points_}; }
     IslandRules rules_of(FrictionModel model, bool exact) const noexcept;
     const Islands& connected(const MixedSystem& system, std::size_t joints) const;
     int island_of(const Islands& islands, const Point& point) const noexcept;
@@ -230,7 +216,6 @@ private:
     void find_orderly(const Islands& islands, const std::vector<double>& first,
                       const std::vector<double>& closing);
     bool come_in_order(const Point& point) const;
-    bool is_stopped(const Point& point, double normal) const;
     void apply_forces_before(std::size_t body, double part, MixedSystem& system);
     Vec6 path_until(std::size_t body, double time) const;
     double gap_at(const Point& point, double time) const;
@@ -252,16 +237,9 @@ private:
                   const std::vector<Vec6>& velocity) const;
     bool is_internal_edge(const Mover& moving, int body, const Mover& other, const OpenPair& open,
                           const std::vector<Vec6>& velocity, double time, bool late, Vec3 facing = {}) const;
-    Pose moved(int body, const std::vector<Vec6>& velocity) const;
     Mover mover(int collider, const Pose& pose, const std::vector<Vec6>& velocity) const;
     double meeting(const OpenPair& open, const std::vector<Vec6>& velocity, bool late) const;
     bool passes(const OpenPair& open, const std::vector<Vec6>& velocity) const;
-    double resting_right(Point& point) const;
-    bool is_pressed(const Point& point) const noexcept;
-    RowBlock resting_row(Point& point) const;
-    CachedContact& cache_contact(const MixedSystem& system, const Point& point, double normal, Vec3 along);
-    double compression(const MixedSystem& system, const Point& point) const;
-    Vec3 store_solution(const RowBlock& block, Point& point);
     // contact_pgs.cpp: the same by PGS over compact contacts
     struct PgsSolveEnd : SolveEnd {
         bool unfinished =
@@ -285,7 +263,7 @@ private:
     };
     PgsEnd judge_pgs(MixedSystem& system);
     JudgedStep judged() const noexcept {
-        return {*bodies_, options_, velocity_, points_, state_.initial_penetration};
+        return {model_->bodies, model_->options, motion_.velocity, points_.all, state_.initial_penetration};
     }
     bool runs_away(const MixedSystem& system) const;
     void hand_over();
@@ -293,33 +271,26 @@ private:
                            std::vector<double>& share) const;
     void correct_events(const MixedSystem& system);
     void note_initial_penetrations();
-    double time_left(const Point& point) const noexcept;
 
     State state_;
     Detection detection_;
-    std::shared_ptr<ContactBodies> bodies_;
-    std::shared_ptr<ContactSurfaces> surfaces_;
-    ContactOptions options_;
-    ExternalDrive drive_;
+    std::shared_ptr<ContactModel> model_;
+    StepMotion motion_;
+    ContactPoints points_;
     IslandSolver resting_solver_, impact_solver_;
     PgsSolver pgs_;
     PositionProjector projector_;
-    bool ran_away_ = false;      // in this solve: islands that are not too large are solved directly
-    std::vector<Vec6> next_;     // velocities between iterations, per body of the scene
-    std::vector<char> changed_;  // bodies with another than at the look before: the rest was judged then
-    std::size_t handed_over_ = 0, ordered_ = 0;  // points the PGS solver has; points in order
+    bool ran_away_ = false;        // in this solve: islands that are not too large are solved directly
+    std::vector<Vec6> next_;       // velocities between iterations, per body of the scene
+    std::vector<char> changed_;    // bodies with another than at the look before: the rest was judged then
+    std::size_t handed_over_ = 0;  // points the PGS solver has
     Unanswered unanswered_;
     std::vector<CachedContact> unordered_;
     mutable ContactArrays arrays_;  // what is in them is of one call
 
-    std::vector<Pose> poses_;
-    std::vector<Vec6> velocity_, dv_ext_, predicted_;  // v, h M⁻¹ f, and what bodies are cast along
-    std::vector<Vec6> whole_dv_ext_;                   // the second before an impact takes its part
     OpenPairs open_;
     SearchMargins margins_;
-    SupportedBodies supported_;
     PointsOfBodies points_of_;
-    ContactExtrasOf extras_;
     std::vector<Meeting> meetings_;
     std::vector<MeetingOf> meetings_of_;     // by body and time
     std::vector<IndexPair> near_;            // where the search was widened
@@ -328,11 +299,9 @@ private:
     std::vector<Contact> scratch_;
     DisjointSets connected_;  // bodies, by contacts and joints
     std::vector<std::uint64_t> known_;
-    std::vector<double> toi_fraction_, event_time_;
     std::vector<double> clock_;  // of successive impacts: up to when a body's way in the step is known, s
     std::vector<Vec6> path_;     // and that way, m and rad
     std::vector<signed char> in_order_;  // bodies: 1 if impacts come one by one in this step, −1 if not
-    LargeArray<Point> points_, toi_points_;
     std::vector<std::pair<std::uint64_t, std::size_t>> places_;  // of points, by key
     std::vector<int> woken_;                                     // sleepers met in this step
     std::vector<char> has_rows_;                                 // moving bodies with rows, by unknown

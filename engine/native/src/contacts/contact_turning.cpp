@@ -37,31 +37,31 @@ bool ContactStage::is_known(const Contact& contact, std::size_t from, std::size_
                dot(old.point.normal, contact.point.normal) > same_direction_cosine &&
                norm(old.point.position - contact.point.position) < same_place * size;
     };
-    const auto at = [this](std::size_t k) { return points_.begin() + static_cast<std::ptrdiff_t>(k); };
-    return std::any_of(at(from), at(end), same) || std::any_of(at(ordered_), points_.end(), same);
+    const auto at = [this](std::size_t k) { return points_.all.begin() + static_cast<std::ptrdiff_t>(k); };
+    return std::any_of(at(from), at(end), same) || std::any_of(at(points_.ordered), points_.all.end(), same);
 }
 
 /// Looks where `velocity` leads the pairs that have points; true if some feature swings in and got a row.
 bool ContactStage::find_turned(const std::vector<Vec6>& velocity) {
-    if (!bodies_->swings) return false;
-    const double h = options_.time_step;
-    const std::size_t known = points_.size();
-    for (std::size_t from = 0, end = 0; from < ordered_; from = end) {
-        const std::uint64_t key = points_[from].contact.key >> feature_bits;
+    if (!model_->bodies.swings) return false;
+    const double h = model_->options.time_step;
+    const std::size_t known = points_.all.size();
+    for (std::size_t from = 0, end = 0; from < points_.ordered; from = end) {
+        const std::uint64_t key = points_.all[from].contact.key >> feature_bits;
         double depth = 0.0;
-        for (; end < ordered_ && points_[end].contact.key >> feature_bits == key; ++end)
-            depth = std::max(depth, -points_[end].contact.point.gap);
+        for (; end < points_.ordered && points_.all[end].contact.key >> feature_bits == key; ++end)
+            depth = std::max(depth, -points_.all[end].contact.point.gap);
         const IndexPair pair{static_cast<int>(key >> 24), static_cast<int>(key & 0xffffff)};
         const Collider::View one = detection_.collider(pair.first), two = detection_.collider(pair.second);
-        if (points_[from].event || (is_single(one.shape) && is_single(two.shape))) continue;
+        if (points_.all[from].event || (is_single(one.shape) && is_single(two.shape))) continue;
         const int a = one.body, b = two.body;
-        const double size = std::max(bodies_->radius[a], bodies_->radius[b]);
-        const double turning =
-            norm(angular(velocity[a])) * bodies_->radius[a] + norm(angular(velocity[b])) * bodies_->radius[b];
+        const double size = std::max(model_->bodies.radius[a], model_->bodies.radius[b]);
+        const double turning = norm(angular(velocity[a])) * model_->bodies.radius[a] +
+                               norm(angular(velocity[b])) * model_->bodies.radius[b];
         const double sliding = norm(linear(velocity[a]) - linear(velocity[b]));
         if (h * (sliding + turning) < deep * size) continue;
-        const Mover first{one.shape, one.part, poses_[a], linear(velocity[a]), angular(velocity[a])};
-        const Mover second{two.shape, two.part, poses_[b], linear(velocity[b]), angular(velocity[b])};
+        const Mover first{one.shape, one.part, motion_.poses[a], linear(velocity[a]), angular(velocity[a])};
+        const Mover second{two.shape, two.part, motion_.poses[b], linear(velocity[b]), angular(velocity[b])};
         const Pose first_end = first.body_at(h), second_end = second.body_at(h);
         scratch_.clear();
         detection_.collide_pair(pair, first_end, second_end, 0.0, scratch_);
@@ -69,19 +69,20 @@ bool ContactStage::find_turned(const std::vector<Vec6>& velocity) {
             if (contact.point.gap >= -(depth + deep * size)) continue;
             // Back to where both surfaces were at the start, half-way between them.
             const Vec3 q = contact.point.position;
-            const Vec3 on_first = apply(poses_[a], local(first_end.rotation, q - first_end.position));
-            const Vec3 on_second = apply(poses_[b], local(second_end.rotation, q - second_end.position));
+            const Vec3 on_first = apply(motion_.poses[a], local(first_end.rotation, q - first_end.position));
+            const Vec3 on_second =
+                apply(motion_.poses[b], local(second_end.rotation, q - second_end.position));
             contact.point.position = 0.5 * (on_first + on_second);
             bool named = false;
             if (is_known(contact, from, end, size, named)) continue;
             if (named) contact.key |= swung_in;
-            add_point(contact, poses_[a], poses_[b], h);
-            Point& point = points_.back();
+            add_point(contact, motion_.poses[a], motion_.poses[b], h);
+            Point& point = points_.all.back();
             const double closing = -relative_velocity(point, contact.point.normal, velocity);
             point.contact.point.gap = std::max(0.0, contact.point.gap + h * closing);
         }
     }
-    return points_.size() > known;
+    return points_.all.size() > known;
 }
 
 }  // namespace spook

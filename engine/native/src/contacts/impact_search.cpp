@@ -29,22 +29,15 @@ void put_on_mover(StepContact& point, bool first_moves, bool second_moves) noexc
 
 /// When an open pair that does not surely pass meets along `velocity`, s; negative if it does not in this step.
 double ContactStage::meeting(const OpenPair& open, const std::vector<Vec6>& velocity, bool late) const {
-    const Pose at_first = moved(open.first, velocity), at_second = moved(open.second, velocity);
+    const Pose at_first = motion_.moved(open.first, velocity),
+               at_second = motion_.moved(open.second, velocity);
     const Mover first = mover(open.pair.first, at_first, velocity),
                 second = mover(open.pair.second, at_second, velocity);
-    const double time = time_of_impact(first, second, options_.time_step, slop(open));
+    const double time = time_of_impact(first, second, model_->options.time_step, slop(open));
     if (time < 0.0 || is_internal_edge(first, open.first, second, open, velocity, time, late) ||
         is_internal_edge(second, open.second, first, open, velocity, time, late))
         return -1.0;
     return time;
-}
-
-/// Where a body begins its way of this step. An event's bodies have gone part of it with another velocity.
-Pose ContactStage::moved(int b, const std::vector<Vec6>& velocity) const {
-    Pose pose = poses_[b];
-    if (event_time_[b] >= 0.0)
-        pose.position += event_time_[b] * (linear(predicted_[b]) - linear(velocity[b]));
-    return pose;
 }
 
 /// A collider whose body goes on from `pose`, which must outlive it.
@@ -57,7 +50,7 @@ Mover ContactStage::mover(int collider, const Pose& pose, const std::vector<Vec6
 /// for an impact: if they need one, late_impact_ tells so, see needs_plastic_impact().
 int ContactStage::find_impacts(const std::vector<Vec6>& velocity, bool late) {
     meetings_.clear();
-    if (bodies_->swings && !open_.pairs.empty()) points_of_.find(points_, *bodies_);
+    if (model_->bodies.swings && !open_.pairs.empty()) points_of_.find(points_.all, model_->bodies);
     open_.drop_met(most_met);
     std::vector<std::size_t>& asked = arrays_.asked;
     asked.resize(open_.pairs.size() + 1);
@@ -76,7 +69,7 @@ int ContactStage::find_impacts(const std::vector<Vec6>& velocity, bool late) {
         if (at + ahead < count) {
             const OpenPair& later = open_.pairs[asked[at + ahead]];
             for (const int body : {later.first, later.second})
-                prefetch(poses_[body]), prefetch(dv_ext_[body]);
+                prefetch(motion_.poses[body]), prefetch(motion_.dv_ext[body]);
         }
         if ((at + 1) % pairs_a_look == 0) Watch::look();
         if (const double time = meeting(open_.pairs[asked[at]], velocity, late); !(time < 0.0))
@@ -89,7 +82,7 @@ int ContactStage::find_impacts(const std::vector<Vec6>& velocity, bool late) {
             const OpenPair& later = open_.pairs[meetings_[at + ahead].open];
             prefetch(detection_.pose(later.pair.first)), prefetch(detection_.pose(later.pair.second));
             for (const int body : {later.first, later.second})
-                prefetch(poses_[body]), prefetch(velocity[body]);
+                prefetch(motion_.poses[body]), prefetch(velocity[body]);
         }
         const auto& [k, time] = meetings_[at];
         OpenPair& open = open_.pairs[k];
@@ -98,15 +91,15 @@ int ContactStage::find_impacts(const std::vector<Vec6>& velocity, bool late) {
             ++found;
             continue;
         }
-        const Pose first = moved(open.first, velocity), second = moved(open.second, velocity);
-        const std::size_t known = points_.size();
+        const Pose first = motion_.moved(open.first, velocity), second = motion_.moved(open.second, velocity);
+        const std::size_t known = points_.all.size();
         const bool met =
             add_toi_points(open.pair, mover(open.pair.first, first, velocity).body_at(time),
                            mover(open.pair.second, second, velocity).body_at(time), time, velocity, late);
-        const Vec3 led =
-            (first.position - poses_[open.first].position) - (second.position - poses_[open.second].position);
-        for (std::size_t i = known; i < points_.size(); ++i)
-            points_[i].begun -= dot(points_[i].contact.point.normal, led);
+        const Vec3 led = (first.position - motion_.poses[open.first].position) -
+                         (second.position - motion_.poses[open.second].position);
+        for (std::size_t i = known; i < points_.all.size(); ++i)
+            points_.all[i].begun -= dot(points_.all[i].contact.point.normal, led);
         if (!met) continue;
         open_.meet(open);
         ++found;
@@ -117,19 +110,19 @@ int ContactStage::find_impacts(const std::vector<Vec6>& velocity, bool late) {
 bool ContactStage::meets(const std::vector<Vec6>& next, bool stop_hit, bool rebounds) {
     plastic_first_ = rebounds;  // impacts that a stop's rebound leads to are found again after it
     late_impact_ = false;
-    changed_ = bodies_->jointed;  // others have been cast along what they fly with
-    if (margins_.outrun(*bodies_, options_.time_step, next, changed_)) find_open_again();
-    const std::size_t closed_points = points_.size();
+    changed_ = model_->bodies.jointed;  // others have been cast along what they fly with
+    if (margins_.outrun(model_->bodies, model_->options.time_step, next, changed_)) find_open_again();
+    const std::size_t closed_points = points_.all.size();
     int found = find_impacts(next, true);
     if (late_impact_ && stop_hit && !plastic_first_) {  // as are those to a body that it only stops
         plastic_first_ = true;
         found += find_impacts(next, true);
     }
     if (found > 0) move_impacts_to_start(closed_points, next);
-    if (points_.empty()) return false;
-    state_.counters.contacts += points_.size();
-    apply_half_of_forces();
-    order_points();
+    if (points_.all.empty()) return false;
+    state_.counters.contacts += points_.all.size();
+    motion_.apply_half_of_forces();
+    points_.order(state_.cache, model_->surfaces.resists_turning);
     return true;
 }
 
@@ -138,12 +131,13 @@ bool ContactStage::meets(const std::vector<Vec6>& next, bool stop_hit, bool rebo
 /// met than is faced at the start, or if the point of the start does not stop them.
 bool ContactStage::add_toi_point_at_start(const OpenPair& open, double time,
                                           const std::vector<Vec6>& velocity) {
-    bool elsewhere = std::min(bodies_->solver_index[open.first], bodies_->solver_index[open.second]) < 0;
+    bool elsewhere =
+        std::min(model_->bodies.solver_index[open.first], model_->bodies.solver_index[open.second]) < 0;
     for (const int collider : {open.pair.first, open.pair.second}) {
         const Collider::View own = detection_.collider(collider);
         const bool flat = own.shape.kind == ShapeKind::plane;
         if (!flat && own.shape.kind != ShapeKind::sphere) return false;
-        if (!plastic_first_ && (*surfaces_)[own.body].restitution > 0.0) return false;
+        if (!plastic_first_ && model_->surfaces[own.body].restitution > 0.0) return false;
         if (flat && angular(velocity[own.body]) == Vec3{}) elsewhere = false;
     }
     if (elsewhere) return false;
@@ -152,11 +146,11 @@ bool ContactStage::add_toi_point_at_start(const OpenPair& open, double time,
     detection_.collide_pair(open.pair, margins_.search()[a] + margins_.search()[b], scratch_);
     if (scratch_.empty()) return false;
     const Contact& contact = scratch_.front();
-    add_point(contact, poses_[a], poses_[b], time);
-    const double closing = relative_velocity(points_.back(), contact.point.normal, velocity);
-    const bool stops = contact.point.gap + options_.time_step * closing < 0.0;
-    if (stops) points_.back().at_start = true;
-    else points_.pop_back();
+    add_point(contact, motion_.poses[a], motion_.poses[b], time);
+    const double closing = relative_velocity(points_.all.back(), contact.point.normal, velocity);
+    const bool stops = contact.point.gap + model_->options.time_step * closing < 0.0;
+    if (stops) points_.all.back().at_start = true;
+    else points_.all.pop_back();
     return stops;
 }
 
@@ -164,25 +158,28 @@ bool ContactStage::add_toi_point_at_start(const OpenPair& open, double time,
 bool ContactStage::add_toi_points(IndexPair pair, const Pose& first, const Pose& second, double time,
                                   const std::vector<Vec6>& velocity, bool late) {
     const int a = detection_.collider(pair.first).body, b = detection_.collider(pair.second).body;
-    const double radius = std::max(bodies_->radius[a], bodies_->radius[b]);
+    const double radius = std::max(model_->bodies.radius[a], model_->bodies.radius[b]);
     scratch_.clear();
     detection_.collide_pair(pair, first, second,
                             std::max(margins_.reach()[a] + margins_.reach()[b], 2.0 * closed * radius),
                             scratch_);
     bool met = false;
     for (const Contact& contact : scratch_) {
-        if (is_turned_through(detection_, contact, first, second, velocity, dv_ext_, options_.time_step))
+        if (is_turned_through(detection_, contact, first, second, velocity, motion_.dv_ext,
+                              model_->options.time_step))
             continue;
         add_point(contact, first, second, time);
-        Point& point = points_.back();
+        Point& point = points_.all.back();
         const double closing = -relative_velocity(point, contact.point.normal, velocity);
         // What forces give to one of them in this step is no impact, though both got it before one was held.
-        const double push = std::max({std::abs(relative_velocity(point, contact.point.normal, dv_ext_)),
-                                      std::abs(dot(contact.point.normal, linear(dv_ext_[contact.first]))),
-                                      std::abs(dot(contact.point.normal, linear(dv_ext_[contact.second])))});
-        if (late && !plastic_first_ && surfaces_->pair(contact).restitution > 0.0 && closing > 4.0 * push) {
+        const double push =
+            std::max({std::abs(relative_velocity(point, contact.point.normal, motion_.dv_ext)),
+                      std::abs(dot(contact.point.normal, linear(motion_.dv_ext[contact.first]))),
+                      std::abs(dot(contact.point.normal, linear(motion_.dv_ext[contact.second])))});
+        if (late && !plastic_first_ && model_->surfaces.pair(contact).restitution > 0.0 &&
+            closing > 4.0 * push) {
             late_impact_ = true;
-            points_.pop_back();
+            points_.all.pop_back();
             continue;
         }
         point.meeting_gap = contact.point.gap;
@@ -197,25 +194,25 @@ bool ContactStage::add_toi_points(IndexPair pair, const Pose& first, const Pose&
 /// not be kept: with the points of that moment, if their rows stop the approach, else at the point of the meeting,
 /// taken back half-way between both bodies, or with the one that moves by itself.
 void ContactStage::move_impacts_to_start(std::size_t from, const std::vector<Vec6>& velocity) {
-    const double h = options_.time_step;
+    const double h = model_->options.time_step;
     const auto is_there = [](const Point& point) { return point.at_start || point.toi < 0.0; };
-    if (std::all_of(points_.begin() + static_cast<std::ptrdiff_t>(from), points_.end(), is_there)) return;
-    toi_points_.assign(points_.begin() + static_cast<std::ptrdiff_t>(from), points_.end());
-    points_.resize(from);
-    for (std::size_t k = 0; k < toi_points_.size();) {
-        if (k + ahead < toi_points_.size()) {
-            const Contact& later = toi_points_[k + ahead].contact;
+    if (std::all_of(points_.all.begin() + static_cast<std::ptrdiff_t>(from), points_.all.end(), is_there))
+        return;
+    const LargeArray<Point>& found = points_.take_from(from);
+    for (std::size_t k = 0; k < found.size();) {
+        if (k + ahead < found.size()) {
+            const Contact& later = found[k + ahead].contact;
             for (const int body : {later.first, later.second})
-                prefetch(poses_[body]), prefetch(velocity[body]);
+                prefetch(motion_.poses[body]), prefetch(velocity[body]);
         }
-        const Contact meeting = toi_points_[k].contact;
-        const double toi = toi_points_[k].toi;
+        const Contact meeting = found[k].contact;
+        const double toi = found[k].toi;
         std::size_t end = k;
-        while (end < toi_points_.size() &&
-               (toi_points_[end].contact.key >> feature_bits) == (meeting.key >> feature_bits))
+        while (end < found.size() &&
+               (found[end].contact.key >> feature_bits) == (meeting.key >> feature_bits))
             ++end;
-        if (toi < 0.0 || toi_points_[k].event || toi_points_[k].at_start) {
-            for (; k < end; ++k) points_.push_back(toi_points_[k]);
+        if (toi < 0.0 || found[k].event || found[k].at_start) {
+            for (; k < end; ++k) points_.all.push_back(found[k]);
             continue;
         }
         const IndexPair pair{static_cast<int>(meeting.key >> (feature_bits + 24)),
@@ -223,11 +220,11 @@ void ContactStage::move_impacts_to_start(std::size_t from, const std::vector<Vec
         scratch_.clear();
         detection_.collide_pair(pair, margins_.search()[meeting.first] + margins_.search()[meeting.second],
                                 scratch_);
-        const std::size_t old = points_.size();
+        const std::size_t old = points_.all.size();
         bool stops = false;
         // Past an edge, another side is met than the one that is faced at the start; of two that move, surely another.
-        const bool fixed =
-            std::min(bodies_->solver_index[meeting.first], bodies_->solver_index[meeting.second]) < 0;
+        const bool fixed = std::min(model_->bodies.solver_index[meeting.first],
+                                    model_->bodies.solver_index[meeting.second]) < 0;
         const double same =
             fixed ? same_side
             : have_sides(detection_.collider(pair.first).shape, detection_.collider(pair.second).shape)
@@ -238,31 +235,31 @@ void ContactStage::move_impacts_to_start(std::size_t from, const std::vector<Vec
             }))
             scratch_.clear();
         for (const Contact& contact : scratch_) {
-            const Pose &one = poses_[contact.first], &two = poses_[contact.second];
-            if (is_turned_through(detection_, contact, one, two, velocity, dv_ext_, h)) continue;
+            const Pose &one = motion_.poses[contact.first], &two = motion_.poses[contact.second];
+            if (is_turned_through(detection_, contact, one, two, velocity, motion_.dv_ext, h)) continue;
             add_point(contact, one, two, toi);
-            if (surfaces_->pair(contact).restitution > 0.0)
-                put_on_mover(points_.back(), bodies_->solver_index[contact.first] >= 0,
-                             bodies_->solver_index[contact.second] >= 0);
-            stops = stops || contact.point.gap +
-                                     h * relative_velocity(points_.back(), contact.point.normal, velocity) <
+            if (model_->surfaces.pair(contact).restitution > 0.0)
+                put_on_mover(points_.all.back(), model_->bodies.solver_index[contact.first] >= 0,
+                             model_->bodies.solver_index[contact.second] >= 0);
+            stops = stops || contact.point.gap + h * relative_velocity(points_.all.back(),
+                                                                       contact.point.normal, velocity) <
                                  0.0;
         }
         if (stops) {
             k = end;
             continue;
         }
-        points_.resize(old);
+        points_.all.resize(old);
         for (; k < end; ++k) {
-            Point& p = points_.emplace_back(toi_points_[k]);
+            Point& p = points_.all.emplace_back(found[k]);
             const int a = p.contact.first, b = p.contact.second;
-            const bool alone = std::min(bodies_->solver_index[a], bodies_->solver_index[b]) <
+            const bool alone = std::min(model_->bodies.solver_index[a], model_->bodies.solver_index[b]) <
                                0;  // then its arm is that of the meeting
-            const Vec3 own = linear(velocity[bodies_->solver_index[a] < 0 ? b : a]);
+            const Vec3 own = linear(velocity[model_->bodies.solver_index[a] < 0 ? b : a]);
             p.contact.point.position -= p.toi * (alone ? own : 0.5 * (own + linear(velocity[b])));
             if (alone) continue;
-            p.first_arm = p.contact.point.position - poses_[a].position;
-            p.second_arm = p.contact.point.position - poses_[b].position;
+            p.first_arm = p.contact.point.position - motion_.poses[a].position;
+            p.second_arm = p.contact.point.position - motion_.poses[b].position;
         }
     }
 }

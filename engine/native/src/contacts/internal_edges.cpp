@@ -38,10 +38,11 @@ bool meets_side_face(const Mover& one, const Mover& other, double time, Vec3 n) 
 /// How deep a closed point is at the start of the step, and what the velocity then adds to it before that is answered, m.
 /// When a solve has answered it, as much as iterations that count as settled may have left, or as the depth.
 double ContactStage::depth_at_toi(const Point& point, bool late) const {
-    const double h = options_.time_step, depth = std::max(0.0, -point.contact.point.gap);
+    const double h = model_->options.time_step, depth = std::max(0.0, -point.contact.point.gap);
     const double sinking =
-        std::max(0.0, -h * relative_velocity(point, point.contact.point.normal, velocity_));
-    const double left = options_.solver == SolverKind::iterative ? h * options_.unsettled_residual : 0.0;
+        std::max(0.0, -h * relative_velocity(point, point.contact.point.normal, motion_.velocity));
+    const double left =
+        model_->options.solver == SolverKind::iterative ? h * model_->options.unsettled_residual : 0.0;
     return depth + (late ? std::min(sinking, std::max(depth, left)) : sinking);
 }
 
@@ -52,16 +53,17 @@ bool ContactStage::is_internal_edge(const Mover& moving, int body, const Mover& 
                                     const std::vector<Vec6>& velocity, double time, bool late,
                                     Vec3 facing) const {
     if (!have_sides(moving.shape, other.shape)) return false;
-    const double h = options_.time_step, slop = this->slop(open), least = share * slop;
-    const bool by_pgs = options_.solver == SolverKind::iterative;
-    if (bodies_->solver_index[body] < 0 || !(iterating_ || by_pgs || depth_[body] > least)) return false;
+    const double h = model_->options.time_step, slop = this->slop(open), least = share * slop;
+    const bool by_pgs = model_->options.solver == SolverKind::iterative;
+    if (model_->bodies.solver_index[body] < 0 || !(iterating_ || by_pgs || depth_[body] > least))
+        return false;
     const std::span<const int> own = points_of_[body];
     for (std::size_t at = 0; at < own.size();) {
-        const std::uint64_t pair = points_[own[at]].contact.key >> feature_bits;
+        const std::uint64_t pair = points_.all[own[at]].contact.key >> feature_bits;
         Vec3 n, support_velocity;  // what holds it goes itself, m/s
         double depth = -unbounded, begun = 0.0, sinking = 0.0;
-        for (; at < own.size() && points_[own[at]].contact.key >> feature_bits == pair; ++at) {
-            const Point& point = points_[own[at]];
+        for (; at < own.size() && points_.all[own[at]].contact.key >> feature_bits == pair; ++at) {
+            const Point& point = points_.all[own[at]];
             if (point.toi >= 0.0) continue;
             const double gap = point.contact.point.gap, side = point.contact.first == body ? 1.0 : -1.0;
             const double deep = depth_at_toi(point, late);
@@ -83,11 +85,11 @@ bool ContactStage::is_internal_edge(const Mover& moving, int body, const Mover& 
                 const double rises = std::max(part * dot(n, support_velocity), top - height(other, part, -n));
                 falls = std::max(falls, now + rises - height(moving, part, n));
             }
-            const double left = h * options_.unsettled_residual;
+            const double left = h * model_->options.unsettled_residual;
             double most = residual_motion * slop;
             if (iterating_)
-                most =
-                    std::max(begun, left + h * free_fall_allowance * norm(linear(dv_ext_[body])) + sinking);
+                most = std::max(
+                    begun, left + h * free_fall_allowance * norm(linear(motion_.dv_ext[body])) + sinking);
             else if (falls > most && meets_side_face(moving, other, time, n)) most = left;
             falls = std::min(falls, most);
             depth = std::max(depth, begun + falls);
@@ -108,8 +110,10 @@ bool ContactStage::is_internal_edge(const Mover& moving, int body, const Mover& 
 bool ContactStage::occludes(const Meeting& earlier, const Meeting& later, int body,
                             const std::vector<Vec6>& velocity) const {
     const OpenPair &before = open_.pairs[earlier.open], &after = open_.pairs[later.open];
-    const Pose before_first = moved(before.first, velocity), before_second = moved(before.second, velocity),
-               after_first = moved(after.first, velocity), after_second = moved(after.second, velocity);
+    const Pose before_first = motion_.moved(before.first, velocity),
+               before_second = motion_.moved(before.second, velocity),
+               after_first = motion_.moved(after.first, velocity),
+               after_second = motion_.moved(after.second, velocity);
     const Mover one = mover(before.pair.first, before_first, velocity),
                 two = mover(before.pair.second, before_second, velocity),
                 three = mover(after.pair.first, after_first, velocity),
@@ -125,7 +129,8 @@ bool ContactStage::occludes(const Meeting& earlier, const Meeting& later, int bo
     const Vec3 n = (before.first == body ? 1.0 : -1.0) * normal(one, two, earlier.time);
     const Vec3 side = (after.first == body ? 1.0 : -1.0) * normal(three, four, later.time);
     if (dot(n, side) > same_direction_cosine) return false;
-    const double h = options_.time_step, slop = this->slop(after), level = height(held, earlier.time, n);
+    const double h = model_->options.time_step, slop = this->slop(after),
+                 level = height(held, earlier.time, n);
     if (!(level + height(other, earlier.time, -n) > -2.0 * (slop + this->slop(before)))) return false;
     const Mover& holder = before.first == body ? two : one;
     const double support_path = std::min(0.0, dot(n, holder.velocity)) * (h - earlier.time);
@@ -140,11 +145,11 @@ bool ContactStage::occludes(const Meeting& earlier, const Meeting& later, int bo
 /// Of what one body meets in a step, leaves out what it would not meet if that which comes before stopped it. What it meets
 /// all the same is found again with the velocities of the solve.
 void ContactStage::remove_occluded(std::vector<Meeting>& meetings, const std::vector<Vec6>& velocity) {
-    if (!bodies_->swings || meetings.size() < 2) return;
+    if (!model_->bodies.swings || meetings.size() < 2) return;
     meetings_of_.clear();
     for (std::size_t at = 0; at < meetings.size(); ++at)
         for (const int b : {open_.pairs[meetings[at].open].first, open_.pairs[meetings[at].open].second})
-            if (bodies_->solver_index[b] >= 0) meetings_of_.push_back({b, meetings[at].time, at});
+            if (model_->bodies.solver_index[b] >= 0) meetings_of_.push_back({b, meetings[at].time, at});
     std::sort(meetings_of_.begin(), meetings_of_.end(), [](const MeetingOf& a, const MeetingOf& b) {
         return a.body != b.body ? a.body < b.body : a.time != b.time ? a.time < b.time : a.at < b.at;
     });
@@ -157,7 +162,7 @@ void ContactStage::remove_occluded(std::vector<Meeting>& meetings, const std::ve
                 if (earlier.time < 0.0) continue;
                 const int body = meetings_of_[from].body;
                 if (occludes(earlier, later, body, velocity)) later.time = -1.0;
-                else if (later.time - earlier.time < simultaneous * options_.time_step &&
+                else if (later.time - earlier.time < simultaneous * model_->options.time_step &&
                          occludes(later, earlier, body, velocity))
                     earlier.time = -1.0;
             }
@@ -171,29 +176,30 @@ void ContactStage::remove_occluded(std::vector<Meeting>& meetings, const std::ve
 /// overlap comes of it. Two bodies whose edges lie on each other touch with either face, and the one they move past is no
 /// obstacle. Whether there are such pairs: they are open then.
 bool ContactStage::skip_grazing(std::size_t from) {
-    if (!bodies_->swings || from == points_.size()) return false;
-    const double h = options_.time_step;
+    if (!model_->bodies.swings || from == points_.all.size()) return false;
+    const double h = model_->options.time_step;
     std::vector<IndexPair>& gone = arrays_.grazing;
     gone.clear();
-    points_of_.find(points_, *bodies_);
-    for (std::size_t k = from, end = from; k < points_.size(); k = end) {
-        const std::uint64_t key = points_[k].contact.key >> feature_bits;
+    points_of_.find(points_.all, model_->bodies);
+    for (std::size_t k = from, end = from; k < points_.all.size(); k = end) {
+        const std::uint64_t key = points_.all[k].contact.key >> feature_bits;
         std::size_t deepest = k;
         double most = 0.0;
-        for (; end < points_.size() && points_[end].contact.key >> feature_bits == key; ++end) {
-            const Contact& contact = points_[end].contact;
-            const double closing = -relative_velocity(points_[end], contact.point.normal, velocity_);
+        for (; end < points_.all.size() && points_.all[end].contact.key >> feature_bits == key; ++end) {
+            const Contact& contact = points_.all[end].contact;
+            const double closing =
+                -relative_velocity(points_.all[end], contact.point.normal, motion_.velocity);
             const double overlap = h * closing - std::max(0.0, contact.point.gap);
             if (overlap > most) most = overlap, deepest = end;
         }
-        if (most > 0.0 && is_grazing(points_[deepest], most))
+        if (most > 0.0 && is_grazing(points_.all[deepest], most))
             gone.push_back({static_cast<int>(key >> 24), static_cast<int>(key & 0xffffff)});
     }
     for (const IndexPair& pair : gone) {
         const Collider::View one = detection_.collider(pair.first), two = detection_.collider(pair.second);
         open_.pairs.push_back(opened(pair, separation(one.shape, detection_.pose(pair.first), two.shape,
                                                       detection_.pose(pair.second))));
-        std::erase_if(points_,
+        std::erase_if(points_.all,
                       [&](const Point& point) { return point.contact.key >> feature_bits == pair_of(pair); });
     }
     return !gone.empty();
@@ -209,11 +215,11 @@ bool ContactStage::is_grazing(const Point& point, double overlap) const {
     const OpenPair open = opened(pair, {contact.point.gap, contact.point.normal});
     if (!(overlap > slop(open))) return false;
     const int a = contact.first, b = contact.second;
-    const Mover first = mover(pair.first, poses_[a], velocity_),
-                second = mover(pair.second, poses_[b], velocity_);
-    return time_of_impact(first, second, options_.time_step, slop(open)) < 0.0 ||
-           is_internal_edge(first, a, second, open, velocity_, 0.0, true, contact.point.normal) ||
-           is_internal_edge(second, b, first, open, velocity_, 0.0, true, contact.point.normal);
+    const Mover first = mover(pair.first, motion_.poses[a], motion_.velocity),
+                second = mover(pair.second, motion_.poses[b], motion_.velocity);
+    return time_of_impact(first, second, model_->options.time_step, slop(open)) < 0.0 ||
+           is_internal_edge(first, a, second, open, motion_.velocity, 0.0, true, contact.point.normal) ||
+           is_internal_edge(second, b, first, open, motion_.velocity, 0.0, true, contact.point.normal);
 }
 
 }  // namespace spook

@@ -20,15 +20,16 @@ bool OverlapSearch::is_far(double way, double radius) const noexcept {
 }
 
 bool OverlapSearch::moves_far(const PenetrationRecord& record) const noexcept {
-    if (!is_far(record.depth, bodies_->moving_size(record.contact))) return false;
-    const auto swings = [this](int b) { return bodies_->moves(b) && bodies_->ball[b] == 0; };
+    if (!is_far(record.depth, model_->bodies.moving_size(record.contact))) return false;
+    const auto swings = [this](int b) { return model_->bodies.moves(b) && model_->bodies.ball[b] == 0; };
     return !by_pgs_ || swings(record.contact.first) || swings(record.contact.second);
 }
 
 void OverlapSearch::add(const Contact& contact, const std::vector<Pose>& poses, double excess) {
     PenetrationRecord& record = records.emplace_back();
     record.contact = contact;
-    record.damping = std::max((*surfaces_)[contact.first].damping, (*surfaces_)[contact.second].damping);
+    record.damping =
+        std::max(model_->surfaces[contact.first].damping, model_->surfaces[contact.second].damping);
     record.first_arm = contact.point.position - poses[contact.first].position;
     record.second_arm = contact.point.position - poses[contact.second].position;
     record.depth = excess;
@@ -40,7 +41,7 @@ double OverlapSearch::way(int b, const StepEnd& end) const {
     for (int i = 0; i < 9; ++i)
         turned = std::max(turned, std::abs(end.poses[b].rotation.m[i] - end.begun[b].rotation.m[i]));
     return norm(end.poses[b].position - end.begun[b].position) +
-           (turned > 0.0 ? 3.0 * turned * bodies_->radius[b] : 0.0);
+           (turned > 0.0 ? 3.0 * turned * model_->bodies.radius[b] : 0.0);
 }
 
 OverlapSearch::Found OverlapSearch::find(const StepEnd& end) {
@@ -57,7 +58,7 @@ double OverlapSearch::find_again(const StepEnd& end, const std::vector<char>& re
 /// Balls have the same points however near one looks, and are looked at once: as near as the last step lets expect.
 double OverlapSearch::find(const StepEnd& end, const std::vector<char>& reconsidered, bool again,
                            bool& goes_on) {
-    const double expected = bodies_->swings ? 0.0 : 2.0 * search_factor * expected_;
+    const double expected = model_->bodies.swings ? 0.0 : 2.0 * search_factor * expected_;
     double deepest = look(end, expected, reconsidered, again);
     if (again) deepest = std::max(deepest, look_at_neighbours(end, 0.0, reconsidered));
     expected_ = deepest;
@@ -83,7 +84,7 @@ double OverlapSearch::look(const StepEnd& at, double margin, const std::vector<c
     for (std::size_t from = 0, end = 0; from < cache.size(); from = end) {
         const std::uint64_t key = cache[from].contact.key >> feature_bits;
         const int a = cache[from].contact.first, b = cache[from].contact.second;
-        const double rounding = bodies_->slack(cache[from].contact);
+        const double rounding = model_->bodies.slack(cache[from].contact);
         double most_compression = 0.0;
         bool overlapped = false;
         for (; end < cache.size() && cache[end].contact.key >> feature_bits == key; ++end) {
@@ -104,7 +105,8 @@ double OverlapSearch::look(const StepEnd& at, double margin, const std::vector<c
         at.detection.collide_pair(pair, at.poses[a], at.poses[b], margin, scratch_);
         for (const Contact& contact : scratch_) {
             double compression = 0.0;
-            if ((*surfaces_)[a].compliance + (*surfaces_)[b].compliance > 0.0) compression = most_compression;
+            if (model_->surfaces[a].compliance + model_->surfaces[b].compliance > 0.0)
+                compression = most_compression;
             for (std::size_t k = from; k < end; ++k)
                 if (cache[k].contact.key == contact.key) compression = cache[k].compression;
             double excess = -contact.point.gap - compression - rounding;
@@ -122,10 +124,10 @@ double OverlapSearch::look(const StepEnd& at, double margin, const std::vector<c
 bool OverlapSearch::find_neighbours(const StepEnd& end, double margin) {
     neighbours_.clear();
     untouched_.clear();
-    reached_.assign(bodies_->count(), 0);
+    reached_.assign(model_->bodies.count(), 0);
     char round = 1;
     const auto reach = [&](int b) {
-        if (reached_[b] || !bodies_->moves(b)) return;
+        if (reached_[b] || !model_->bodies.moves(b)) return;
         if (round == 1 && grown_.empty()) margin_ = end.margin;
         reached_[b] = round;
         grown_.push_back(b);
@@ -156,7 +158,7 @@ bool OverlapSearch::find_neighbours(const StepEnd& end, double margin) {
             if (scratch_.empty()) continue;
             neighbours_.push_back(pair);
             if (std::any_of(scratch_.begin(), scratch_.end(),
-                            [this](const Contact& c) { return bodies_->is_deep(c); }))
+                            [this](const Contact& c) { return model_->bodies.is_deep(c); }))
                 untouched_.push_back(pair);
             reach(a);
             reach(b);
@@ -183,8 +185,8 @@ double OverlapSearch::look_at_neighbours(const StepEnd& end, double margin,
         end.detection.collide_pair(pair, end.poses[a], end.poses[b], margin, scratch_);
         const bool was_overlapping = std::binary_search(untouched_.begin(), untouched_.end(), pair);
         for (const Contact& contact : scratch_) {
-            if (was_overlapping && bodies_->is_deep(contact)) continue;
-            const double excess = -contact.point.gap - bodies_->slack(contact);
+            if (was_overlapping && model_->bodies.is_deep(contact)) continue;
+            const double excess = -contact.point.gap - model_->bodies.slack(contact);
             deepest = std::max(deepest, excess);
             if (margin > 0.0) add(contact, end.poses, excess);
         }

@@ -44,9 +44,8 @@ public:
     };
 
     /// `by_pgs`: displacements come by PGS, cheap and rough.
-    OverlapSearch(std::shared_ptr<const ContactBodies> bodies,
-                  std::shared_ptr<const ContactSurfaces> surfaces, bool by_pgs)
-        : bodies_(std::move(bodies)), surfaces_(std::move(surfaces)), by_pgs_(by_pgs) {}
+    OverlapSearch(std::shared_ptr<const ContactModel> model, bool by_pgs)
+        : model_(std::move(model)), by_pgs_(by_pgs) {}
 
     /// Points of the step's pairs, up to gaps of `search_factor` times their largest overlap that nothing explains, and of
     /// pairs without points that may be pushed into each other, into `records`. None of them if there is no overlap.
@@ -70,8 +69,7 @@ private:
     void add(const Contact& contact, const std::vector<Pose>& poses, double excess);
     double way(int body, const StepEnd& end) const;
 
-    std::shared_ptr<const ContactBodies> bodies_;
-    std::shared_ptr<const ContactSurfaces> surfaces_;
+    std::shared_ptr<const ContactModel> model_;
     bool by_pgs_;
     double expected_ = 0.0;                          // of the last step: how near to look at balls, no more
     std::vector<IndexPair> neighbours_, untouched_;  // pairs without points; of those, what overlapped before

@@ -14,24 +14,20 @@ using namespace tolerances::position_projection;
 
 }  // namespace
 
-PositionProjector::PositionProjector(std::shared_ptr<const ContactBodies> bodies,
-                                     std::shared_ptr<const ContactSurfaces> surfaces,
-                                     const ContactOptions& options, std::vector<char> yielding)
-    : bodies_(std::move(bodies)),
-      surfaces_(std::move(surfaces)),
-      options_(options),
+PositionProjector::PositionProjector(std::shared_ptr<const ContactModel> model, std::vector<char> yielding)
+    : model_(std::move(model)),
       yielding_(std::move(yielding)),
-      by_pgs_(options.solver == SolverKind::iterative && !surfaces_->resists_turning),
-      search_(bodies_, surfaces_, by_pgs_) {
-    solver_.floor = options.floor;
-    solver_.refinements = options.refinements;
+      by_pgs_(model_->options.solver == SolverKind::iterative && !model_->surfaces.resists_turning),
+      search_(model_, by_pgs_) {
+    solver_.floor = model_->options.floor;
+    solver_.refinements = model_->options.refinements;
 }
 
 void PositionProjector::begin_step() {
     for (std::vector<char>* flags : {&projection_.grounded, &projection_.externally_driven, &far_islands_})
-        flags->reserve(bodies_->count());
+        flags->reserve(model_->bodies.count());
     for (std::vector<double>* depths : {&projection_.overlap, &projection_.overlap_before})
-        depths->reserve(bodies_->count());
+        depths->reserve(model_->bodies.count());
 }
 
 /// What a contact yields, 1/kg, per moving body on either side. A light body that is jointed to a heavy one, or touches
@@ -48,7 +44,7 @@ void PositionProjector::find_body_compliance(const MixedSystem& projection) {
 }
 
 double PositionProjector::compliance_of(const Contact& contact) const noexcept {
-    const int a = bodies_->solver_index[contact.first], b = bodies_->solver_index[contact.second];
+    const int a = model_->bodies.solver_index[contact.first], b = model_->bodies.solver_index[contact.second];
     return std::min(a < 0 ? unbounded : compliance_[a], b < 0 ? unbounded : compliance_[b]);
 }
 
@@ -96,7 +92,7 @@ bool PositionProjector::mark_far_islands() {
     if (!by_pgs_) return goes_on_;
     bool some = false;
     const auto island = [this](int b) {
-        return bodies_->moves(b) ? projection_.islands.of_body[bodies_->solver_index[b]] : -1;
+        return model_->bodies.moves(b) ? projection_.islands.of_body[model_->bodies.solver_index[b]] : -1;
     };
     std::vector<char>& far = filled(far_islands_, projection_.islands.count);
     for (const PenetrationRecord& record : search_.records) {
@@ -105,14 +101,15 @@ bool PositionProjector::mark_far_islands() {
         for (const int b : {record.contact.first, record.contact.second})
             if (island(b) >= 0) far[island(b)] = 1;
     }
-    for (std::size_t b = 0; b < bodies_->count(); ++b) {
+    for (std::size_t b = 0; b < model_->bodies.count(); ++b) {
         const int k = island(static_cast<int>(b));
-        if (k < 0 || bodies_->ball[b] != 0 || far[k] != 0) continue;
-        const Vec6& d = projection_.velocity[bodies_->solver_index[b]];
-        const double way = options_.time_step * (norm(linear(d)) + bodies_->radius[b] * norm(angular(d)));
-        if (search_.is_far(way, bodies_->radius[b])) some = true, far[k] = 1;
+        if (k < 0 || model_->bodies.ball[b] != 0 || far[k] != 0) continue;
+        const Vec6& d = projection_.velocity[model_->bodies.solver_index[b]];
+        const double way =
+            model_->options.time_step * (norm(linear(d)) + model_->bodies.radius[b] * norm(angular(d)));
+        if (search_.is_far(way, model_->bodies.radius[b])) some = true, far[k] = 1;
     }
-    reconsidered_.resize(bodies_->count());
+    reconsidered_.resize(model_->bodies.count());
     for (std::size_t b = 0; b < reconsidered_.size(); ++b) {
         const int k = island(static_cast<int>(b));
         reconsidered_[b] = k >= 0 && far[k] != 0;
@@ -134,7 +131,7 @@ bool PositionProjector::keep_projected(const std::vector<Pose>& poses) {
         auto at = std::lower_bound(places.begin(), places.end(), std::make_pair(contact.key, std::size_t{0}));
         for (; at != places.end() && at->first == contact.key; ++at)  // parallel edges have one name
             if (norm(records[at->second].contact.point.position - contact.point.position) <
-                same_place * bodies_->size(contact))
+                same_place * model_->bodies.size(contact))
                 return true;
         return false;
     };
@@ -142,7 +139,7 @@ bool PositionProjector::keep_projected(const std::vector<Pose>& poses) {
     order(projected_, projected_places_);
     bool fresh = false;
     for (const PenetrationRecord& record : search_.records)
-        fresh = fresh || (record.depth > bodies_->slack(record.contact) &&
+        fresh = fresh || (record.depth > model_->bodies.slack(record.contact) &&
                           !has(projected_, projected_places_, record.contact));
     for (PenetrationRecord record : projected_) {
         const Contact& contact = record.contact;
@@ -164,7 +161,7 @@ bool PositionProjector::keep_projected(const std::vector<Pose>& poses) {
 /// How fast the bodies of an overlap are to part in the step, m/s; of points apart, how fast they may close.
 double PositionProjector::separation_speed(const PenetrationRecord& record, const DepthOfPair& initial,
                                            bool again) const {
-    const double h = options_.time_step, excess = record.depth;
+    const double h = model_->options.time_step, excess = record.depth;
     const auto given = initial.find(record.contact.key >> feature_bits);
     if (again || !(excess > 0.0) || given == initial.end()) return excess / h;
     const double slow = std::min(excess, given->second);
@@ -176,8 +173,8 @@ double PositionProjector::separation_speed(const PenetrationRecord& record, cons
 void PositionProjector::note_projected(const StepEnd& end, const ExternalDrive& drive) {
     for (const CachedContact& cached : end.cache.points)
         if (cached.pushes())
-            pushed_.tie(bodies_->solver_index[cached.contact.first],
-                        bodies_->solver_index[cached.contact.second]);
+            pushed_.tie(model_->bodies.solver_index[cached.contact.first],
+                        model_->bodies.solver_index[cached.contact.second]);
     for (const RowBlock& block : system_.rows) pushed_.tie(block);
     projection_.velocity = system_.velocity;
     projection_.islands = pushed_.find();
@@ -191,13 +188,13 @@ void PositionProjector::note_projected(const StepEnd& end, const ExternalDrive& 
     projection_.overlap.assign(projection_.islands.count, 0.0);
     projection_.overlap_before.assign(projection_.islands.count, 0.0);
     const auto island = [this](const Contact& contact) {
-        return projection_.islands
-            .of_body[std::max(bodies_->solver_index[contact.first], bodies_->solver_index[contact.second])];
+        return projection_.islands.of_body[std::max(model_->bodies.solver_index[contact.first],
+                                                    model_->bodies.solver_index[contact.second])];
     };
     for (const CachedContact& cached : end.cache.points) {
         const int k = island(cached.contact);
         if (k < 0) continue;
-        if (drive.acts_at(cached.contact, *surfaces_)) projection_.externally_driven[k] = 1;
+        if (drive.acts_at(cached.contact, model_->surfaces)) projection_.externally_driven[k] = 1;
         projection_.overlap_before[k] = std::max(projection_.overlap_before[k], -cached.contact.point.gap);
     }
     for (const PenetrationRecord& record : search_.records) {
@@ -216,8 +213,8 @@ bool PositionProjector::project_directly(const DepthOfPair& given, bool again, C
     for (const PenetrationRecord& record : search_.records) {
         answered_.push_back(!(separation_speed(record, given, again) > 0.0));
         RowBlock block;
-        block.first = bodies_->solver_index[record.contact.first];
-        block.second = bodies_->solver_index[record.contact.second];
+        block.first = model_->bodies.solver_index[record.contact.first];
+        block.second = model_->bodies.solver_index[record.contact.second];
         block.size = 1;
         const Vec3 normal = record.contact.point.normal;
         if (block.first >= 0) block.first_jacobian[0] = contact_row(normal, record.first_arm);
@@ -230,8 +227,10 @@ bool PositionProjector::project_directly(const DepthOfPair& given, bool again, C
     }
     projection.velocity.clear();
     std::vector<FrictionPoint> none;
-    const IslandRules rules{.friction = options_.friction, .enough = options_.unsettled_residual};
-    if (!solve_islands(projection, none, solver_, options_, rules, counters, &answered_).finite) return false;
+    const IslandRules rules{.friction = model_->options.friction,
+                            .enough = model_->options.unsettled_residual};
+    if (!solve_islands(projection, none, solver_, model_->options, rules, counters, &answered_).finite)
+        return false;
     for (std::size_t k = joints; k < projection.rows.size(); ++k)
         if (projection.rows[k].multiplier[0] != 0.0)
             pushed_.tie(projection.rows[k].first, projection.rows[k].second);
@@ -242,16 +241,17 @@ bool PositionProjector::project_directly(const DepthOfPair& given, bool again, C
 bool PositionProjector::project_by_pgs(const PgsSolver& beside, const DepthOfPair& given, bool again,
                                        ContactCounters& counters) {
     MixedSystem& projection = system_;
-    pgs_.start_beside(beside, projection, options_.friction, bodies_->swings ? 1.0 : over_relaxation);
+    pgs_.start_beside(beside, projection, model_->options.friction,
+                      model_->bodies.swings ? 1.0 : over_relaxation);
     for (const PenetrationRecord& record : search_.records)
-        pgs_.announce(bodies_->solver_index[record.contact.first],
-                      bodies_->solver_index[record.contact.second]);
+        pgs_.announce(model_->bodies.solver_index[record.contact.first],
+                      model_->bodies.solver_index[record.contact.second]);
     pgs_.arrange();
     for (std::size_t k = 0; k < search_.records.size(); ++k) {
         const PenetrationRecord& record = search_.records[k];
         PgsContact row;
-        row.first = bodies_->solver_index[record.contact.first];
-        row.second = bodies_->solver_index[record.contact.second];
+        row.first = model_->bodies.solver_index[record.contact.first];
+        row.second = model_->bodies.solver_index[record.contact.second];
         row.normal = record.contact.point.normal;
         row.first_arm = record.first_arm;
         row.second_arm = record.second_arm;
@@ -259,14 +259,16 @@ bool PositionProjector::project_by_pgs(const PgsSolver& beside, const DepthOfPai
         if (!projection.rows.empty()) row.softness = compliance_of(record.contact);
         pgs_.add(row);
     }
-    const FrictionReport report = pgs_.run(options_.iterations, options_.residual_tolerance, 0.0, nullptr);
+    const FrictionReport report =
+        pgs_.run(model_->options.iterations, model_->options.residual_tolerance, 0.0, nullptr);
     counters.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
     if (!report.finite) return false;
     pgs_.write(projection);
     for (std::size_t k = 0; k < search_.records.size(); ++k) {
         const Contact& contact = search_.records[k].contact;
         if (pgs_.impulse(static_cast<int>(k))[0] != 0.0)
-            pushed_.tie(bodies_->solver_index[contact.first], bodies_->solver_index[contact.second]);
+            pushed_.tie(model_->bodies.solver_index[contact.first],
+                        model_->bodies.solver_index[contact.second]);
     }
     return true;
 }
@@ -289,7 +291,7 @@ const PositionProjection* PositionProjector::project(const Solved& solved, const
         return nullptr;
     }
     const auto is_rounding = [this](const PenetrationRecord& record) {
-        return record.depth <= parted * bodies_->slack(record.contact);
+        return record.depth <= parted * model_->bodies.slack(record.contact);
     };
     if (again && std::all_of(search_.records.begin(), search_.records.end(), is_rounding)) return nullptr;
     for (const PenetrationRecord& record : search_.records) end.cache.add_sleepers(record.contact, woken);

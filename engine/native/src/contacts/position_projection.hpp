@@ -28,9 +28,7 @@ struct PositionProjection {
 class PositionProjector {
 public:
     /// `yielding` tells of each block of rows of joints whether it gives way while overlaps are parted, as springs do.
-    PositionProjector(std::shared_ptr<const ContactBodies> bodies,
-                      std::shared_ptr<const ContactSurfaces> surfaces, const ContactOptions& options,
-                      std::vector<char> yielding);
+    PositionProjector(std::shared_ptr<const ContactModel> model, std::vector<char> yielding);
     /// Makes room, or there would be none in a copy: there may be as many islands as bodies, however late in a run.
     void begin_step();
 
@@ -63,9 +61,7 @@ private:
     bool keep_projected(const std::vector<Pose>& poses);
     void update_initial_penetrations(const ContactCache& cache, DepthOfPair& initial_penetration);
 
-    std::shared_ptr<const ContactBodies> bodies_;
-    std::shared_ptr<const ContactSurfaces> surfaces_;
-    ContactOptions options_;
+    std::shared_ptr<const ContactModel> model_;
     std::vector<char> yielding_;
     bool by_pgs_;  // cheap, and as exact as the next step will need
     OverlapSearch search_;

@@ -56,25 +56,6 @@ struct ContactExtras {
     bool is_anisotropic() const noexcept { return axis_scale[0] != axis_scale[1]; }
 };
 
-class ContactExtrasOf {
-public:
-    const ContactExtras& of(const StepContact& point) const noexcept {
-        static constexpr ContactExtras none{};
-        return point.extras < 0 ? none : extras_[point.extras];
-    }
-    ContactExtras& own(StepContact& point) {
-        if (point.extras < 0) {
-            point.extras = static_cast<int>(extras_.size());
-            extras_.emplace_back();
-        }
-        return extras_[point.extras];
-    }
-    void clear() noexcept { extras_.clear(); }
-
-private:
-    std::vector<ContactExtras> extras_;  // in no order
-};
-
 /// Two that are apart at the start of the step; they may still meet.
 struct OpenPair {
     IndexPair pair;

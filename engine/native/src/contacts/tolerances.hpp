@@ -42,8 +42,8 @@ inline constexpr double slack_share = 1e-10;  // of the smaller body's radius
 inline constexpr double rounding = 1e-15;     // of a place and of a size: four roundings
 }  // namespace tolerances::contact_bodies
 
-// contact_detect.cpp
-namespace tolerances::contact_detect {
+// contact_points.cpp
+namespace tolerances::contact_points {
 inline constexpr double vanishing = 1e-8;  // a direction so steep on the surface has no shadow
 }
 

@@ -1,0 +1,109 @@
+#include "contacts/step_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "contacts/contact_geometry.hpp"
+
+namespace spook {
+
+void StepMotion::begin(const std::vector<Pose>& at, const std::vector<Vec6>& v,
+                       const std::vector<Vec6>& free_velocity) {
+    const std::size_t bodies = model_->bodies.count();
+    poses = at;
+    velocity = v;
+    dv_ext.resize(bodies);
+    for (std::size_t b = 0; b < bodies; ++b) dv_ext[b] = sum(free_velocity[b], v[b], -1.0);
+    whole_dv_ext = dv_ext;
+    drive.begin(model_->bodies, model_->surfaces, v);
+    toi_fraction.assign(bodies, 0.0);
+    event_time.assign(bodies, -1.0);
+    supported.begin(bodies);
+}
+
+void StepMotion::predict(const std::vector<Vec6>& free_velocity) {
+    supported.find(model_->bodies);
+    predicted.resize(velocity.size());
+    for (std::size_t b = 0; b < predicted.size(); ++b)
+        predicted[b] =
+            is_free(b) && model_->bodies.moves(static_cast<int>(b)) ? free_velocity[b] : velocity[b];
+}
+
+bool StepMotion::moves_along_forces(int body) const {
+    return !is_free(body) && is_along(linear(dv_ext[body]), linear(velocity[body]));
+}
+
+void StepMotion::apply_forces_until(std::size_t b, double part) {
+    velocity[b] = sum(velocity[b], whole_dv_ext[b], part - toi_fraction[b]);
+    dv_ext[b] = sum(Vec6{}, whole_dv_ext[b], 1.0 - part);
+    toi_fraction[b] = part;
+}
+
+void StepMotion::apply_half_of_forces() {
+    const bool rebounds = model_->surfaces.rebounds;
+    for (std::size_t b = 0; rebounds && b < velocity.size(); ++b)
+        if (model_->bodies.moves(static_cast<int>(b)) && is_free(b) && event_time[b] < 0.0)
+            apply_forces_until(b, part_of_forces(0.0, rebounds));
+}
+
+void StepMotion::release_support(int body, const Vec6& after) {
+    if (event_time[body] < 0.0 || toi_fraction[body] > 0.0 || is_free(body)) return;
+    const Vec3 kick = linear(dv_ext[body]), before = linear(velocity[body]);
+    if (is_along(kick, before) || !is_along(kick, linear(after) - before)) return;
+    toi_fraction[body] =
+        part_of_forces(event_time[body] / model_->options.time_step, model_->surfaces.rebounds);
+    supported.release(body, toi_fraction[body], dv_ext[body]);
+    for (double& k : dv_ext[body]) k *= 1.0 - toi_fraction[body];
+}
+
+void StepMotion::lay_down(const LargeArray<StepContact>& points) {
+    for (const StepContact& point : points) {
+        if (!point.event) continue;
+        const double apart = relative_velocity(point, point.contact.point.normal, velocity),
+                     push = relative_velocity(point, point.contact.point.normal, whole_dv_ext);
+        const double left = 1.0 - point.toi / model_->options.time_step;
+        if (!(std::abs(apart) < 0.5 * left * -push)) continue;
+        for (const int b : {point.contact.first, point.contact.second})
+            if (model_->bodies.moves(b) && toi_fraction[b] > 1.0) dv_ext[b] = Vec6{}, toi_fraction[b] = 1.0;
+    }
+}
+
+Vec3 StepMotion::free_fall_correction(int body, Vec3 after) const {
+    const Vec3 k = linear(dv_ext[body]), change = after - linear(velocity[body]);
+    if (!supported[body] || !(dot(k, k) > 0.0)) return {};
+    const double passed = event_time[body] / model_->options.time_step,
+                 won = passed * dot(k, after - linear(predicted[body])) - 0.5 * dot(change, change);
+    return won > 0.0 ? (won / dot(k, k)) * k : Vec3{};
+}
+
+Pose StepMotion::moved(int b, const std::vector<Vec6>& along) const {
+    Pose pose = poses[b];
+    if (event_time[b] >= 0.0) pose.position += event_time[b] * (linear(predicted[b]) - linear(along[b]));
+    return pose;
+}
+
+void StepMotion::measure(StepContact& point) const {
+    point.approach = relative_velocity(point, point.contact.point.normal, velocity);
+    point.dv_ext = relative_velocity(point, point.contact.point.normal, dv_ext);
+}
+
+double StepMotion::time_left(const StepContact& point) const noexcept {
+    const double h = model_->options.time_step;
+    return point.event ? std::max(h - point.toi, 1e-3 * h) : h;
+}
+
+double StepMotion::surface_speed(const StepContact& point, Vec3 direction) const noexcept {
+    const ContactSurfaces& surfaces = model_->surfaces;
+    if (!surfaces.conveys) return 0.0;
+    const int a = point.contact.first, b = point.contact.second;
+    return dot(direction, poses[a].rotation * surfaces[a].surface_velocity -
+                              poses[b].rotation * surfaces[b].surface_velocity);
+}
+
+bool StepMotion::is_stopped(const StepContact& point, double normal) const {
+    const double fall = std::abs(relative_velocity(point, point.contact.point.normal, whole_dv_ext));
+    return normal > 0.0 && point.approach < -(point.rounding + fall) &&
+           model_->surfaces.pair(point.contact).restitution > 0.0;
+}
+
+}  // namespace spook

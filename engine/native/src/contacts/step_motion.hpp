@@ -1,0 +1,64 @@
+// Bodies on their way through a step: where they begin it and how fast, and which part of its forces has acted on each.
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "contacts/contact_bodies.hpp"
+#include "contacts/external_drive.hpp"
+#include "contacts/step_contact.hpp"
+#include "contacts/supported_bodies.hpp"
+#include "linear/large_array.hpp"
+
+namespace spook {
+
+/// All arrays are per body of the scene.
+struct StepMotion {
+    explicit StepMotion(std::shared_ptr<const ContactModel> model) : model_(std::move(model)) {}
+    /// `free_velocity` is v + h M⁻¹ f.
+    void begin(const std::vector<Pose>& at, const std::vector<Vec6>& v,
+               const std::vector<Vec6>& free_velocity);
+    /// What bodies are cast along, once it is known which are supported.
+    void predict(const std::vector<Vec6>& free_velocity);
+
+    bool is_free(std::size_t b) const noexcept { return !supported[b] && !model_->bodies.jointed[b]; }
+    /// Whether a body that is supported, or jointed, moves along the forces.
+    bool moves_along_forces(int body) const;
+    /// Forces act on a free body up to this part of the step; the rest of them comes with the solve.
+    void apply_forces_until(std::size_t body, double part);
+    /// Where bodies may rebound, free ones that are not moved to the time of an impact have half of the forces before any.
+    void apply_half_of_forces();
+    /// A supported body that an impact sends along the forces, or against them: until then its support took its kick.
+    void release_support(int body, const Vec6& after);
+    /// Bodies that forces would bring together again in the rest of the step, so soon after their impact, lie on each other: what
+    /// is left of their forces, which would lift them off where more than the half of the step has passed, is taken by the contact.
+    void lay_down(const LargeArray<StepContact>& points);
+    /// What a supported body of an event that falls in the rest of the step is to go besides, m/s: it falls for all of it, or it
+    /// would have the speed of a fall and not have lost the height.
+    Vec3 free_fall_correction(int body, Vec3 after) const;
+
+    /// Where a body begins its way of this step. An event's bodies have gone part of it with another velocity.
+    Pose moved(int body, const std::vector<Vec6>& along) const;
+    /// Approach and push, from the current velocities.
+    void measure(StepContact& point) const;
+    /// What is left of the step after a point's event, s.
+    double time_left(const StepContact& point) const noexcept;
+    /// How fast the surfaces move along themselves, the first against the second, along `direction`, m/s.
+    double surface_speed(const StepContact& point, Vec3 direction) const noexcept;
+    /// Whether a point that is to rebound was stopped instead, faster than a fall in a step.
+    bool is_stopped(const StepContact& point, double normal) const;
+
+    std::vector<Pose> poses;             // where the step begins
+    std::vector<Vec6> velocity, dv_ext;  // v, and what is still to come of h M⁻¹ f
+    std::vector<Vec6> whole_dv_ext;      // the second before an impact takes its part
+    std::vector<Vec6> predicted;         // what bodies are cast along
+    std::vector<double> toi_fraction;    // the part of the forces that acts before the last impact
+    std::vector<double> event_time;      // s; negative: the body is moved to no impact's time
+    SupportedBodies supported;
+    ExternalDrive drive;
+
+private:
+    std::shared_ptr<const ContactModel> model_;
+};
+
+}  // namespace spook
