@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -70,22 +71,42 @@ def urdf_bodies(root: ElementTree.Element, path: Path) -> Body:
 
 
 def hang_sdf(root: ElementTree.Element, into: Body) -> None:
-    """The links of all its models."""
-    for model in root.iter("model"):
-        links = {link.get("name", ""): Body(link.get("name", "")) for link in model.findall("link")}
-        inner = set()
-        for joint in model.findall("joint"):
-            parent, child = (joint.findtext(end, "").strip() for end in ("parent", "child"))
-            if child in links and child not in inner:
-                links[child].moves = joint.get("type") in MOVES_URDF
-                inner.add(child)
-                if parent in links:
-                    links[parent].children.append(links[child])
-        fixed = model.findtext("static", "false").strip() in ("true", "1")
-        for name, link in links.items():
-            if name not in inner:
-                link.moves = link.free = not fixed
-                into.children.append(link)
+    """The links of all its models, each from its parent's link; what hangs from the world hangs from `into`.
+
+    A link name that several models have is said with its model's, as SDF does: box::link.
+    """
+    links: dict[str, Body] = {}  # by model::link
+    still: set[str] = set()
+    joints: list[tuple[str, ElementTree.Element]] = []
+    for scope, model in _models(root, ""):
+        parts = [f"{scope}::{link.get('name', '')}" for link in model.findall("link")]
+        links |= {name: Body(name.rpartition("::")[2]) for name in parts}
+        joints += [(scope, joint) for joint in model.findall("joint")]
+        if model.findtext("static", "false").strip() in ("true", "1"):
+            still |= {*parts}
+    shared = Counter(link.name for link in links.values())
+    for name, link in links.items():
+        link.name = name if shared[link.name] > 1 else link.name
+        link.moves = link.free = name not in still
+    tops = dict(links)
+    for scope, joint in joints:
+        parent, child = (f"{scope}::{joint.findtext(end, '').strip()}" for end in ("parent", "child"))
+        if child in tops and child != parent:
+            links[child].moves = joint.get("type") in MOVES_URDF and child not in still
+            links[child].free = False
+            links.get(parent, into).children.append(tops.pop(child))
+    into.children += tops.values()
+
+
+def _models(root: ElementTree.Element, scope: str) -> Iterator[tuple[str, ElementTree.Element]]:
+    """Every model with the names of those it is in."""
+    for child in root:
+        if child.tag == "model":
+            name = child.get("name", "")
+            yield (inner := f"{scope}::{name}" if scope else name), child
+            yield from _models(child, inner)
+        elif child.tag in ("sdf", "world"):
+            yield from _models(child, scope)
 
 
 def hanging(bodies: Body, path: Path) -> int:
@@ -99,7 +120,7 @@ def hanging(bodies: Body, path: Path) -> int:
 
 
 def hang_mjcf(element: ElementTree.Element, into: Body) -> None:
-    """Bodies of MJCF, also those in frames."""
+    """Bodies of MJCF, also those in frames, those that are replicated, and points of what is soft."""
     for child in element:
         if child.tag == "body":
             body = Body(child.get("name", ""))
@@ -109,8 +130,45 @@ def hang_mjcf(element: ElementTree.Element, into: Body) -> None:
             body.moves = any(True for _ in _joints(child))
             into.children.append(body)
             hang_mjcf(child, body)
-        elif child.tag in ("frame", "replicate"):
+        elif child.tag == "frame":
             hang_mjcf(child, into)
+        elif child.tag == "replicate":
+            one = Body("")
+            hang_mjcf(child, one)
+            count = round(product_of(child.get("count", "1")))
+            for k in range(count):
+                last = f"{child.get('sep', '')}{k:0{len(str(count))}}"
+                into.children += [_copied(body, last) for body in one.children]
+        elif child.tag == "flexcomp" and child.get("rigid") != "true":
+            pinned = {k for pin in child.findall("pin") for k in pin.get("id", "").split()}
+            free = round(product_of(child.get("count", "1"))) - len(pinned)
+            into.children += [Body("", moves=True) for _ in range(max(1, free))]
+        elif child.tag == "composite":  # a cable, in releases before 4
+            prefix, links = child.get("prefix", ""), round(product_of(child.get("count", "3"))) - 1
+            below = into
+            for k in range(links := min(links, DEEPEST)):
+                name = "first" if k == 0 else "last" if k == links - 1 else str(k)
+                body = Body(
+                    f"{prefix}B_{name}",
+                    moves=k > 0 or child.get("initial") != "none",
+                    free=k == 0 and child.get("initial") == "free",
+                )
+                below.children.append(body)
+                below = body
+
+
+def product_of(counts: str) -> float:
+    """What they ask for; what is no number is left to the engine."""
+    try:
+        return math.prod(map(float, counts.split()))
+    except ValueError:
+        return 1.0
+
+
+def _copied(body: Body, last: str) -> Body:
+    """With what hangs from it, and that behind each name."""
+    below = [_copied(child, last) for child in body.children]
+    return replace(body, name=body.name and body.name + last, children=below)
 
 
 def _joints(body: ElementTree.Element) -> Iterator[ElementTree.Element]:

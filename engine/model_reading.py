@@ -10,13 +10,9 @@ from __future__ import annotations
 import hashlib
 import math
 import os
-import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
-from xml.parsers import expat
-
-import numpy as np
 
 from spook_tracker.engine.model_bodies import (
     DEEPEST,
@@ -27,9 +23,12 @@ from spook_tracker.engine.model_bodies import (
     hang_sdf,
     hanging,
     moving,
+    product_of,
     urdf_bodies,
 )
 from spook_tracker.engine.model_file import Format, Watched
+from spook_tracker.engine.model_meshes import ENTITIES, wrong_mesh
+from spook_tracker.engine.model_parts import attach, settle_joint_types
 
 MOST_BYTES = 64_000_000  # of one file; the largest mesh of the robots people share has a third of that
 MOST_XML = 16_000_000  # bytes of a file that is read as text: elements take ten times their text in memory
@@ -41,7 +40,9 @@ KEPT = ("nkey", "nuserdata")  # of <size>: rows of numbers
 ROW = 100  # numbers in one, at least
 SHORTEST = 1e-6  # s, of a time step: with less a second takes hours
 COPYING = ("replicate", "composite", "flexcomp")  # elements with a count, or a product of counts
-ENTITIES = "declares XML entities, which no model needs; write out what they stand for"
+MOST_ELEMENTS = 1_000_000  # of a model with all copies
+XACRO = ("{http://www.ros.org/wiki/xacro}", "{http://ros.org/wiki/xacro}")
+IN_PACKAGES = ("package://", "model://")
 POINTER = b"version https://git-lfs"  # what a clone without Git LFS has in place of a file
 MOST_WATCHED = 8
 TIME_STEP = 0.002  # s, of MJCF that names none; also what MuJoCo gives a URDF
@@ -73,7 +74,7 @@ class Reading:
     stands_free: bool = False  # everything that moves is free: nothing but contacts carries it
     driven: bool = False  # it has actuators
     gravity: tuple[float, float, float] = GRAVITY  # m/s²
-    assets: dict[str, Path] = field(default_factory=dict)  # a URDF's meshes, by the name after the last slash
+    assets: dict[str, Path] = field(default_factory=dict)  # a URDF's meshes, as it names them
 
 
 def folder_of(path: Path) -> Path:
@@ -104,7 +105,8 @@ class _Reader:
     def __init__(self, path: Path, folder: Path) -> None:
         self.path, self.folder = path, folder
         self.files: dict[Path, None] = {}
-        self.attached: set[Path] = set()
+        self.attached: dict[Path, ElementTree.Element | None] = {}  # none while it is read
+        self.spliced = 0  # elements that came from other files
 
     def reading(self) -> Reading:
         root = self.parsed(self.path)
@@ -118,7 +120,7 @@ class _Reader:
             f"{self.path} is no model by itself: it begins with <{root.tag}>; a model begins with <mujoco>, <robot> or <sdf>"
         )
 
-    def inside(self, path: Path, named_in: Path) -> Path:
+    def inside(self, path: Path, named_in: Path | str) -> Path:
         """The file itself, if it lies inside the folder."""
         found = _resolved(path)
         if not found.is_relative_to(self.folder):
@@ -128,7 +130,7 @@ class _Reader:
             )
         return found
 
-    def taken(self, path: Path, named_in: Path, most: int = MOST_BYTES) -> Path:
+    def taken(self, path: Path, named_in: Path | str, most: int = MOST_BYTES) -> Path:
         """A file of the model, whose size is bounded."""
         found = self.inside(path, named_in)
         if not found.is_file():
@@ -144,7 +146,7 @@ class _Reader:
                 raise ModelError(
                     f"{path} is a pointer of Git LFS in place of the file itself; fetch it with: git lfs pull"
                 )
-        if found not in self.files and (wrong := _wrong_mesh(found)):
+        if found not in self.files and (wrong := wrong_mesh(found)):
             raise ModelError(f"{path} {wrong}")
         self.files.setdefault(found)
         if len(self.files) > MOST_FILES:
@@ -166,7 +168,16 @@ class _Reader:
             root = ElementTree.fromstring(text)
         except (ElementTree.ParseError, ValueError, LookupError) as error:
             raise ModelError(f"{path} is no XML: {error}") from None
-        level, depth = [(root, 1.0)], 0
+        if any(element.tag.startswith(XACRO) for element in root.iter()):
+            raise ModelError(
+                f"{path} is a xacro, of which a model is made first: xacro {path.name} > expanded.urdf"
+            )
+        self.bounded(root, path)
+        return root
+
+    def bounded(self, root: ElementTree.Element, path: Path) -> None:
+        """ModelError where engines would write out more than they can."""
+        level, depth, made = [(root, 1.0)], 0, 0.0
         while level:
             below: list[tuple[ElementTree.Element, float]] = []
             for one, copies in level:
@@ -178,35 +189,44 @@ class _Reader:
                         f"{path}: <{one.tag}> asks for {room:.3g} numbers; it may ask for {MOST_ROOM:.0e}"
                     )
                 below += [(child, own) for child in one]
+                made += own
             level, depth = below, depth + 1
             if depth > DEEPEST:
                 raise ModelError(f"{path} has elements nested deeper than {DEEPEST}")
-        return root
+        if made > MOST_ELEMENTS:
+            raise ModelError(
+                f"{path} has {made:.3g} elements with all copies; it may have {MOST_ELEMENTS:.0e}"
+            )
 
-    def first(self, name: str, places: list[Path], named_in: Path) -> Path:
-        """A named file, looked for in several folders; the first place is the one that is named if it is nowhere."""
-        written = Path(name.removeprefix("file://"))
+    def counted(self, element: ElementTree.Element) -> None:
+        """That is put in the place of its name: each may name another twice."""
+        self.spliced += sum(1 for _ in element.iter())
+        if self.spliced > MOST_ELEMENTS:
+            raise ModelError(
+                f"{self.path} includes or attaches more than {MOST_ELEMENTS:.0e} elements in all"
+            )
+
+    def first(self, name: str, places: list[Path], file: Path, said: str = "") -> Path:
+        """A file named in another, where it is `said`, looked for in several folders; the first place is the one that is
+        named if it is nowhere."""
+        written = Path(name.removeprefix("file://").replace("\\", "/"))
         candidates = [written] if written.is_absolute() else [place / written for place in places]
         if not written.is_absolute() and all(
             not candidate.resolve().is_relative_to(self.folder) for candidate in candidates
         ):
-            self.inside(candidates[0], named_in)
+            self.inside(candidates[0], _where(said or name, file))
         inside = [c for c in candidates if c.resolve().is_relative_to(self.folder)]
         there = next((candidate for candidate in inside if candidate.is_file()), (inside or candidates)[0])
-        return self.taken(there, named_in)
+        return self.taken(there, file if there.is_file() else _where(said or name, file))
 
     # MJCF
 
     def mjcf(self, root: ElementTree.Element) -> Reading:
-        self.expand(root, self.path.parent, self.path, (self.path.resolve(),))
+        self.completed(root, self.path)
+        self.bounded(root, self.path)
         bodies = Body("")
         for world in root.findall("worldbody"):
             hang_mjcf(world, bodies)
-        if not any(len(world) for world in root.findall("worldbody")):
-            raise ModelError(
-                f"{self.path} is no model by itself: nothing is in its world; it is a part for inclusion"
-            )
-        self.mjcf_files(root, self.path.parent, self.path)
         steps = [o.get("timestep") for o in root.findall("option") if o.get("timestep")]
         keys = [key for frames in root.findall("keyframe") for key in frames.findall("key")]
         return self.found(
@@ -217,6 +237,17 @@ class _Reader:
             driven=any(len(actuators) for actuators in root.findall("actuator")),
             gravity=_gravity([o.get("gravity") for o in root.findall("option")], self.path),
         )
+
+    def completed(self, root: ElementTree.Element, file: Path) -> None:
+        """With what it includes and attaches in its place, and all its files known."""
+        self.expand(root, file.parent, file, (_resolved(file),))
+        if not any(len(world) for world in root.findall("worldbody")):
+            raise ModelError(
+                f"{file} is no model by itself: nothing is in its world; it is a part for inclusion"
+            )
+        models = self.mjcf_files(root, file.parent, file)
+        settle_joint_types(root)
+        attach(root, models, self.counted)
 
     def expand(self, element: ElementTree.Element, main: Path, file: Path, within: tuple[Path, ...]) -> None:
         """Put what is included in its place."""
@@ -235,86 +266,100 @@ class _Reader:
                 raise ModelError(f"{file} includes {found.name}, which includes it")
             included = self.parsed(found, file)
             self.expand(included, main, found, (*within, found))
+            self.counted(included)
             element[place : place + 1] = list(included)
             place += len(included)
 
-    def mjcf_files(self, root: ElementTree.Element, main: Path, file: Path) -> None:
-        """Meshes, height fields, skins, textures and attached models."""
-        folders = {"mesh": "", "texture": ""}
+    def mjcf_files(self, root: ElementTree.Element, main: Path, file: Path) -> dict[str, ElementTree.Element]:
+        """Meshes, height fields, skins and textures; and attached models, by name."""
+        folders, models = {"mesh": "", "texture": ""}, {}
         for compiler in root.findall("compiler"):
             both = compiler.get("assetdir")
             folders["mesh"] = compiler.get("meshdir", both or folders["mesh"])
             folders["texture"] = compiler.get("texturedir", both or folders["texture"])
         for element in root.iter():
-            if element.tag == "model" and element.get("file"):
-                child = self.first(str(element.get("file")), [main, file.parent], file)
+            if element.tag == "model" and (name := element.get("file")):
+                child = self.first(name, [main, file.parent], file)
                 if child not in self.attached:
-                    self.attached.add(child)
+                    self.attached[child] = None
                     other = self.parsed(child, file)
                     if other.tag == "mujoco":
-                        self.expand(other, child.parent, child, (child,))
-                        self.mjcf_files(other, child.parent, child)
+                        self.completed(other, child)
+                    self.attached[child] = other
+                if (made := self.attached[child]) is None:
+                    raise ModelError(f"{_where(name, file)} attaches {child.name}, which attaches it")
+                models[element.get("name", made.get("model", ""))] = made
             for attribute in FILES_OF.get(element.tag, ()):
                 if name := element.get(attribute):
                     folder = folders["texture" if element.tag == "texture" else "mesh"]
                     self.first(name, [main / folder, main], file)
+        return models
 
     # URDF and SDF
 
     def urdf(self, root: ElementTree.Element) -> Reading:
         bodies = urdf_bodies(root, self.path)
         assets = {}
-        for collision in (False, True):  # what collides goes before what is only seen
-            for mesh in (
-                m for k in root.iter("collision" if collision else "visual") for m in k.iter("mesh")
-            ):
-                if name := mesh.get("filename"):
-                    assets[name.rpartition("/")[2]] = self.first(
-                        _local(name), self.ros_places(name), self.path
-                    )
+        compiler = root.find("mujoco/compiler")
+        told = compiler.get("meshdir", compiler.get("assetdir")) if compiler is not None else None
+        for mesh in root.iter("mesh"):
+            if name := mesh.get("filename"):
+                local, places = _local(name), self.ros_places(name)
+                if told is not None:
+                    beside = self.path.parent / told
+                    places = [beside, *places]
+                    if (beside / Path(local).name).is_file() and not (beside / local).is_file():
+                        local = Path(local).name  # MuJoCo strips the folders
+                assets[name] = self.first(local, places, self.path, name)
         return self.found("URDF", bodies, TIME_STEP, assets=assets)
 
     def ros_places(self, name: str) -> list[Path]:
         """Where a mesh may lie: beside the file, or in any folder above that the package could be."""
         above = [f for f in self.path.resolve().parents if f.is_relative_to(self.folder)]
-        package = name.removeprefix("package://").partition("/")[0] if name.startswith("package://") else ""
-        named = [folder / package for folder in above] + [f for f in above if f.name == package]
+        package = name.partition("://")[2].partition("/")[0] if name.startswith(IN_PACKAGES) else ""
+        named = [f for f in above if f.name == package] + [folder / package for folder in above]
         return [*(named if package else []), self.path.parent]
 
     def sdf(self, root: ElementTree.Element) -> Reading:
         bodies = Body("")
-        step = root.findtext(".//physics/max_step_size")
-        self.sdf_models(root, self.path, (self.path.resolve(),), bodies)
+        self.sdf_completed(root, self.path, (self.path.resolve(),))
+        hang_sdf(root, bodies)
         if not bodies.children:
             raise ModelError(f"{self.path} is no model: it has no links")
         hanging(bodies, self.path)
+        step = root.findtext(".//physics/max_step_size")
         gravity = _gravity([root.findtext(".//gravity")], self.path)
         return self.found("SDF", bodies, _step(step, self.path) if step else 0.001, gravity=gravity)
 
-    def sdf_models(
-        self, root: ElementTree.Element, file: Path, within: tuple[Path, ...], bodies: Body
-    ) -> None:
-        """The links of a file's models and of those it includes, and the files that all of them name."""
-        hang_sdf(root, bodies)
-        for element in root.iter():
-            for uri in element.findall("uri") if element.tag in NAMING_SDF else ():
-                found = self.of_uri((uri.text or "").strip(), file)
-                if element.tag != "include":
-                    continue
-                if found in within:
-                    raise ModelError(f"{file} includes {found.name}, which includes it")
-                self.sdf_models(self.parsed(found, file), found, (*within, found), bodies)
+    def sdf_completed(self, root: ElementTree.Element, file: Path, within: tuple[Path, ...]) -> None:
+        """All files that it names are looked for, and what it includes is put in its place."""
+        for holder in list(root.iter()):
+            for place, element in enumerate(holder):
+                for uri in element.findall("uri") if element.tag in NAMING_SDF else ():
+                    found = self.of_uri((uri.text or "").strip(), file)
+                    if element.tag != "include":
+                        continue
+                    if found in within:
+                        raise ModelError(f"{file} includes {found.name}, which includes it")
+                    other = self.parsed(found, file)
+                    self.sdf_completed(other, found, (*within, found))
+                    self.counted(other)
+                    if (model := other.find("model")) is not None:
+                        model.set("name", element.findtext("name", model.get("name", "")).strip())
+                        if (static := element.find("static")) is not None:
+                            model.insert(0, static)
+                        holder[place] = model
 
     def of_uri(self, uri: str, file: Path) -> Path:
         """The file that an SDF means: beside it, beside its folder, or in a folder above of the name it begins with; of a
         folder, its model.sdf."""
-        name = uri.removeprefix("model://").removeprefix("package://")
+        name = uri.partition("://")[2] if uri.startswith(IN_PACKAGES) else uri
         first = name.partition("/")[0]
         above = [folder.parent for folder in file.resolve().parents if folder.name == first]
         places = [file.parent, file.parent.parent, *above]
         if any((place / name / "model.sdf").is_file() for place in places):
             name = f"{name}/model.sdf"
-        return self.first(name, places, file)
+        return self.first(name, places, file, uri)
 
     def found(
         self,
@@ -357,35 +402,6 @@ class _Reader:
         return total.hexdigest()[:16]
 
 
-def _wrong_mesh(file: Path) -> str:
-    """Why engines' own readers would come to harm by it; empty if they would not, or it is no mesh written as text."""
-    kind = file.suffix.lower()
-    if kind == ".dae":
-        parser = expat.ParserCreate()  # keeps no tree, which takes ten times the text
-        parser.EntityDeclHandler = _no_entity
-        try:
-            parser.Parse(file.read_bytes(), True)
-        except ModelError as error:
-            return str(error)
-        except (expat.ExpatError, ValueError, LookupError) as error:
-            return f"is no XML: {error}"
-    if kind == ".obj":
-        content = re.sub(rb"\\\r?\n", b" ", re.sub(rb"#.*", b"", file.read_bytes()))
-        corners = len(re.findall(rb"^[ \t]*v[ \t]", content, re.MULTILINE))
-        faces = b" ".join(re.findall(rb"^[ \t]*f[ \t]+(.*)", content, re.MULTILINE))
-        try:
-            named = np.array(re.sub(rb"/\S*", b"", faces).split(), dtype=np.int64)
-        except (ValueError, OverflowError):
-            return "has faces of something else than whole numbers"
-        if len(far := named[(named == 0) | (np.abs(named) > corners)]):
-            return f"has a face with corner {far[0]}, of {corners}"
-    return ""
-
-
-def _no_entity(*_declared: object) -> None:
-    raise ModelError(ENTITIES)
-
-
 def _resolved(path: Path) -> Path:
     """Where a path leads to."""
     try:
@@ -395,11 +411,15 @@ def _resolved(path: Path) -> Path:
 
 
 def _copies(element: ElementTree.Element) -> float:
-    """What its counts ask for; what is no number is left to the engine."""
-    try:
-        return math.prod(map(float, element.get("count", "1").split()))
-    except ValueError:
-        return 1.0
+    """What its counts ask for."""
+    return product_of(element.get("count", "1"))
+
+
+def _where(said: str, file: Path) -> str:
+    """A file, and its line that says something."""
+    text = file.read_text(encoding="utf-8-sig", errors="replace")
+    place = text.find(said)
+    return f"{file}, line {text.count(chr(10), 0, place) + 1}," if place >= 0 else str(file)
 
 
 def _room(element: ElementTree.Element) -> float:
@@ -420,7 +440,7 @@ def _beside(file: Path, main: Path) -> str:
 
 def _local(name: str) -> str:
     """Where in its package: package://name/meshes/a.stl -> meshes/a.stl."""
-    return name.removeprefix("package://").partition("/")[2] if name.startswith("package://") else name
+    return name.partition("://")[2].partition("/")[2] if name.startswith(IN_PACKAGES) else name
 
 
 def _step(text: str | None, path: Path) -> float:

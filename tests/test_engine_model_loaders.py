@@ -37,9 +37,9 @@ def engine(request: pytest.FixtureRequest) -> Any:
         pytest.skip(str(missing))
 
 
-def _model(folder: Path, text: str, **facts: Any) -> ModelFile:
+def _model(folder: Path, text: str, suffix: str = "urdf", **facts: Any) -> ModelFile:
     folder.mkdir(exist_ok=True)
-    file = folder / "model.urdf"
+    file = folder / f"model.{suffix}"
     file.write_text(text)
     found = read(file)
     return ModelFile(
@@ -76,6 +76,30 @@ def test_the_same_bits_come_twice_and_pushes_move_it(tmp_path: Path, engine: Any
     ]
 
     assert runs[0].state_hash == runs[1].state_hash != runs[2].state_hash
+
+
+WORLD = """<sdf version="1.6"><world name="w"><physics type="ode"><max_step_size>.002</max_step_size></physics><gravity>0 0 -9.81</gravity>
+<model name="floor"><static>1</static><link name="link">{inertial}<collision name="c"><pose>0 0 -.5 0 0 0</pose><geometry><box>
+<size>9 9 1</size></box></geometry></collision></link></model>{balls}</world></sdf>"""
+INERTIAL = "<inertial><mass>1</mass><inertia><ixx>.01</ixx><iyy>.01</iyy><izz>.01</izz><ixy>0</ixy><ixz>0</ixz><iyz>0</iyz></inertia></inertial>"
+BALL = '<model name="{}"><pose>{} 0 {} 0 0 0</pose><link name="link">{}<collision name="c"><geometry><sphere><radius>.15</radius></sphere></geometry></collision></link></model>'
+
+
+@pytest.mark.parametrize("name", ["drake", "dart", "pybullet"])
+def test_links_of_one_name_in_several_models_are_told_apart(tmp_path: Path, name: str) -> None:
+    """Every model of an SDF world may call its link so: two balls fall a little, and the floor carries both."""
+    try:
+        simulate = find(name).simulate
+    except EngineMissing as missing:
+        pytest.skip(str(missing))
+    balls = "".join(BALL.format(f"ball{k}", k, 0.16 + 0.02 * k, INERTIAL) for k in (0, 1))
+    model = _model(tmp_path, WORLD.format(inertial=INERTIAL, balls=balls), suffix="sdf")
+    found = simulate(ModelRun(model=model, samples=(0.0, 1.5)), time_step=0.002, duration=1.5)
+
+    assert [one.name for one in model.watched] == ["ball0::link", "ball1::link"]
+    assert pytest.approx(np.array([[0.0, 0.16], [1.0, 0.18]]), abs=1e-6) == found["position"][0, :, [0, 2]].T
+    assert found["position"][-1, :, 2] == pytest.approx(0.15, abs=3e-3)
+    assert float(found["load"]) == pytest.approx(1.0, abs=0.02)
 
 
 LIAR = b"x" * 80 + b"\xff" * 4 + bytes(50)  # an STL of one triangle that says it has four thousand million

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from spook_tracker.engine.model_bodies import DEEPEST, ModelError
-from spook_tracker.engine.model_reading import folder_of, read
+from spook_tracker.engine.model_reading import Reading, folder_of, read
 
 CART = """<mujoco><compiler meshdir="meshes"/><option timestep=".004"/>
 <asset><mesh name="wheel" file="wheel.stl"/></asset>
@@ -72,7 +72,11 @@ def test_a_urdf_finds_its_packages_and_its_last_moving_link(tmp_path: Path) -> N
     found = read(file)
 
     assert [one.label for one in found.watched] == ["hand"]
-    assert found.assets == {"upper.stl": (tmp_path / "arm_description/meshes/upper.stl").resolve()}
+    assert found.assets == {
+        "package://arm_description/meshes/upper.stl": (
+            tmp_path / "arm_description/meshes/upper.stl"
+        ).resolve()
+    }
 
 
 def test_a_model_belongs_to_its_repository_or_installed_package(tmp_path: Path) -> None:
@@ -96,6 +100,12 @@ def _chain(links: int, more: str = "") -> str:
     )
 
 
+ATTACHED = """<mujoco><asset><model name="part" file="parts/arm.xml"/></asset><worldbody>
+<frame pos="0 1 0"><attach model="part" body="upper" prefix="left_"/></frame>
+<attach model="part" prefix="right_"/></worldbody></mujoco>"""
+PART = """<mujoco model="arm"><default><default class="loose"><joint type="free"/></default></default>
+<worldbody><body name="upper"><joint/><geom size=".1"/><body name="fore"><joint/><geom size=".1"/></body></body>
+<body name="nut" childclass="loose"><joint/><geom size=".1"/></body></worldbody></mujoco>"""
 BOMB = '<!DOCTYPE m [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><mujoco><worldbody><body name="&b;"/></worldbody></mujoco>'
 
 
@@ -125,7 +135,12 @@ BOMB = '<!DOCTYPE m [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><mujoco><worldbody
         ('<mujoco><worldbody><include file="gone.xml"/></worldbody></mujoco>', "gone.xml, which is no file"),
         ('<mujoco><worldbody><include file="robot.xml"/></worldbody></mujoco>', "which includes it"),
         ('<mujoco><worldbody><include/></worldbody></mujoco>', "does not name"),
-        (CART.replace("meshes", "elsewhere"), "wheel.stl, which is no file"),
+        (CART.replace("meshes", "elsewhere"), r"robot.xml, line 2, names .*elsewhere.wheel.stl, which is no file"),
+        ('<mujoco><worldbody><include file="parts\\gone.xml"/></worldbody></mujoco>', "parts/gone.xml, which is no file"),
+        (ATTACHED.replace("arm.xml", "loop.xml"), "loop.xml, which attaches it"),
+        (ATTACHED.replace("arm.xml", "doubled0.xml"), r"includes or attaches more than 1e\+06 elements"),
+        ("<mujoco><worldbody>" + '<replicate count="10000"><body/></replicate>' * 60 + "</worldbody></mujoco>", "elements with all copies"),
+        ('<robot xmlns:x="http://www.ros.org/wiki/xacro"><x:include filename="arm.xacro"/></robot>', "robot.xml is a xacro"),
         (CART.replace("wheel.stl", "../../secret.stl"), "lies outside"),
         (CART.replace("wheel.stl", "/etc/passwd"), "lies outside"),
         ('<mujoco><worldbody><include file="../secret.xml"/></worldbody></mujoco>', "lies outside"),
@@ -161,6 +176,10 @@ def test_what_cannot_be_read_is_one_sentence_that_names_the_file(
     )
     (tmp_path / "models/parts/bomb.dae").write_text(BOMB)
     (tmp_path / "models/parts/torn.dae").write_bytes(b"<COLLADA\xff\x00")
+    (tmp_path / "models/parts/loop.xml").write_text(ATTACHED.replace("parts/arm.xml", "loop.xml"))
+    for k in range(21):
+        twice = ATTACHED.replace("parts/arm.xml", f"doubled{k + 1}.xml").replace(' body="upper"', "")
+        (tmp_path / f"models/parts/doubled{k}.xml").write_text(twice if k < 20 else PART)
     for name, face in (("far", "1/1/1 2//1 9"), ("word", "1 2 x")):
         (tmp_path / f"models/parts/{name}.obj").write_text(f"v 0 0 0\nv 1 0 0\nv 0 1 0\nf {face}\n")
     file = tmp_path / "models/robot.xml"
@@ -170,7 +189,85 @@ def test_what_cannot_be_read_is_one_sentence_that_names_the_file(
         read(file)
 
     assert "\n" not in str(raised.value)
-    assert any(name in str(raised.value) for name in ("robot.xml", "model.sdf", ".dae", ".obj"))
+    assert any(name in str(raised.value) for name in ("robot.xml", "loop.xml", "model.sdf", ".dae", ".obj"))
+
+
+def _names(found: Reading) -> list[str]:
+    return [one.name for one in found.watched]
+
+
+def test_bodies_that_are_attached_or_replicated_are_watched_by_the_names_they_get(tmp_path: Path) -> None:
+    (tmp_path / "parts").mkdir()
+    (tmp_path / "parts/arm.xml").write_text(PART)
+    file = tmp_path / "robot.xml"
+    file.write_text(ATTACHED)
+    found = read(file)
+
+    assert _names(found) == ["left_fore", "right_fore", "right_nut"]
+    assert (found.bodies, len(found.files), found.stands_free) == (5, 2, False)
+    ball = '<replicate count="2"><replicate count="10" sep="-"><body name="ball"><freejoint/><geom size=".1"/></body></replicate></replicate>'
+    file.write_text(f"<mujoco><worldbody>{ball}</worldbody></mujoco>")
+    found = read(file)
+    assert (found.bodies, found.stands_free) == (20, True)
+    assert _names(found)[:2] == ["ball-000", "ball-010"]  # as MuJoCo has them: the inner number first
+    file.write_text(PART.replace('<body name="upper"><joint/>', '<body name="upper">'))
+    assert [(one.name, read(file).stands_free) for one in read(file).watched] == [
+        ("fore", False),
+        ("nut", False),
+    ]
+
+
+def test_what_is_made_by_elements_alone_moves(tmp_path: Path) -> None:
+    """A cable, which releases before 4 have, and a soft grid with a corner that is held."""
+    file = tmp_path / "soft.xml"
+    file.write_text(
+        '<mujoco><worldbody><composite type="cable" prefix="C" count="11 1 1" initial="none"/></worldbody></mujoco>'
+    )
+    assert (_names(read(file)), read(file).bodies) == (["CB_last"], 9)
+    file.write_text(
+        '<mujoco><worldbody><flexcomp name="soft" count="2 2 1"><pin id="0 3"/></flexcomp></worldbody></mujoco>'
+    )
+    assert [one.path for one in read(file).watched] == [(0,), (1,)]
+    file.write_text('<mujoco><worldbody><flexcomp name="stiff" rigid="true"/></worldbody></mujoco>')
+    with pytest.raises(ModelError, match="nothing in"):
+        read(file)
+
+
+def test_links_of_an_sdf_hang_from_the_world_and_share_names_between_models(tmp_path: Path) -> None:
+    file = tmp_path / "world.sdf"
+    hung = '<joint type="{}"><parent>world</parent><child>bar</child></joint>'
+    bar = '<sdf><model name="bar"><link name="bar"/>{}</model></sdf>'
+    file.write_text(bar.format(hung.format("revolute")))
+    assert (_names(read(file)), read(file).stands_free) == (["bar"], False)
+    file.write_text(bar.format(hung.format("fixed")))
+    with pytest.raises(ModelError, match="nothing in"):
+        read(file)
+    (tmp_path / "box").mkdir()
+    (tmp_path / "box/model.sdf").write_text('<sdf><model name="box"><link name="link"/></model></sdf>')
+    box = "<include><uri>model://box</uri>{}</include>"
+    floor = '<model name="floor"><static>true</static><link name="link"/></model>'
+    one, other = box.format(""), box.format("<name>other</name>")
+    still = box.format("<name>still</name><static>1</static>")
+    file.write_text(f'<sdf><world name="w">{floor}{one}{other}{still}</world></sdf>')
+    found = read(file)
+    assert (_names(found), found.stands_free) == (["box::link", "other::link"], True)
+
+
+def test_a_urdf_says_to_mujoco_where_its_meshes_are(tmp_path: Path) -> None:
+    """By the compiler element that MuJoCo reads; else beside the file, also of a model:// as Gazebo has it."""
+    (tmp_path / "arm_description/meshes").mkdir(parents=True)
+    (tmp_path / "arm_description/package.xml").write_text("")
+    (tmp_path / "arm_description/meshes/upper.stl").write_text("x")
+    file = tmp_path / "arm_description/arm.urdf"
+    for name, head in (
+        ("upper.stl", '<mujoco><compiler meshdir="meshes"/></mujoco>'),
+        ("package://arm_description/elsewhere/upper.stl", '<mujoco><compiler meshdir="meshes"/></mujoco>'),
+        ("model://arm_description/meshes/upper.stl", ""),
+    ):
+        text = ARM.replace('<robot name="arm">', f'<robot name="arm">{head}')
+        file.write_text(text.replace("package://arm_description/meshes/upper.stl", name))
+
+        assert {key: path.name for key, path in read(file).assets.items()} == {name: "upper.stl"}
 
 
 @pytest.mark.parametrize(

@@ -20,6 +20,7 @@ from spook_tracker.engine.find import find
 from spook_tracker.engine.method import PLAIN
 from spook_tracker.engine.model_file import Drive, ModelFile, ModelRun, Watched
 from spook_tracker.engine.model_reading import read
+from spook_tracker.engine.peers.mujoco_file import load
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.scalar_tests.model_file import books, cost, ladder, motion, rest
 from spook_tracker.scalar_tests.model_file.facts import Asked, turns
@@ -217,6 +218,32 @@ def test_to_hold_the_start_asks_servos_to_stay_at_the_keyframe(tmp_path: Path) -
 
     assert angle[0] == pytest.approx(0.5, abs=1e-12)
     assert angle[1] < 0.5
+
+
+def test_meshes_of_one_name_in_two_folders_of_a_urdf_stay_two(tmp_path: Path) -> None:
+    """MuJoCo tells what it is handed by the name after the last slash."""
+    link = '<link name="{0}"><collision><geometry><mesh filename="package://two/{0}/link.obj"/></geometry></collision></link>'
+    joint = '<joint name="{0}" type="continuous"><parent link="{1}"/><child link="{0}"/></joint>'
+    links = "".join(map(link.format, "ab"))
+    (tmp_path / "package.xml").write_text("")
+    (tmp_path / "two.urdf").write_text(
+        f'<robot name="two"><link name="base"/>{links}{joint.format("a", "base")}{joint.format("b", "a")}</robot>'
+    )
+    for name, size in (("a", 1.0), ("b", 4.0)):
+        (tmp_path / name).mkdir()
+        corners = "".join(
+            f"v {size * x} {size * y} {size * z}\n"
+            for x, y, z in ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1))
+        )
+        (tmp_path / name / "link.obj").write_text(corners + "f 1 3 2\nf 1 2 4\nf 2 3 4\nf 1 4 3\n")
+    found = read(tmp_path / "two.urdf")
+    assets = {name: str(path) for name, path in found.assets.items()}
+    model = ModelFile(
+        path=str(found.path), format="URDF", digest="", time_step=0.01, watched=found.watched, assets=assets
+    )
+
+    a, b = load(ModelRun(model=model)).geom_rbound
+    assert b == pytest.approx(4.0 * a)
 
 
 def test_what_mujoco_refuses_or_lacks_is_not_supported_by_name(tmp_path: Path) -> None:

@@ -261,6 +261,49 @@ def test_what_it_lacks_is_named_with_its_line_and_all_of_it_at_once(tmp_path: Pa
     assert "\n" not in str(refused.value)
 
 
+FLOOR = """<mujoco><option>{option}</option><default>{default}</default><worldbody>
+<geom name="floor" type="plane" size="2 2 .1" {floor}/>
+<body name="b" pos="0 0 .2"><joint name="root" type="free"/><geom name="box" type="box" size=".1 .1 .1"/>
+<body pos=".3 0 0"><joint name="h" {joint}/><geom size=".05"/></body></body></worldbody>
+<contact>{pair}</contact><actuator>{actuator}</actuator></mujoco>"""
+
+
+@pytest.mark.parametrize(
+    ("part", "text", "said"),
+    [
+        ("default", '<joint damping="1"/>', r"a free joint with springs, damping or friction \(joint 'root' in line 3\)"),
+        ("default", '<joint armature="1"/>', r"a free joint with armature \(joint 'root' in line 3\)"),
+        ("pair", '<pair name="p" geom1="floor" geom2="box" friction=".1 .1 .1 .1 .1"/>', r"friction of its own \(pair 'p' in line 5\)"),
+        ("pair", '<pair geom1="floor" geom2="box" condim="1"/>', r"friction of its own \(pair 'floor and box'\)"),
+        ("option", '<flag override="enable"/>', "for all contacts"),
+        ("floor", 'surfacevel="1 0 0"', r"a surface that moves along itself \(geom 'floor' in line 2\)"),
+        ("floor", 'adhesion="1"', r"a surface that clings \(geom 'floor' in line 2\)"),
+        ("joint", 'stiffness="1" springyield="1"', r"springs or damping that are not linear \(joint 'h' in line 4\)"),
+        ("actuator", '<motor name="a" joint="h" delay=".01" nsample="10"/>', r"an actuator with a delay \(actuator 'a' in line 5\)"),
+    ],
+)  # fmt: skip
+def test_what_would_move_a_model_is_never_passed_over(
+    part: str, text: str, said: str, tmp_path: Path
+) -> None:
+    parts = dict.fromkeys(("option", "default", "floor", "joint", "pair", "actuator"), "")
+    model = _model(tmp_path, FLOOR.format(**parts | {part: text}))
+    try:
+        mujoco.MjModel.from_xml_path(model.path)
+    except ValueError as older:
+        assert "unrecognized attribute" in str(older)
+        pytest.skip("this release of MuJoCo does not have it")
+
+    with pytest.raises(NotSupported, match=said):
+        find("spook").simulate(ModelRun(model=model), time_step=0.002, duration=0.1)
+
+
+def test_a_pair_that_rubs_as_its_geoms_do_is_taken(tmp_path: Path) -> None:
+    parts = dict.fromkeys(("option", "default", "floor", "joint", "pair", "actuator"), "")
+    model = _model(tmp_path, FLOOR.format(**parts | {"pair": '<pair geom1="floor" geom2="box"/>'}))
+
+    assert find("spook").simulate(ModelRun(model=model), time_step=0.002, duration=0.1).completed
+
+
 def test_a_tie_that_is_open_at_the_start_is_refused(tmp_path: Path) -> None:
     tie = '<equality><connect name="far" body1="tip" anchor="0 0 0" solref=".01 1"/></equality>'
     text = _arm(HINGE, '<joint axis="1 0 0"/>', tie)

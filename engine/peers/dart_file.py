@@ -114,11 +114,7 @@ class _Simulation(LoadedModel):
         if not self.moving:
             raise NotSupported(f"nothing in {Path(run.model.path).name} moves in dart")
         names = {body.getName(): body for body in bodies}
-        self.owners = {
-            body.getShapeNode(k).getName(): body.getName()
-            for body in bodies
-            for k in range(body.getNumShapeNodes())
-        }
+        names |= {f"{body.getSkeleton().getName()}::{body.getName()}": body for body in bodies}
         self.watched = [self._found(one, names) for one in run.model.watched]
         self.freedom = sum(skeleton.getNumDofs() for skeleton in self.skeletons)
         self.size = self._size()
@@ -188,13 +184,13 @@ class _Simulation(LoadedModel):
         return {"violation": 0.0}  # joint coordinates: limits are not read
 
     def at_end(self) -> dict[str, Any]:
-        gravity, moving = np.array(self.run.model.gravity), {body.getName() for body in self.moving}
+        gravity, moving = np.array(self.run.model.gravity), {*self.moving}
         deepest = carried = 0.0
         for contact in self.world.getLastCollisionResult().getContacts():
             deepest = max(deepest, float(contact.penetrationDepth))
             held = float(np.ravel(contact.force) @ gravity)  # on the first
             shapes = (contact.collisionObject1, contact.collisionObject2)
-            owners = [self.owners.get(one.getShapeFrame().getName(), "") for one in shapes]
+            owners = [one.getShapeFrame().getBodyNode() for one in shapes]
             if (owners[0] in moving) != (owners[1] in moving):
                 carried += -held if owners[0] in moving else held
         mass = sum(body.getMass() for body in self.moving)

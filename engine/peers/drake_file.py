@@ -97,7 +97,12 @@ class _Simulation(LoadedModel):
                 self.plant.WeldFrames(world, first.body_frame())
 
     def _found(self, watched: Watched) -> Any:
-        if not watched.path and self.plant.HasBodyNamed(watched.name):
+        model, scoped, name = watched.name.rpartition("::")
+        if scoped and self.plant.HasModelInstanceNamed(model):
+            instance = self.plant.GetModelInstanceByName(model)
+            if self.plant.HasBodyNamed(name, instance):
+                return self.plant.GetBodyByName(name, instance)
+        elif not watched.path and self.plant.HasBodyNamed(watched.name):
             return self.plant.GetBodyByName(watched.name)
         raise NotSupported(f"drake finds no body {watched.label!r} in {Path(self.run.model.path).name}")
 

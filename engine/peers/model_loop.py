@@ -78,8 +78,8 @@ def packages(run: ModelRun) -> dict[str, str]:
     """Folders of the packages that a file's meshes are named by: package://NAME/meshes/a.stl."""
     text = Path(run.model.path).read_text(encoding="utf-8", errors="replace")
     found = {}
-    for name, rest in re.findall(r"""package://([^/"']+)/([^"'<]+)""", text):
-        file = run.model.assets.get(rest.rpartition("/")[2], "")
+    for kind, name, rest in re.findall(r"""(package|model)://([^/"']+)/([^"'<]+)""", text):
+        file = run.model.assets.get(f"{kind}://{name}/{rest}", "")
         if file.endswith(f"/{rest}"):
             found[name] = file[: -len(rest) - 1]
     return found

@@ -75,9 +75,14 @@ class Drives:
             "that is a servo on a joint of bounded force, which others drive as well": servo
             and any(m.jnt_actfrclimited[joint] and self._others(actuator, joint) for joint, _ in arms),
             "that is a servo of several joints": servo and len(arms) > 1,
-            "with damping of its own": bool(getattr(m, "actuator_damping", np.zeros(m.nu))[actuator]),
+            "with damping of its own": self._any(actuator, "damping", "dampingpoly"),
+            "with a delay": self._any(actuator, "delay"),
         }
         return next((what for what, there in kinds.items() if there), "")
+
+    def _any(self, actuator: int, *names: str) -> bool:
+        """Whether some of these, which releases of MuJoCo have or have not, are not zero."""
+        return any(np.any(getattr(self.m, f"actuator_{n}", np.zeros(self.m.nu))[actuator]) for n in names)
 
     def _gives_way(self, actuator: int, joint: int) -> bool:
         """Whether it is a servo of bounded force."""

@@ -57,11 +57,18 @@ def run_model(run: ModelRun, time_step: float, duration: float, time_limit: floa
 
 
 def load(run: ModelRun) -> Any:
-    """The compiled model; a URDF's meshes are handed in, for MuJoCo does not know where packages lie."""
+    """The compiled model; a URDF's meshes are handed in, for MuJoCo does not know where packages lie. It tells them by
+    what stands after the last slash: meshes of one such name are handed in by others."""
     path = Path(run.model.path)
     if run.model.format == "URDF":
-        assets = {name: Path(file).read_bytes() for name, file in run.model.assets.items()}
-        return mujoco.MjModel.from_xml_string(path.read_text(encoding="utf-8"), assets)
+        text, files = path.read_text(encoding="utf-8"), dict[str, str]()
+        for number, (name, file) in enumerate(run.model.assets.items()):
+            short = name.rpartition("/")[2]
+            if files.setdefault(short, file) != file:
+                files[other := f"{number}_{short}"] = file
+                text = text.replace(f'"{name}"', f'"{other}"').replace(f"'{name}'", f"'{other}'")
+        assets = {name: Path(file).read_bytes() for name, file in files.items()}
+        return mujoco.MjModel.from_xml_string(text, assets)
     return mujoco.MjModel.from_xml_path(str(path))
 
 

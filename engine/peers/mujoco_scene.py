@@ -248,6 +248,11 @@ class _Translation:
         holder = above.name if above else WORLD
         numbers = range(m.body_jntadr[body], m.body_jntadr[body] + m.body_jntnum[body])
         if m.jnt_type[numbers[0]] == FREE:
+            dof = m.jnt_dofadr[numbers[0]]
+            if any(self.passive(numbers[0])[:2]) or (self.has("FRICTIONLOSS") and m.dof_frictionloss[dof]):
+                self.lack("a free joint with springs, damping or friction", "joint", numbers[0])
+            if m.dof_armature[dof]:
+                self.lack("a free joint with armature", "joint", numbers[0])
             return
         self.tied.add(frozenset((holder, child.name)))
         parent = int(self.weld[m.body_parentid[body]])
@@ -336,8 +341,12 @@ class _Translation:
         """Stiffness and damping of a joint by itself, and where its spring rests [m or rad]."""
         m = self.m
         dof = m.jnt_dofadr[number]
-        for poly, what in (("jnt_stiffnesspoly", number), ("dof_dampingpoly", dof)):
-            if hasattr(m, poly) and np.any(getattr(m, poly)[what]):
+        for poly, what, part in (
+            ("jnt_stiffnesspoly", number, "SPRING"),
+            ("jnt_springyield", number, "SPRING"),
+            ("dof_dampingpoly", dof, "DAMPER"),
+        ):
+            if self.has(part) and np.any(getattr(m, poly, np.zeros(m.nv))[what]):
                 self.lack("springs or damping that are not linear", "joint", number)
         stiffness = float(m.jnt_stiffness[number]) if self.has("SPRING") else 0.0
         damping = float(m.dof_damping[dof]) if self.has("DAMPER") else 0.0

@@ -63,9 +63,39 @@ class _Surfaces:
         self.m, self.d, self.main, self.lacks = model, data, main, lacks
         self.weld = weld[np.asarray(model.geom_bodyid)]
         self.meets = self.meeting(tied)
+        self.refuse_what_we_lack()
 
     def label(self, geom: int) -> str:
         return mujoco.mj_id2name(self.m, mujoco.mjtObj.mjOBJ_GEOM, geom) or str(geom)
+
+    def refuse_what_we_lack(self) -> None:
+        """What of surfaces that touch no material of ours can say."""
+        m = self.m
+        for kind, what in (
+            ("surfacevel", "a surface that moves along itself"),
+            ("adhesion", "a surface that clings"),
+        ):
+            values = getattr(m, f"geom_{kind}", np.zeros(m.ngeom))
+            for geom in range(m.ngeom):
+                if np.any(values[geom]) and self.meets[geom].any():
+                    self.lacks.add(what, "geom", self.label(geom))
+        if m.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE):
+            self.lacks.add("one friction and softness for all contacts (flag override)")
+        for pair, (one, two) in enumerate(zip(m.pair_geom1, m.pair_geom2, strict=True)):
+            if not self.as_its_geoms(pair, int(one), int(two)):
+                name = (
+                    mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_PAIR, pair)
+                    or f"{self.label(int(one))} and {self.label(int(two))}"
+                )
+                self.lacks.add("a pair with friction of its own", "pair", name)
+
+    def as_its_geoms(self, pair: int, one: int, two: int) -> bool:
+        """Whether a pair rubs as MuJoCo lets its two geoms rub where none is said of them: as the one that rubs more."""
+        m = self.m
+        sliding, _, spin, rolling, _ = m.pair_friction[pair]
+        alike = np.allclose((sliding, spin, rolling), np.maximum(*m.geom_friction[[one, two]]), rtol=1e-6)
+        clings = bool(np.any(getattr(m, "pair_adhesion", np.zeros(m.npair))[pair]))
+        return alike and not clings and int(m.pair_dim[pair]) == int(np.max(m.geom_condim[[one, two]]))
 
     def meeting(self, tied: set[frozenset[str]]) -> npt.NDArray[np.bool_]:
         """Which geoms may touch, by bits, bodies, exclusions and pairs."""

@@ -125,14 +125,17 @@ class _Simulation(LoadedModel):
         return found
 
     def _names(self) -> dict[str, tuple[int, int]]:
-        names = {}
+        """Links by their names, and by their model's before them."""
+        names: dict[str, tuple[int, int]] = {}
         for body, link in self.links:
             if link < 0:
                 base, made = bullet.getBodyInfo(body, physicsClientId=self.client)
-                names.update({one.decode(): (body, link) for one in (made, base)})
+                made, base = made.decode(), base.decode()
+                found = [made, base, f"{made}::{base}"]
             else:
                 joint = bullet.getJointInfo(body, link, physicsClientId=self.client)
-                names[joint[12].decode()] = (body, link)
+                found = [joint[12].decode(), f"{made}::{joint[12].decode()}"]
+            names |= dict.fromkeys(found, (body, link))
         return names
 
     def _found(self, watched: Watched, names: dict[str, tuple[int, int]]) -> tuple[int, int]:
