@@ -42,6 +42,13 @@ struct Contact {
     std::uint64_t key = 0;  // colliders and feature: the same point has the same key from step to step
 };
 
+/// The colliders of a contact.
+inline IndexPair colliders_of(const Contact& contact) noexcept {
+    constexpr std::uint64_t second = (std::uint64_t{1} << collider_bits) - 1;
+    const std::uint64_t pair = contact.key >> feature_bits;
+    return {static_cast<int>(pair >> collider_bits), static_cast<int>(pair & second)};
+}
+
 /// Finds contacts among a fixed set of colliders. Pairs of one body, pairs in which neither body is dynamic and
 /// excluded pairs never touch; a dynamic body that sleeps counts as one that is not, but for those told to stir.
 class Detection {
@@ -82,6 +89,7 @@ public:
 
     /// A dynamic body sleeps, or is awake again.
     void set_asleep(int body, bool asleep) noexcept { role_[body] = asleep ? sleeps : awake; }
+    bool is_asleep(int body) const noexcept { return role_[body] == sleeps; }
     /// A body that moves as it is told does so, or stands still: then no sleeper need be told from it.
     void mark_moving(int body, bool moves) noexcept { role_[body] = moves ? is_moving : none; }
 

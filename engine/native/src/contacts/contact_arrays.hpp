@@ -42,19 +42,6 @@ void order_by_key(Items& items, Items& rest, std::vector<std::pair<std::uint64_t
     }
 }
 
-/// Of an open pair, by its place; s.
-struct Meeting {
-    std::size_t open;
-    double time;
-};
-
-/// Of a body, the one at that place.
-struct MeetingOf {
-    int body;
-    double time;
-    std::size_t at;
-};
-
 /// A depth [m] by pair of colliders, in one array.
 struct DepthOfPair {
     using Item = std::pair<std::uint64_t, double>;
@@ -124,8 +111,6 @@ struct ContactArrays {
     std::vector<double> share;        // per moving body
     std::vector<EnergySums> sums;     // by island
     std::vector<Vec6> free_velocity;  // per moving body
-    std::vector<IndexPair> grazing;   // pairs, see skip_grazing()
-    std::vector<std::size_t> asked;   // open pairs to be judged
     // Which bodies are connected by rows of joints and points; where a solve is shortened.
     IslandFinder connected, shortened;
 };

@@ -34,12 +34,6 @@ struct ContactCache {
     /// Whether that pair of colliders had a point.
     bool has_pair(std::uint64_t pair) const noexcept;
 
-    /// Which bodies of a contact sleep, behind those there are.
-    void add_sleepers(const Contact& contact, std::vector<int>& found) const {
-        for (const int body : {contact.first, contact.second})
-            if (sleeps(body)) found.push_back(body);
-    }
-
     /// What such bodies touch is put by, or taken up again. `bodies`: of the scene.
     void put_to_sleep(const std::vector<int>& sleepers, std::size_t bodies);
     void wake(const std::vector<int>& sleepers);

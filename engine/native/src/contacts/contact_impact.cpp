@@ -168,23 +168,25 @@ void ContactStage::solve_impact(MixedSystem& hit, std::size_t joints, std::vecto
     if (report.finite && !settled) judge_impact(quality_, judged(), hit, friction, model);
 }
 
-/// Whether the bodies that a plastic impact sets in motion meet others with restitution in this very step. The resting rows
-/// that answer such impacts know of no bounce: plastic ones, too, are then met before, so that these are found in time. If
-/// there are none, what has been found late is no longer left out: it is met as if it did not rebound.
-bool ContactStage::needs_plastic_impact() {
-    if (!late_impact_ || plastic_first_) return false;
-    plastic_first_ = true;
+/// After a solve: whether an impact is to come first. Where impacts that rebound were left out, bodies that a plastic impact
+/// sets in motion may meet others with restitution in this very step. The resting rows that answer such impacts know of no
+/// bounce: plastic ones, too, are then met before, so that these are found in time. If there are none, what has been left out is
+/// met as if it did not rebound. So come impacts of bodies that a stop sends back with `next` with others that no row knew
+/// of: `known` is how many points there were.
+bool ContactStage::needs_impact_first(const MixedSystem& system, std::size_t known,
+                                      const std::vector<Vec6>& next, bool left_out) {
+    if (left_out) {
+        plastic_first_ = true;
+        measure_points();
+        if (impact_needed_) {
+            points_.order(state_.cache, model_->surfaces.resists_turning);
+            return true;
+        }
+        find_impacts({next, Cast::When::solved}, true);
+    }
+    if (points_.all.size() == known || !stop_is_hit(system)) return false;
+    points_.order(state_.cache, model_->surfaces.resists_turning);
     measure_points();
-    if (impact_needed_) points_.order(state_.cache, model_->surfaces.resists_turning);
-    return impact_needed_;
-}
-
-/// Gives points to the impacts that were left out for an impact that does not come.
-bool ContactStage::find_deferred_impacts(const std::vector<Vec6>& velocity) {
-    late_impact_ = false;
-    const std::size_t dissipated_energy = points_.all.size();
-    if (find_impacts(velocity, true) == 0) return false;
-    move_impacts_to_start(dissipated_energy, velocity);
     return true;
 }
 
@@ -221,22 +223,6 @@ bool ContactStage::stop_is_hit(const MixedSystem& system) const {
     return std::any_of(system.rows.begin(), system.rows.end(), [&](const RowBlock& block) {
         return is_hit(block) && touched[islands.of_body[std::max(block.first, block.second)]];
     });
-}
-
-/// Whether bodies that a stop sends back with `next` meet others that no row knew of: `known` is how many points there
-/// were. Such impacts come after the stop's.
-bool ContactStage::needs_stop_impact(const MixedSystem& system, std::size_t known,
-                                     const std::vector<Vec6>& next) {
-    const auto hit = [this](const RowBlock& block) { return is_hit(block); };
-    if (std::none_of(system.rows.begin(), system.rows.end(), hit)) return false;
-    if (late_impact_) {
-        plastic_first_ = true;  // keeps them
-        find_deferred_impacts(next);
-    }
-    if (points_.all.size() == known || !stop_is_hit(system)) return false;
-    points_.order(state_.cache, model_->surfaces.resists_turning);
-    measure_points();
-    return true;
 }
 
 /// Leaves out points that close where nothing is approached and no stop is hit: what goes on elsewhere is nothing to their
@@ -401,13 +387,13 @@ void ContactStage::after_impact(const MixedSystem& system) {
         if (model_->bodies.solver_index[b] >= 0 && !motion_.supported[b] && !model_->bodies.jointed[b])
             next[b] = sum(motion_.velocity[b], motion_.dv_ext[b]);
     changed_.assign(next.size(), 1);
-    if (margins_.outrun(model_->bodies, model_->options.time_step, next, changed_)) find_open_again();
+    const Cast cast{next};
+    search_.widen(cast, changed_, motion_, points_);
     const std::size_t known = points_.all.size();
-    const bool found = find_impacts(next, false) > 0;
-    if (found) {
+    if (search_.find_impacts(cast, changed_, false, motion_, points_).pairs > 0) {
         for (std::size_t k = known; k < points_.all.size(); ++k)
             if (come_in_order(points_.all[k])) move_to_last_impact(points_.all[k]);
-        move_impacts_to_start(known, next);
+        search_.move_impacts_to_start(known, next, motion_, points_);
         state_.counters.contacts += points_.all.size() - known;
         points_.order(state_.cache, model_->surfaces.resists_turning);
     }

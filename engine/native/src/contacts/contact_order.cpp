@@ -55,8 +55,10 @@ void ContactStage::find_events() {
             may_move_along[island] = std::max<std::size_t>(may_move_along[island], 1);
         if (point.toi < 0.0) {
             const double approach = -relative_velocity(point, contact.point.normal, motion_.predicted);
-            if (approach > 1e-9 * (margins_.reach()[contact.first] + margins_.reach()[contact.second]) /
-                               model_->options.time_step)
+            if (approach >
+                1e-9 *
+                    (search_.margins().reach()[contact.first] + search_.margins().reach()[contact.second]) /
+                    model_->options.time_step)
                 plain[island] = 0;
             continue;
         }
@@ -77,7 +79,7 @@ void ContactStage::find_events() {
         fastest = std::max(fastest, norm(linear(motion_.predicted[b])));
     }
     const auto island = [&](int b) { return model_->bodies.solver_index[b] >= 0 ? root(b) : b; };
-    for (const OpenPair& open : open_.pairs) {
+    for (const OpenPair& open : search_.open().pairs) {
         if (open.has_met()) continue;
         const int a = island(open.first), b = island(open.second);
         if (open.apart.gap > model_->options.time_step * (speed[a] + speed[b])) continue;
@@ -128,7 +130,9 @@ void ContactStage::measure_points() {
         const double kick =
             norm(linear(motion_.dv_ext[contact.first])) + norm(linear(motion_.dv_ext[contact.second]));
         point.rounding =
-            1e-6 * kick + 1e-12 * (margins_.reach()[contact.first] + margins_.reach()[contact.second]) / h;
+            1e-6 * kick +
+            1e-12 * (search_.margins().reach()[contact.first] + search_.margins().reach()[contact.second]) /
+                h;
         impact_needed_ = impact_needed_ || is_impact(point);
     }
 }

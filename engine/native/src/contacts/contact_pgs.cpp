@@ -58,25 +58,12 @@ void ContactStage::hand_over() {
     }
 }
 
-/// How much deeper into what supports them bodies would go with the velocities so far.
-void ContactStage::predict_sinking() {
-    std::fill(predicted_sinking_.begin(), predicted_sinking_.end(), 0.0);
-    for (const Point& point : points_.all) {
-        if (point.toi >= 0.0) continue;
-        const Contact& contact = point.contact;
-        const double closing = -relative_velocity(point, contact.point.normal, next_);
-        const double sinking = model_->options.time_step * closing - std::max(0.0, contact.point.gap);
-        for (const int b : {contact.first, contact.second})
-            predicted_sinking_[b] = std::max(predicted_sinking_[b], sinking);
-    }
-}
-
 /// Pairs that meet because of what the iterations have found so far get rows in the same solve.
-bool ContactStage::find_more(bool over) {
+bool ContactStage::find_more(bool over, PgsLook& look) {
     const bool first = next_.empty();  // look of this step
     if (first) next_ = motion_.velocity;
     // On the way bodies are skipped at the sides of others that they do meet in the end, and need not have changed since.
-    const bool was_settling = std::exchange(iterating_, !over);
+    const bool was_settling = std::exchange(look.iterating, !over);
     const bool all = first || (was_settling && over && model_->bodies.swings);
     changed_.assign(model_->bodies.count(), all);
     pgs_.visit_moved([&](int moving) {
@@ -85,13 +72,14 @@ bool ContactStage::find_more(bool over) {
         changed_[b] = all || next_[b] != now;
         next_[b] = now;
     });
-    if (margins_.outrun(model_->bodies, model_->options.time_step, next_, changed_)) find_open_again();
-    if (model_->bodies.swings) predict_sinking();
+    const Cast cast{next_, over ? Cast::When::solved : Cast::When::iterating};
+    search_.widen(cast, changed_, motion_, points_);
+    if (model_->bodies.swings) search_.edges.predict_sinking(search_.step(motion_), points_, next_);
     const std::size_t known = points_.all.size();
-    const bool turned = find_turned(next_);
-    const std::size_t dissipated_energy = points_.all.size();
-    if (find_impacts(next_, true) > 0) move_impacts_to_start(dissipated_energy, next_);
-    else if (!turned) return false;
+    const bool turned = search_.find_turned(next_, motion_, points_);
+    const CandidateSearch::Found found = find_impacts(cast, plastic_first_);
+    look.left_out = look.left_out || found.left_out;
+    if (found.pairs == 0 && !turned) return false;
     take_in(known);
     return true;
 }
@@ -183,10 +171,10 @@ const ContactStage::Unanswered& ContactStage::find_unanswered(std::size_t bodies
 /// Where a solve sets many bodies in motion towards others, each solve would find a few pairs more that meet. Iterations find
 /// nearly all of them at a fraction of the cost, and the next solve starts from where they end. Islands that an earlier
 /// solve has answered, and no new point ties to others, stay as they are to the last bit.
-void ContactStage::warm_start_by_pgs(MixedSystem& system, std::size_t known, int round) {
-    if (model_->surfaces.resists_turning) return;  // PGS over contacts knows no such friction
-    if (points_.all.size() <= few_points && round < many_rounds) return;
-    if (find_unanswered(system.mass.size(), known).largest <= few_points && round < many_rounds) return;
+bool ContactStage::warm_start_by_pgs(MixedSystem& system, std::size_t known, int round) {
+    if (model_->surfaces.resists_turning) return false;  // PGS over contacts knows no such friction
+    if (points_.all.size() <= few_points && round < many_rounds) return false;
+    if (find_unanswered(system.mass.size(), known).largest <= few_points && round < many_rounds) return false;
     double speed = 0.0;
     for (const Vec6& v : system.velocity) speed = std::max(speed, norm(linear(v)));
     system.rows.clear();
@@ -195,13 +183,12 @@ void ContactStage::warm_start_by_pgs(MixedSystem& system, std::size_t known, int
     handed_over_ = 0;
     hand_over();
     const double enough = warm_started * speed;
+    PgsLook look;  // what is left out by velocities on the way, the solve will tell
     const FrictionReport report =
-        pgs_.run(warm_start_iterations, enough, enough, [this](bool over) { return find_more(over); });
+        pgs_.run(warm_start_iterations, enough, enough, [&](bool over) { return find_more(over, look); });
     state_.counters.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
-    late_impact_ = false;  // by velocities on the way: the solve will tell
-    std::fill(predicted_sinking_.begin(), predicted_sinking_.end(), 0.0);
-    if (!report.finite) return;
-    warm_started_ = true;
+    search_.edges.forget_sinking();
+    if (!report.finite) return false;
     const Unanswered& islands = find_unanswered(system.mass.size(), known);
     for (std::size_t k = 0; k < points_.all.size(); ++k) {
         if (!islands.open[islands.island[k]]) continue;
@@ -211,15 +198,15 @@ void ContactStage::warm_start_by_pgs(MixedSystem& system, std::size_t known, int
         point.normal = impulse[0];
         for (int i = 0; i < 2; ++i) point.tangents[i] = impulse[i + 1] * points_.extras(point).axis_scale[i];
     }
+    return true;
 }
 
 ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
     pgs_.start(system, model_->options.friction);
     next_.clear();
-    late_impact_ = false;
     handed_over_ = 0;
     hand_over();
-    iterating_ = false;
+    PgsLook look;
     const std::size_t begun = points_.all.size();
     FrictionReport report;
     quality_ = {};
@@ -230,7 +217,7 @@ ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
              ++turn) {
             report = pgs_.run(model_->options.iterations, model_->options.residual_tolerance,
                               focus * model_->options.unsettled_residual,
-                              [this](bool over) { return find_more(over); });
+                              [&](bool over) { return find_more(over, look); });
             state_.counters.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
             PgsEnd end;
             if (report.finite) end = judge_pgs(system);
@@ -239,7 +226,7 @@ ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
                 quality_.residual > std::exchange(last, quality_.residual) && system.rows.empty();
             if (!report.finite || (grows && runs_away(system))) {
                 points_.all.resize(begun);  // what was met on that way is not
-                find_open();
+                search_.find_open(motion_, points_, Cast::When::solved);
                 ran_away_ = true;
                 return {{}, true};
             }
@@ -247,18 +234,17 @@ ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
         }
         pgs_.write(system);
         if (!report.finite) break;
-        if (!late_impact_) {
-            if (needs_stop_impact(system, begun, next_)) return {};
+        if (!look.left_out) {
+            if (needs_impact_first(system, begun, next_, false)) return {};
             break;
         }
-        late_impact_ = false;  // it was one by velocities on the way
+        look.left_out = false;  // it was one by velocities on the way
         for (std::size_t b = 0; b < model_->bodies.count(); ++b)
             if (model_->bodies.solver_index[b] >= 0) next_[b] = pgs_.velocity(model_->bodies.solver_index[b]);
         changed_.assign(model_->bodies.count(), 1);
         const std::size_t known = points_.all.size();
-        if (find_impacts(next_, true) > 0) move_impacts_to_start(known, next_);
-        if (needs_plastic_impact() || needs_stop_impact(system, begun, next_)) return {};
-        if (late_impact_) find_deferred_impacts(next_);
+        const bool left_out = find_impacts({next_, Cast::When::solved}, plastic_first_).left_out;
+        if (needs_impact_first(system, begun, next_, left_out)) return {};
         again = points_.all.size() > known;
         if (again) take_in(known);
     }

@@ -7,29 +7,29 @@
 namespace spook {
 
 void ContactStage::put_to_sleep(const std::vector<int>& bodies) {
-    for (const int body : bodies) detection_.set_asleep(body, true);
+    for (const int body : bodies) search_.detection.set_asleep(body, true);
     state_.cache.put_to_sleep(bodies, model_->bodies.count());
 }
 
 void ContactStage::wake(const std::vector<int>& bodies) {
-    for (const int body : bodies) detection_.set_asleep(body, false);
+    for (const int body : bodies) search_.detection.set_asleep(body, false);
     state_.cache.wake(bodies);
 }
 
 void ContactStage::sleep_through() {
-    woken_.clear();
+    search_.woken.clear();
     points_.all.clear();
     correction_.clear();
 }
 
 /// What sleeps is what slept then, for the search as well.
 void ContactStage::lie_as(const State& state) {
-    woken_.clear();
+    search_.woken.clear();
     if (state_.cache.asleep.empty() && state.cache.asleep.empty()) return;
     for (std::size_t b = 0; b < model_->bodies.count(); ++b) {
         const int body = static_cast<int>(b);
         if (const bool slept = state.cache.sleeps(body); slept != state_.cache.sleeps(body))
-            detection_.set_asleep(body, slept);
+            search_.detection.set_asleep(body, slept);
     }
 }
 

@@ -18,18 +18,88 @@ using namespace tolerances::contact_stage;
 ContactStage::ContactStage(Detection detection, const std::vector<SurfaceMaterial>& materials,
                            std::vector<int> unknown, const ContactOptions& options,
                            std::vector<IndexPair> joints, std::vector<char> yielding)
-    : detection_(std::move(detection)),
-      model_(std::make_shared<ContactModel>(ContactBodies{detection_, std::move(unknown), std::move(joints)},
+    : model_(std::make_shared<ContactModel>(ContactBodies{detection, std::move(unknown), std::move(joints)},
                                             ContactSurfaces{materials}, options)),
       motion_(model_),
+      search_(std::move(detection), model_),
       projector_(model_, std::move(yielding)) {
     for (IslandSolver* solver : {&resting_solver_, &impact_solver_}) {
         solver->floor = options.floor;
         solver->refinements = options.refinements;
     }
+}
+
+bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6>& velocity,
+                          const std::vector<Vec6>& free_velocity) {
     const std::size_t bodies = model_->bodies.count();
-    depth_.assign(bodies, 0.0);
-    predicted_sinking_.assign(bodies, 0.0);
+    motion_.begin(poses, velocity, free_velocity);
+    projector_.begin_step();
+    // By island, of which there may be as many as bodies, however late; a copy of the stage has no room for them.
+    arrays_.sums.reserve(bodies);
+    correction_.clear();
+    points_.clear();
+    impact_needed_ = plastic_first_ = false;
+    ran_away_ = false;  // of a step that was taken back, or is over
+    impact_rounds_ = 0;
+    if (model_->surfaces.rebounds || model_->options.impacts == ImpactOrder::successive)
+        clock_.assign(bodies, 0.0), path_.assign(bodies, Vec6{}), in_order_.assign(bodies, 0);
+
+    search_.begin(motion_, free_velocity, points_);
+    motion_.predict(free_velocity);
+    const std::size_t closed_points = points_.all.size();
+    if (!state_.initial_penetration_known) note_initial_penetrations();
+    if (search_.find_impacts({motion_.predicted}, changed_, false, motion_, points_).pairs > 0) {
+        find_events();
+        search_.move_impacts_to_start(closed_points, motion_.predicted, motion_, points_);
+    }
+    if (points_.all.empty()) {
+        state_.cache.points.clear();
+        return false;
+    }
+    state_.counters.contacts += points_.all.size();
+    motion_.apply_half_of_forces();
+    points_.order(state_.cache, model_->surfaces.resists_turning);
+    measure_points();
+    return true;
+}
+
+/// Takes down how deep pairs overlap where the run begins: nothing but the scene has brought them there.
+void ContactStage::note_initial_penetrations() {
+    state_.initial_penetration_known = true;
+    for (const Point& point : points_.all) {
+        const double excess = -point.contact.point.gap - elastic_depth(model_->bodies, point);
+        if (!(excess > 0.0)) continue;
+        double& given = state_.initial_penetration[point.contact.key >> feature_bits];
+        given = std::max(given, excess);
+    }
+}
+
+bool ContactStage::meets(const std::vector<Vec6>& next, bool stop_hit, bool rebounds) {
+    plastic_first_ = rebounds;          // impacts that a stop's rebound leads to are found again after it
+    changed_ = model_->bodies.jointed;  // others have been cast along what they fly with
+    const Cast cast{next, Cast::When::solved};
+    search_.widen(cast, changed_, motion_, points_);
+    const std::size_t closed_points = points_.all.size();
+    CandidateSearch::Found found = search_.find_impacts(cast, changed_, plastic_first_, motion_, points_);
+    if (found.left_out && stop_hit) {  // as are those to a body that it only stops
+        plastic_first_ = true;
+        found.pairs += search_.find_impacts(cast, changed_, true, motion_, points_).pairs;
+    }
+    if (found.pairs > 0) search_.move_impacts_to_start(closed_points, next, motion_, points_);
+    if (points_.all.empty()) return false;
+    state_.counters.contacts += points_.all.size();
+    motion_.apply_half_of_forces();
+    points_.order(state_.cache, model_->surfaces.resists_turning);
+    return true;
+}
+
+/// Gives points to what bodies meet along such velocities, where the step begins.
+CandidateSearch::Found ContactStage::find_impacts(const Cast& cast, bool keeps_rebounds) {
+    const std::size_t from = points_.all.size();
+    const CandidateSearch::Found found =
+        search_.find_impacts(cast, changed_, keeps_rebounds, motion_, points_);
+    if (found.pairs > 0) search_.move_impacts_to_start(from, cast.velocity, motion_, points_);
+    return found;
 }
 
 IslandRules ContactStage::rules_of(FrictionModel model, bool exact) const noexcept {
@@ -41,7 +111,8 @@ IslandRules ContactStage::rules_of(FrictionModel model, bool exact) const noexce
 ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity) {
     const std::size_t joints = system.rows.size();
     motion_.velocity = velocity;
-    warm_started_ = ran_away_ = false;
+    ran_away_ = false;
+    bool warm_started = false;
     const auto by_rows = [&] { return state_.by_rows && joints + points_.all.size() <= few_jointed; };
     if (model_->options.solver == SolverKind::iterative && !model_->surfaces.resists_turning) {
         if (by_rows()) pgs_.start(system, model_->options.friction);  // overlaps are parted with its masses
@@ -71,7 +142,7 @@ ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vecto
         const bool late = round > 0 && model_->options.solver == SolverKind::direct;
         // What a resting solve leaves, the next step sees; what an impact leaves stays.
         IslandRules rules = rules_of(model_->options.friction, state_.by_rows);
-        rules.warm_started = warm_started_;
+        rules.warm_started = warm_started;
         if (by_rows()) rules.few_enough = few_jointed;
         report = solve_islands(system, friction, resting_solver_, model_->options, rules, state_.counters,
                                late ? &answered : nullptr);
@@ -84,13 +155,10 @@ ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vecto
         move_on(system, next);
         const std::size_t known = points_.all.size();
         changed_.assign(next.size(), 1);
-        if (margins_.outrun(model_->bodies, model_->options.time_step, next, changed_)) find_open_again();
-        find_turned(next);
-        const std::size_t dissipated_energy = points_.all.size();
-        late_impact_ = false;
-        if (find_impacts(next, true) > 0) move_impacts_to_start(dissipated_energy, next);
-        if (needs_plastic_impact() || needs_stop_impact(system, known, next)) return {};
-        if (late_impact_) find_deferred_impacts(next);
+        const Cast cast{next, Cast::When::solved};
+        search_.widen(cast, changed_, motion_, points_);
+        search_.find_turned(next, motion_, points_);
+        if (needs_impact_first(system, known, next, find_impacts(cast, plastic_first_).left_out)) return {};
         if (points_.all.size() == known) {
             if (passes_other_ends(system, joints, model_->options.time_step)) return {.ends_passed = true};
             break;
@@ -99,7 +167,7 @@ ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vecto
         for (std::size_t k = 0; k < system.rows.size() - joints; ++k)
             store_solution(*model_, system.rows[joints + k], points_, points_.all[k]);
         if (joints == 0 && model_->options.solver == SolverKind::direct)
-            warm_start_by_pgs(system, known, round);
+            warm_started = warm_start_by_pgs(system, known, round) || warm_started;
         points_.order(state_.cache, model_->surfaces.resists_turning);
     }
     mark_rows(system);  // the last round may have brought rows to bodies that had none
@@ -170,10 +238,10 @@ void ContactStage::correct_events(const MixedSystem& system) {
 
 const PositionProjection* ContactStage::project_positions(const MixedSystem& system, std::size_t joints,
                                                           const std::vector<Pose>& poses, bool again) {
-    const StepEnd end{detection_,        motion_.poses, poses,
-                      margins_.search(), state_.cache,  state_.initial_penetration};
+    const StepEnd end{search_.detection,          motion_.poses, poses,
+                      search_.margins().search(), state_.cache,  state_.initial_penetration};
     return projector_.project({system, joints, pgs_}, end, motion_.drive, again, state_.initial_penetration,
-                              state_.counters, woken_);
+                              state_.counters, search_.woken);
 }
 
 void ContactStage::apply_balancing_impulse(const Islands& islands, int island, Vec3 momentum) noexcept {

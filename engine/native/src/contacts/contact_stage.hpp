@@ -48,16 +48,15 @@
 #include <vector>
 
 #include "collision/detection.hpp"
+#include "contacts/candidate_search.hpp"
 #include "contacts/contact_arrays.hpp"
 #include "contacts/contact_bodies.hpp"
 #include "contacts/contact_cache.hpp"
 #include "contacts/contact_islands.hpp"
 #include "contacts/contact_points.hpp"
 #include "contacts/contact_rows.hpp"
-#include "contacts/open_pairs.hpp"
 #include "contacts/pgs_solver.hpp"
 #include "contacts/position_projection.hpp"
-#include "contacts/search_margins.hpp"
 #include "contacts/solve_islands.hpp"
 #include "contacts/solve_quality.hpp"
 #include "contacts/step_motion.hpp"
@@ -76,7 +75,7 @@ public:
                  std::vector<char> yielding = {});
 
     /// Whether any contact can ever be; if not, the stage can be left out.
-    bool possible() const noexcept { return detection_.possible(); }
+    bool possible() const noexcept { return search_.detection.possible(); }
 
     /// Impacts of this body are met at the start of the step, like the stops of its joints, never at their own time.
     void leave_at_start(int body) noexcept { model_->bodies.ball[body] = 0; }
@@ -142,9 +141,9 @@ public:
     /// These are awake again, with their touches as they were left.
     void wake(const std::vector<int>& bodies);
     /// A body that moves as it is told does so in this step, or stands still.
-    void mark_moving(int body, bool moves) noexcept { detection_.mark_moving(body, moves); }
+    void mark_moving(int body, bool moves) noexcept { search_.detection.mark_moving(body, moves); }
     /// Sleepers that another body met, or was moved into, since the step began.
-    const std::vector<int>& woken() const noexcept { return woken_; }
+    const std::vector<int>& woken() const noexcept { return search_.woken; }
     /// A step that all bodies sleep through.
     void sleep_through();
     const ContactBodies& bodies() const noexcept { return model_->bodies; }
@@ -184,34 +183,19 @@ public:
 
 private:
     using Point = StepContact;
-    void add_point(const Contact& contact, const Pose& first, const Pose& second, double toi);
     void lie_as(const State& state);
-    void find_open();
-    void find_open_again();
     bool is_impact(const Point& point) const noexcept;
-    bool needs_plastic_impact();
-    bool find_deferred_impacts(const std::vector<Vec6>& velocity);
-    void look_at(const std::vector<IndexPair>& near);
-    OpenPair opened(const IndexPair& pair, const Separation& apart) const;
-    bool skip_grazing(std::size_t from);
-    bool is_grazing(const Point& point, double overlap) const;
-    int find_impacts(const std::vector<Vec6>& velocity, bool late);
-    bool find_turned(const std::vector<Vec6>& velocity);
-    bool is_known(const Contact& contact, std::size_t from, std::size_t end, double size, bool& named) const;
-    bool add_toi_points(IndexPair pair, const Pose& first, const Pose& second, double time,
-                        const std::vector<Vec6>& velocity, bool late);
-    bool add_toi_point_at_start(const OpenPair& open, double time, const std::vector<Vec6>& velocity);
-    void move_impacts_to_start(std::size_t from, const std::vector<Vec6>& velocity);
+    bool needs_impact_first(const MixedSystem& system, std::size_t known, const std::vector<Vec6>& next,
+                            bool left_out);
+    CandidateSearch::Found find_impacts(const Cast& cast, bool keeps_rebounds);
     void find_events();
     void measure_points();
-    bool reachable(const Contact& contact) const;
     ContactRows rows() const noexcept { return {*model_, motion_, points_}; }
     IslandRules rules_of(FrictionModel model, bool exact) const noexcept;
     const Islands& connected(const MixedSystem& system, std::size_t joints) const;
     int island_of(const Islands& islands, const Point& point) const noexcept;
     bool is_hit(const RowBlock& block) const noexcept;
     bool stop_is_hit(const MixedSystem& system) const;
-    bool needs_stop_impact(const MixedSystem& system, std::size_t known, const std::vector<Vec6>& next);
     void find_earliest_impacts(MixedSystem& system, std::vector<std::size_t>& hit_points);
     void find_orderly(const Islands& islands, const std::vector<double>& first,
                       const std::vector<double>& closing);
@@ -230,23 +214,17 @@ private:
     void after_impact(const MixedSystem& system);
     void mark_rows(const MixedSystem& system);
     void move_on(const MixedSystem& system, std::vector<Vec6>& next);
-    double slop(const OpenPair& open) const noexcept;
-    double depth_at_toi(const Point& point, bool late) const;
-    void remove_occluded(std::vector<Meeting>& meetings, const std::vector<Vec6>& velocity);
-    bool occludes(const Meeting& earlier, const Meeting& later, int body,
-                  const std::vector<Vec6>& velocity) const;
-    bool is_internal_edge(const Mover& moving, int body, const Mover& other, const OpenPair& open,
-                          const std::vector<Vec6>& velocity, double time, bool late, Vec3 facing = {}) const;
-    Mover mover(int collider, const Pose& pose, const std::vector<Vec6>& velocity) const;
-    double meeting(const OpenPair& open, const std::vector<Vec6>& velocity, bool late) const;
-    bool passes(const OpenPair& open, const std::vector<Vec6>& velocity) const;
     // contact_pgs.cpp: the same by PGS over compact contacts
     struct PgsSolveEnd : SolveEnd {
         bool unfinished =
             false;  // few joints and contacts are better solved by rows, or the iterations run away
     };
     PgsSolveEnd solve_by_pgs(MixedSystem& system);
-    void warm_start_by_pgs(MixedSystem& system, std::size_t known, int round);
+    bool warm_start_by_pgs(MixedSystem& system, std::size_t known, int round);
+    struct PgsLook {
+        bool iterating = false;  // PGS goes on: what bodies do so far is not final
+        bool left_out = false;   // some impact that rebounds was
+    };
     struct Unanswered {
         std::vector<int> island;          // of each point
         std::vector<char> open;           // islands to be solved
@@ -254,9 +232,8 @@ private:
         std::size_t largest = 0;          // points of one of those
     };
     const Unanswered& find_unanswered(std::size_t bodies, std::size_t known);
-    bool find_more(bool over);
+    bool find_more(bool over, PgsLook& look);
     void take_in(std::size_t known);
-    void predict_sinking();
     struct PgsEnd {
         bool settled = false,
              joint_is_worst = false;  // as near to their law as the method asks for; else a joint is furthest
@@ -273,9 +250,9 @@ private:
     void note_initial_penetrations();
 
     State state_;
-    Detection detection_;
     std::shared_ptr<ContactModel> model_;
     StepMotion motion_;
+    CandidateSearch search_;
     ContactPoints points_;
     IslandSolver resting_solver_, impact_solver_;
     PgsSolver pgs_;
@@ -288,28 +265,14 @@ private:
     std::vector<CachedContact> unordered_;
     mutable ContactArrays arrays_;  // what is in them is of one call
 
-    OpenPairs open_;
-    SearchMargins margins_;
-    PointsOfBodies points_of_;
-    std::vector<Meeting> meetings_;
-    std::vector<MeetingOf> meetings_of_;     // by body and time
-    std::vector<IndexPair> near_;            // where the search was widened
-    std::vector<double> depth_;              // of a body's closed contacts, m
-    std::vector<double> predicted_sinking_;  // what unsettled iterations would add to it in the step, m
-    std::vector<Contact> scratch_;
-    DisjointSets connected_;  // bodies, by contacts and joints
-    std::vector<std::uint64_t> known_;
+    DisjointSets connected_;     // bodies, by contacts and joints
     std::vector<double> clock_;  // of successive impacts: up to when a body's way in the step is known, s
     std::vector<Vec6> path_;     // and that way, m and rad
     std::vector<signed char> in_order_;  // bodies: 1 if impacts come one by one in this step, −1 if not
     std::vector<std::pair<std::uint64_t, std::size_t>> places_;  // of points, by key
-    std::vector<int> woken_;                                     // sleepers met in this step
     std::vector<char> has_rows_;                                 // moving bodies with rows, by unknown
     std::vector<Vec6> correction_;
     bool impact_needed_ = false;
-    bool warm_started_ = false;   // the step's next solve starts from warm_start_by_pgs()
-    bool iterating_ = false;      // PGS goes on: what bodies do so far is not final
-    bool late_impact_ = false;    // an impact found after the solve needs an impact
     bool plastic_first_ = false;  // plastic impacts are met in the impact as well
     int impact_rounds_ = 0;
     SolveQuality quality_;

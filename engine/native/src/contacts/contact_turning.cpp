@@ -1,4 +1,4 @@
-// The contact stage's part for pairs that touch and turn: features that swing in within the step.
+// Pairs that touch and turn: features that swing in within the step.
 //
 // A manifold tells where two bodies touch at the start of a step. While they turn on it, an edge or a corner that was
 // far away may come down elsewhere; no row of that manifold knows of it. So the velocities a solve found are tried:
@@ -8,8 +8,8 @@
 #include <cmath>
 
 #include "collision/shape_cast.hpp"
+#include "contacts/candidate_search.hpp"
 #include "contacts/contact_geometry.hpp"
-#include "contacts/contact_stage.hpp"
 #include "contacts/tolerances.hpp"
 
 namespace spook {
@@ -28,61 +28,61 @@ bool is_single(const Primitive& shape) noexcept {
 }  // namespace
 
 /// Whether the point is one of the pair's: of those in order in [from, end), or of those found since.
-bool ContactStage::is_known(const Contact& contact, std::size_t from, std::size_t end, double size,
-                            bool& named) const {
-    const auto same = [&](const Point& point) {
+bool CandidateSearch::is_known(const ContactPoints& points, const Contact& contact, std::size_t from,
+                               std::size_t end, double size, bool& named) const {
+    const auto same = [&](const StepContact& point) {
         const Contact& old = point.contact;
         named = named || old.key == contact.key;
         return old.key >> feature_bits == contact.key >> feature_bits &&
                dot(old.point.normal, contact.point.normal) > same_direction_cosine &&
                norm(old.point.position - contact.point.position) < same_place * size;
     };
-    const auto at = [this](std::size_t k) { return points_.all.begin() + static_cast<std::ptrdiff_t>(k); };
-    return std::any_of(at(from), at(end), same) || std::any_of(at(points_.ordered), points_.all.end(), same);
+    const auto at = [&points](std::size_t k) { return points.all.begin() + static_cast<std::ptrdiff_t>(k); };
+    return std::any_of(at(from), at(end), same) || std::any_of(at(points.ordered), points.all.end(), same);
 }
 
 /// Looks where `velocity` leads the pairs that have points; true if some feature swings in and got a row.
-bool ContactStage::find_turned(const std::vector<Vec6>& velocity) {
+bool CandidateSearch::find_turned(const std::vector<Vec6>& velocity, const StepMotion& motion,
+                                  ContactPoints& points) {
     if (!model_->bodies.swings) return false;
     const double h = model_->options.time_step;
-    const std::size_t known = points_.all.size();
-    for (std::size_t from = 0, end = 0; from < points_.ordered; from = end) {
-        const std::uint64_t key = points_.all[from].contact.key >> feature_bits;
+    const std::size_t known = points.all.size();
+    for (std::size_t from = 0, end = 0; from < points.ordered; from = end) {
+        const std::uint64_t key = points.all[from].contact.key >> feature_bits;
         double depth = 0.0;
-        for (; end < points_.ordered && points_.all[end].contact.key >> feature_bits == key; ++end)
-            depth = std::max(depth, -points_.all[end].contact.point.gap);
+        for (; end < points.ordered && points.all[end].contact.key >> feature_bits == key; ++end)
+            depth = std::max(depth, -points.all[end].contact.point.gap);
         const IndexPair pair{static_cast<int>(key >> 24), static_cast<int>(key & 0xffffff)};
-        const Collider::View one = detection_.collider(pair.first), two = detection_.collider(pair.second);
-        if (points_.all[from].event || (is_single(one.shape) && is_single(two.shape))) continue;
+        const Collider::View one = detection.collider(pair.first), two = detection.collider(pair.second);
+        if (points.all[from].event || (is_single(one.shape) && is_single(two.shape))) continue;
         const int a = one.body, b = two.body;
         const double size = std::max(model_->bodies.radius[a], model_->bodies.radius[b]);
         const double turning = norm(angular(velocity[a])) * model_->bodies.radius[a] +
                                norm(angular(velocity[b])) * model_->bodies.radius[b];
         const double sliding = norm(linear(velocity[a]) - linear(velocity[b]));
         if (h * (sliding + turning) < deep * size) continue;
-        const Mover first{one.shape, one.part, motion_.poses[a], linear(velocity[a]), angular(velocity[a])};
-        const Mover second{two.shape, two.part, motion_.poses[b], linear(velocity[b]), angular(velocity[b])};
+        const Mover first = step(motion).mover(pair.first, motion.poses[a], velocity),
+                    second = step(motion).mover(pair.second, motion.poses[b], velocity);
         const Pose first_end = first.body_at(h), second_end = second.body_at(h);
         scratch_.clear();
-        detection_.collide_pair(pair, first_end, second_end, 0.0, scratch_);
+        detection.collide_pair(pair, first_end, second_end, 0.0, scratch_);
         for (Contact& contact : scratch_) {
             if (contact.point.gap >= -(depth + deep * size)) continue;
             // Back to where both surfaces were at the start, half-way between them.
             const Vec3 q = contact.point.position;
-            const Vec3 on_first = apply(motion_.poses[a], local(first_end.rotation, q - first_end.position));
+            const Vec3 on_first = apply(motion.poses[a], local(first_end.rotation, q - first_end.position));
             const Vec3 on_second =
-                apply(motion_.poses[b], local(second_end.rotation, q - second_end.position));
+                apply(motion.poses[b], local(second_end.rotation, q - second_end.position));
             contact.point.position = 0.5 * (on_first + on_second);
             bool named = false;
-            if (is_known(contact, from, end, size, named)) continue;
+            if (is_known(points, contact, from, end, size, named)) continue;
             if (named) contact.key |= swung_in;
-            add_point(contact, motion_.poses[a], motion_.poses[b], h);
-            Point& point = points_.all.back();
+            StepContact& point = add_point(points, contact, motion.poses[a], motion.poses[b], h);
             const double closing = -relative_velocity(point, contact.point.normal, velocity);
             point.contact.point.gap = std::max(0.0, contact.point.gap + h * closing);
         }
     }
-    return points_.all.size() > known;
+    return points.all.size() > known;
 }
 
 }  // namespace spook

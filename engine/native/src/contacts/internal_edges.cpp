@@ -1,4 +1,4 @@
-// The contact stage's part for bodies that are sunk into what holds them, and come to the side of its next part.
+// Bodies that are sunk into what holds them, and come to the side of its next part.
 //
 // A body that lies a micron deep in the first of two tiles, as compliance and overlaps make it, would be stopped by the side
 // of the second. Cast as it would stand if it were lifted out of the first, it goes over the second. What does not lie
@@ -8,12 +8,12 @@
 // What falls onto the first tile is cast through it as well, and would come to the side of the second from below: what is met
 // first occludes what a body would meet only behind it. And where edges lie on each other, as a body's and a tile's do when
 // a step begins there, both faces are as near: the one it moves past is no obstacle.
+#include "contacts/internal_edges.hpp"
+
 #include <algorithm>
 #include <span>
 
-#include "collision/shape_cast.hpp"
 #include "contacts/contact_geometry.hpp"
-#include "contacts/contact_stage.hpp"
 #include "contacts/tolerances.hpp"
 
 namespace spook {
@@ -33,67 +33,112 @@ bool meets_side_face(const Mover& one, const Mover& other, double time, Vec3 n) 
            side_cosine;
 }
 
-}  // namespace
-
 /// How deep a closed point is at the start of the step, and what the velocity then adds to it before that is answered, m.
 /// When a solve has answered it, as much as iterations that count as settled may have left, or as the depth.
-double ContactStage::depth_at_toi(const Point& point, bool late) const {
-    const double h = model_->options.time_step, depth = std::max(0.0, -point.contact.point.gap);
+double depth_at_toi(const SearchedStep& step, const StepContact& point, bool late) {
+    const double h = step.model.options.time_step, depth = std::max(0.0, -point.contact.point.gap);
     const double sinking =
-        std::max(0.0, -h * relative_velocity(point, point.contact.point.normal, motion_.velocity));
+        std::max(0.0, -h * relative_velocity(point, point.contact.point.normal, step.motion.velocity));
     const double left =
-        model_->options.solver == SolverKind::iterative ? h * model_->options.unsettled_residual : 0.0;
+        step.model.options.solver == SolverKind::iterative ? h * step.model.options.unsettled_residual : 0.0;
     return depth + (late ? std::min(sinking, std::max(depth, left)) : sinking);
 }
 
-/// Whether `body`, that would meet another at `time` [s], does not once it is lifted out of what holds it. `facing` is
-/// the normal they touch with already, if they do. Between iterations a body may also sink on the way, and to the side of another
-/// as far as settled iterations may have left it falling.
-bool ContactStage::is_internal_edge(const Mover& moving, int body, const Mover& other, const OpenPair& open,
-                                    const std::vector<Vec6>& velocity, double time, bool late,
-                                    Vec3 facing) const {
+}  // namespace
+
+Mover SearchedStep::mover(int collider, const Pose& pose, const std::vector<Vec6>& velocity) const {
+    const Collider::View own = detection.collider(collider);
+    return {own.shape, own.part, pose, linear(velocity[own.body]), angular(velocity[own.body])};
+}
+
+void InternalEdges::begin(std::size_t bodies) {
+    depth_.assign(bodies, 0.0);
+    predicted_sinking_.assign(bodies, 0.0);
+}
+
+void InternalEdges::forget_sinking() noexcept {
+    std::fill(predicted_sinking_.begin(), predicted_sinking_.end(), 0.0);
+}
+
+void InternalEdges::note_depths(const SearchedStep& step, const ContactPoints& points, std::size_t from) {
+    for (std::size_t k = from; k < points.all.size(); ++k) {
+        // As deep as a body will be when it meets the next part of what holds it.
+        const double depth = depth_at_toi(step, points.all[k], false);
+        for (const int b : {points.all[k].contact.first, points.all[k].contact.second})
+            depth_[b] = std::max(depth_[b], depth);
+    }
+}
+
+void InternalEdges::predict_sinking(const SearchedStep& step, const ContactPoints& points,
+                                    const std::vector<Vec6>& velocity) {
+    forget_sinking();
+    for (const StepContact& point : points.all) {
+        if (point.toi >= 0.0) continue;
+        const Contact& contact = point.contact;
+        const double closing = -relative_velocity(point, contact.point.normal, velocity);
+        const double sinking = step.model.options.time_step * closing - std::max(0.0, contact.point.gap);
+        for (const int b : {contact.first, contact.second})
+            predicted_sinking_[b] = std::max(predicted_sinking_[b], sinking);
+    }
+}
+
+void InternalEdges::index(const SearchedStep& step, const ContactPoints& points) {
+    points_of_.find(points.all, step.model.bodies);
+}
+
+double InternalEdges::slop(const SearchedStep& step, const OpenPair& open) const noexcept {
+    const int a = open.first, b = open.second;
+    const bool sides = have_sides(step.detection.collider(open.pair.first).shape,
+                                  step.detection.collider(open.pair.second).shape);
+    return closed * std::max(step.model.bodies.radius[a], step.model.bodies.radius[b]) +
+           (sides ? 2.0 * std::max(predicted_sinking_[a], predicted_sinking_[b]) : 0.0);
+}
+
+bool InternalEdges::is_internal_edge(const SearchedStep& step, const ContactPoints& points,
+                                     const Mover& moving, int body, const Mover& other, const OpenPair& open,
+                                     const Cast& cast, double time, Vec3 facing) const {
+    const bool iterating = cast.when == Cast::When::iterating, late = cast.when != Cast::When::ahead;
     if (!have_sides(moving.shape, other.shape)) return false;
-    const double h = model_->options.time_step, slop = this->slop(open), least = share * slop;
-    const bool by_pgs = model_->options.solver == SolverKind::iterative;
-    if (model_->bodies.solver_index[body] < 0 || !(iterating_ || by_pgs || depth_[body] > least))
-        return false;
+    const double h = step.model.options.time_step, slop = this->slop(step, open), least = share * slop;
+    const bool by_pgs = step.model.options.solver == SolverKind::iterative;
+    if (!step.model.bodies.moves(body) || !(iterating || by_pgs || depth_[body] > least)) return false;
     const std::span<const int> own = points_of_[body];
     for (std::size_t at = 0; at < own.size();) {
-        const std::uint64_t pair = points_.all[own[at]].contact.key >> feature_bits;
+        const std::uint64_t pair = points.all[own[at]].contact.key >> feature_bits;
         Vec3 n, support_velocity;  // what holds it goes itself, m/s
         double depth = -unbounded, begun = 0.0, sinking = 0.0;
-        for (; at < own.size() && points_.all[own[at]].contact.key >> feature_bits == pair; ++at) {
-            const Point& point = points_.all[own[at]];
+        for (; at < own.size() && points.all[own[at]].contact.key >> feature_bits == pair; ++at) {
+            const StepContact& point = points.all[own[at]];
             if (point.toi >= 0.0) continue;
             const double gap = point.contact.point.gap, side = point.contact.first == body ? 1.0 : -1.0;
-            const double deep = depth_at_toi(point, late);
+            const double deep = depth_at_toi(step, point, late);
             if (deep > depth) {
                 const int holder = point.contact.first == body ? point.contact.second : point.contact.first;
                 const Vec3 arm = point.contact.first == body ? point.second_arm : point.first_arm;
                 depth = deep, n = side * point.contact.point.normal;
-                support_velocity = linear(velocity[holder]) + cross(angular(velocity[holder]), arm);
+                support_velocity = linear(cast.velocity[holder]) + cross(angular(cast.velocity[holder]), arm);
             }
             begun = std::max(begun, -gap);
-            sinking = std::max(sinking, depth_at_toi(point, false));
+            sinking = std::max(sinking, depth_at_toi(step, point, false));
         }
         if (depth == -unbounded || pair == pair_of(open.pair) || std::abs(dot(n, facing)) > same_face_cosine)
             continue;
-        if (iterating_ || by_pgs) {
+        if (iterating || by_pgs) {
             const double now = height(moving, 0.0, n), top = height(other, 0.0, -n);
             double falls = 0.0;
             for (const double part : {time, h}) {  // against what holds it, and against the other
                 const double rises = std::max(part * dot(n, support_velocity), top - height(other, part, -n));
                 falls = std::max(falls, now + rises - height(moving, part, n));
             }
-            const double left = h * model_->options.unsettled_residual;
+            const double left = h * step.model.options.unsettled_residual;
             double most = residual_motion * slop;
-            if (iterating_)
+            if (iterating)
                 most = std::max(
-                    begun, left + h * free_fall_allowance * norm(linear(motion_.dv_ext[body])) + sinking);
+                    begun, left + h * free_fall_allowance * norm(linear(step.motion.dv_ext[body])) + sinking);
             else if (falls > most && meets_side_face(moving, other, time, n)) most = left;
             falls = std::min(falls, most);
             depth = std::max(depth, begun + falls);
-            if (iterating_) depth += slop;  // it met the other with as much
+            if (iterating) depth += slop;  // it met the other with as much
         }
         if (!(depth > least)) continue;
         Pose out = moving.body;
@@ -107,17 +152,17 @@ bool ContactStage::is_internal_edge(const Mover& moving, int body, const Mover& 
 
 /// Whether `body`, that meets one after the other in this step, would not meet the later one if the earlier one stopped it:
 /// it falls onto a tile, and would be past its edge, below its top, when it came to the next one's side.
-bool ContactStage::occludes(const Meeting& earlier, const Meeting& later, int body,
-                            const std::vector<Vec6>& velocity) const {
-    const OpenPair &before = open_.pairs[earlier.open], &after = open_.pairs[later.open];
-    const Pose before_first = motion_.moved(before.first, velocity),
-               before_second = motion_.moved(before.second, velocity),
-               after_first = motion_.moved(after.first, velocity),
-               after_second = motion_.moved(after.second, velocity);
-    const Mover one = mover(before.pair.first, before_first, velocity),
-                two = mover(before.pair.second, before_second, velocity),
-                three = mover(after.pair.first, after_first, velocity),
-                four = mover(after.pair.second, after_second, velocity);
+bool InternalEdges::occludes(const SearchedStep& step, const OpenPair& before, double earlier,
+                             const OpenPair& after, double later, int body,
+                             const std::vector<Vec6>& velocity) const {
+    const Pose before_first = step.motion.moved(before.first, velocity),
+               before_second = step.motion.moved(before.second, velocity),
+               after_first = step.motion.moved(after.first, velocity),
+               after_second = step.motion.moved(after.second, velocity);
+    const Mover one = step.mover(before.pair.first, before_first, velocity),
+                two = step.mover(before.pair.second, before_second, velocity),
+                three = step.mover(after.pair.first, after_first, velocity),
+                four = step.mover(after.pair.second, after_second, velocity);
     const Mover &held = before.first == body ? one : two, &moving = after.first == body ? three : four,
                 &other = after.first == body ? four : three;
     for (const Mover* each : {&one, &two, &three, &four})
@@ -126,15 +171,15 @@ bool ContactStage::occludes(const Meeting& earlier, const Meeting& later, int bo
     const auto normal = [](const Mover& a, const Mover& b, double time) {
         return separation(a.shape, a.at(time), b.shape, b.at(time)).normal;
     };
-    const Vec3 n = (before.first == body ? 1.0 : -1.0) * normal(one, two, earlier.time);
-    const Vec3 side = (after.first == body ? 1.0 : -1.0) * normal(three, four, later.time);
+    const Vec3 n = (before.first == body ? 1.0 : -1.0) * normal(one, two, earlier);
+    const Vec3 side = (after.first == body ? 1.0 : -1.0) * normal(three, four, later);
     if (dot(n, side) > same_direction_cosine) return false;
-    const double h = model_->options.time_step, slop = this->slop(after),
-                 level = height(held, earlier.time, n);
-    if (!(level + height(other, earlier.time, -n) > -2.0 * (slop + this->slop(before)))) return false;
+    const double h = step.model.options.time_step, slop = this->slop(step, after),
+                 level = height(held, earlier, n);
+    if (!(level + height(other, earlier, -n) > -2.0 * (slop + this->slop(step, before)))) return false;
     const Mover& holder = before.first == body ? two : one;
-    const double support_path = std::min(0.0, dot(n, holder.velocity)) * (h - earlier.time);
-    const double falls = level + support_path - std::min(height(held, later.time, n), height(held, h, n));
+    const double support_path = std::min(0.0, dot(n, holder.velocity)) * (h - earlier);
+    const double falls = level + support_path - std::min(height(held, later, n), height(held, h, n));
     if (!(falls > 0.0)) return false;
     Pose out = moving.body;
     out.position += (falls + slop) * n;
@@ -142,14 +187,13 @@ bool ContactStage::occludes(const Meeting& earlier, const Meeting& later, int bo
            0.0;
 }
 
-/// Of what one body meets in a step, leaves out what it would not meet if that which comes before stopped it. What it meets
-/// all the same is found again with the velocities of the solve.
-void ContactStage::remove_occluded(std::vector<Meeting>& meetings, const std::vector<Vec6>& velocity) {
-    if (!model_->bodies.swings || meetings.size() < 2) return;
+void InternalEdges::remove_occluded(const SearchedStep& step, const LargeArray<OpenPair>& pairs,
+                                    const std::vector<Vec6>& velocity, std::vector<Meeting>& meetings) {
+    if (!step.model.bodies.swings || meetings.size() < 2) return;
     meetings_of_.clear();
     for (std::size_t at = 0; at < meetings.size(); ++at)
-        for (const int b : {open_.pairs[meetings[at].open].first, open_.pairs[meetings[at].open].second})
-            if (model_->bodies.solver_index[b] >= 0) meetings_of_.push_back({b, meetings[at].time, at});
+        for (const int b : {pairs[meetings[at].open].first, pairs[meetings[at].open].second})
+            if (step.model.bodies.moves(b)) meetings_of_.push_back({b, meetings[at].time, at});
     std::sort(meetings_of_.begin(), meetings_of_.end(), [](const MeetingOf& a, const MeetingOf& b) {
         return a.body != b.body ? a.body < b.body : a.time != b.time ? a.time < b.time : a.at < b.at;
     });
@@ -161,9 +205,10 @@ void ContactStage::remove_occluded(std::vector<Meeting>& meetings, const std::ve
                 Meeting& earlier = meetings[meetings_of_[k].at];
                 if (earlier.time < 0.0) continue;
                 const int body = meetings_of_[from].body;
-                if (occludes(earlier, later, body, velocity)) later.time = -1.0;
-                else if (later.time - earlier.time < simultaneous * model_->options.time_step &&
-                         occludes(later, earlier, body, velocity))
+                const OpenPair &one = pairs[earlier.open], &other = pairs[later.open];
+                if (occludes(step, one, earlier.time, other, later.time, body, velocity)) later.time = -1.0;
+                else if (later.time - earlier.time < simultaneous * step.model.options.time_step &&
+                         occludes(step, other, later.time, one, earlier.time, body, velocity))
                     earlier.time = -1.0;
             }
         }
@@ -172,54 +217,21 @@ void ContactStage::remove_occluded(std::vector<Meeting>& meetings, const std::ve
     std::erase_if(meetings, [](const Meeting& meeting) { return meeting.time < 0.0; });
 }
 
-/// Takes out the points from `from` on of pairs that only graze: they touch with a side or an edge, and as they move no
-/// overlap comes of it. Two bodies whose edges lie on each other touch with either face, and the one they move past is no
-/// obstacle. Whether there are such pairs: they are open then.
-bool ContactStage::skip_grazing(std::size_t from) {
-    if (!model_->bodies.swings || from == points_.all.size()) return false;
-    const double h = model_->options.time_step;
-    std::vector<IndexPair>& gone = arrays_.grazing;
-    gone.clear();
-    points_of_.find(points_.all, model_->bodies);
-    for (std::size_t k = from, end = from; k < points_.all.size(); k = end) {
-        const std::uint64_t key = points_.all[k].contact.key >> feature_bits;
-        std::size_t deepest = k;
-        double most = 0.0;
-        for (; end < points_.all.size() && points_.all[end].contact.key >> feature_bits == key; ++end) {
-            const Contact& contact = points_.all[end].contact;
-            const double closing =
-                -relative_velocity(points_.all[end], contact.point.normal, motion_.velocity);
-            const double overlap = h * closing - std::max(0.0, contact.point.gap);
-            if (overlap > most) most = overlap, deepest = end;
-        }
-        if (most > 0.0 && is_grazing(points_.all[deepest], most))
-            gone.push_back({static_cast<int>(key >> 24), static_cast<int>(key & 0xffffff)});
-    }
-    for (const IndexPair& pair : gone) {
-        const Collider::View one = detection_.collider(pair.first), two = detection_.collider(pair.second);
-        open_.pairs.push_back(opened(pair, separation(one.shape, detection_.pose(pair.first), two.shape,
-                                                      detection_.pose(pair.second))));
-        std::erase_if(points_.all,
-                      [&](const Point& point) { return point.contact.key >> feature_bits == pair_of(pair); });
-    }
-    return !gone.empty();
-}
-
-/// Whether bodies that touch, and would overlap by `overlap` [m] along that normal, do not as they move.
-bool ContactStage::is_grazing(const Point& point, double overlap) const {
+bool InternalEdges::is_grazing(const SearchedStep& step, const ContactPoints& points,
+                               const StepContact& point, const OpenPair& open, double overlap,
+                               Cast::When when) const {
     const Contact& contact = point.contact;
-    const IndexPair pair{static_cast<int>(contact.key >> (feature_bits + 24)),
-                         static_cast<int>(contact.key >> feature_bits & 0xffffff)};
-    if (!have_sides(detection_.collider(pair.first).shape, detection_.collider(pair.second).shape))
+    if (!have_sides(step.detection.collider(open.pair.first).shape,
+                    step.detection.collider(open.pair.second).shape))
         return false;
-    const OpenPair open = opened(pair, {contact.point.gap, contact.point.normal});
-    if (!(overlap > slop(open))) return false;
+    if (!(overlap > slop(step, open))) return false;
+    const Cast cast{step.motion.velocity, when == Cast::When::ahead ? Cast::When::solved : when};
     const int a = contact.first, b = contact.second;
-    const Mover first = mover(pair.first, motion_.poses[a], motion_.velocity),
-                second = mover(pair.second, motion_.poses[b], motion_.velocity);
-    return time_of_impact(first, second, model_->options.time_step, slop(open)) < 0.0 ||
-           is_internal_edge(first, a, second, open, motion_.velocity, 0.0, true, contact.point.normal) ||
-           is_internal_edge(second, b, first, open, motion_.velocity, 0.0, true, contact.point.normal);
+    const Mover first = step.mover(open.pair.first, step.motion.poses[a], step.motion.velocity),
+                second = step.mover(open.pair.second, step.motion.poses[b], step.motion.velocity);
+    return time_of_impact(first, second, step.model.options.time_step, slop(step, open)) < 0.0 ||
+           is_internal_edge(step, points, first, a, second, open, cast, 0.0, contact.point.normal) ||
+           is_internal_edge(step, points, second, b, first, open, cast, 0.0, contact.point.normal);
 }
 
 }  // namespace spook

@@ -294,7 +294,9 @@ const PositionProjection* PositionProjector::project(const Solved& solved, const
         return record.depth <= parted * model_->bodies.slack(record.contact);
     };
     if (again && std::all_of(search_.records.begin(), search_.records.end(), is_rounding)) return nullptr;
-    for (const PenetrationRecord& record : search_.records) end.cache.add_sleepers(record.contact, woken);
+    for (const PenetrationRecord& record : search_.records)
+        for (const int body : {record.contact.first, record.contact.second})
+            if (end.detection.is_asleep(body)) woken.push_back(body);
     if (!again) ++counters.corrections;
     const bool fresh = again && keep_projected(end.poses);
     if (again && !fresh && !(deepest_ < 0.5 * last)) return nullptr;

@@ -109,7 +109,7 @@ void ContactStage::find_earliest_impacts(MixedSystem& system, std::vector<std::s
     for (const Point& point : points_.all)
         arrays_.connected.tie(model_->bodies.solver_index[point.contact.first],
                               model_->bodies.solver_index[point.contact.second]);
-    for (const OpenPair& open : open_.pairs)
+    for (const OpenPair& open : search_.open().pairs)
         if (!open.has_met())
             arrays_.connected.tie(model_->bodies.solver_index[open.first],
                                   model_->bodies.solver_index[open.second]);

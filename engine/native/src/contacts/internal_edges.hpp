@@ -1,0 +1,82 @@
+// Internal edges: sides of what holds a body, and of what it meets first, that it does not meet.
+#pragma once
+
+#include <vector>
+
+#include "collision/detection.hpp"
+#include "collision/shape_cast.hpp"
+#include "contacts/contact_points.hpp"
+#include "contacts/open_pairs.hpp"
+#include "contacts/step_motion.hpp"
+
+namespace spook {
+
+/// What a search reads: shapes, and bodies on their way through the step.
+struct SearchedStep {
+    const ContactModel& model;
+    const Detection& detection;
+    const StepMotion& motion;
+
+    /// A collider whose body goes on from `pose`, which must outlive it.
+    Mover mover(int collider, const Pose& pose, const std::vector<Vec6>& velocity) const;
+};
+
+/// What bodies are cast along, and when: ahead of any solve, between iterations, or after a solve.
+struct Cast {
+    enum class When : unsigned char { ahead, iterating, solved };
+    const std::vector<Vec6>& velocity;  // per body of the scene
+    When when = When::ahead;
+};
+
+/// Of an open pair, by its place; s.
+struct Meeting {
+    std::size_t open;
+    double time;
+};
+
+class InternalEdges {
+public:
+    void begin(std::size_t bodies);
+    /// How deep the closed points from `from` on hold their bodies.
+    void note_depths(const SearchedStep& step, const ContactPoints& points, std::size_t from);
+    /// How much deeper into what supports them bodies would go with velocities between iterations; or that there are none.
+    void predict_sinking(const SearchedStep& step, const ContactPoints& points,
+                         const std::vector<Vec6>& velocity);
+    void forget_sinking() noexcept;
+    /// To be told of the points before what follows is asked.
+    void index(const SearchedStep& step, const ContactPoints& points);
+
+    /// The overlap at which a pair counts as met, m. Bodies that sink while iterations have not settled meet the sides of the
+    /// next part of what holds them as deep as that; round shapes and planes have no sides.
+    double slop(const SearchedStep& step, const OpenPair& open) const noexcept;
+    /// Whether `body`, that would meet another at `time` [s], does not once it is lifted out of what holds it. `facing` is
+    /// the normal they touch with already, if they do. Between iterations a body may also sink on the way, and to the side of
+    /// another as far as settled iterations may have left it falling.
+    bool is_internal_edge(const SearchedStep& step, const ContactPoints& points, const Mover& moving,
+                          int body, const Mover& other, const OpenPair& open, const Cast& cast, double time,
+                          Vec3 facing = {}) const;
+    /// Whether bodies that touch, and would overlap by `overlap` [m] along that normal, do not as they move.
+    bool is_grazing(const SearchedStep& step, const ContactPoints& points, const StepContact& point,
+                    const OpenPair& open, double overlap, Cast::When when) const;
+    /// Of what one body meets in a step, leaves out what it would not meet if that which comes before stopped it. What it meets
+    /// all the same is found again with the velocities of the solve.
+    void remove_occluded(const SearchedStep& step, const LargeArray<OpenPair>& pairs,
+                         const std::vector<Vec6>& velocity, std::vector<Meeting>& meetings);
+
+private:
+    /// Of a body, the one at that place.
+    struct MeetingOf {
+        int body;
+        double time;
+        std::size_t at;
+    };
+    bool occludes(const SearchedStep& step, const OpenPair& before, double earlier, const OpenPair& after,
+                  double later, int body, const std::vector<Vec6>& velocity) const;
+
+    std::vector<double> depth_;              // of a body's closed contacts, m
+    std::vector<double> predicted_sinking_;  // what unsettled iterations would add to it in the step, m
+    PointsOfBodies points_of_;
+    std::vector<MeetingOf> meetings_of_;  // by body and time
+};
+
+}  // namespace spook
