@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
@@ -79,6 +78,8 @@ def framed(html: str, height: int = 640) -> str:
 
 def display() -> Display:
     """The package that draws. EngineError if none is installed."""
+    from importlib.metadata import entry_points  # takes as long to import as a quarter of the engine
+
     for point in entry_points(group=GROUP):
         found: Display = point.load()
         return found

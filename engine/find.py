@@ -15,7 +15,6 @@ import sys
 import traceback
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
@@ -85,6 +84,8 @@ def find(name: str) -> Any:
         return importlib.import_module("spook_tracker.engine")
     if name in EXTRAS or name in NODE or name in BUILT:
         return Peer(_peer(name).ENGINE)
+    from importlib.metadata import entry_points
+
     for point in entry_points(group=GROUP):
         if point.name == name:
             return _faced(_loaded(name, point.load))
@@ -114,6 +115,8 @@ def _module(name: str) -> Any:
 
 def known() -> tuple[str, ...]:
     """Names of the engines that can be asked for, installed or not."""
+    from importlib.metadata import entry_points
+
     return ("spook", *EXTRAS, *NODE, *BUILT, *sorted(point.name for point in entry_points(group=GROUP)))
 
 

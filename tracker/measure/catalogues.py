@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Iterator, Mapping
-from importlib.metadata import entry_points
 from importlib.util import find_spec
 
 from spook_tracker.engine.find import look_beside, thrown
@@ -84,6 +83,8 @@ def _one(name: str) -> Mapping[str, ScalarTest]:
 
 
 def _loaded(name: str) -> object:
+    from importlib.metadata import entry_points
+
     for point in () if ":" in name else entry_points(group=GROUP):
         if point.name == name:
             found: object = point.load()

@@ -13,8 +13,6 @@ Run times are never taken there: they need a machine of which is known that it i
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from concurrent.futures import CancelledError, Future, as_completed
-from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
 from importlib import import_module
@@ -28,6 +26,8 @@ from spook_tracker.tracker.measure.machine import machine
 from spook_tracker.tracker.measure.workers import Lost
 
 if TYPE_CHECKING:
+    from concurrent.futures import Future
+
     from spook_tracker.tracker.measure.questions import Engine
 
 DASK = "dask://"
@@ -125,6 +125,9 @@ def _placed(
 
 def _answer(future: Future[tuple[Answer, Place]]) -> tuple[Answer | Lost, Place | None]:
     """What came of a piece. A worker that dies costs its piece; what `perform` raises is raised."""
+    from concurrent.futures import CancelledError  # most runs need no executor
+    from concurrent.futures.process import BrokenProcessPool
+
     try:
         answer, there = future.result()
         return answer, there
@@ -204,6 +207,8 @@ def _completed(
     waiting: Mapping[Future[tuple[Answer, Place]], Piece],
 ) -> Iterator[Future[tuple[Answer, Place]]]:
     """Futures as they are done; Dask has its own."""
+    from concurrent.futures import Future, as_completed
+
     first = next(iter(waiting), None)
     if first is None or isinstance(first, Future):
         return as_completed(waiting)

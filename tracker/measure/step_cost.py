@@ -9,7 +9,6 @@ from __future__ import annotations
 import ctypes
 import functools
 import math
-import statistics
 import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -49,7 +48,7 @@ class LeavingOut:
     @property
     def factor(self) -> float:
         """Median of the rounds."""
-        return statistics.median(self.times) if self.times else math.nan
+        return float(np.median(self.times)) if self.times else math.nan
 
     def told(self) -> Saving:
         """As a run's document says it."""
@@ -86,7 +85,7 @@ def leaving_out(test: ScalarTest, simulate: Simulate) -> LeavingOut | None:
     if any(len(taken) < len(runs) for taken in whole):
         return None
     saved = {
-        stage: max(0.0, statistics.median(taken[i] - taken[0] for taken in whole)) / steps
+        stage: max(0.0, float(np.median([taken[i] - taken[0] for taken in whole]))) / steps
         for i, stage in enumerate(added.values(), 1)
     }
     times = tuple(taken[-1] / taken[0] for taken in whole)
