@@ -14,6 +14,7 @@ from sqlalchemy import make_url
 from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.cli.console import PIPE_WIDTH
+from spook_tracker.tracker.measure.request import Request
 from spook_tracker.tracker.store.database import open_database
 from tests import postgresql
 from tests.browser import MISSING, browser, new_tab, programs
@@ -129,6 +130,14 @@ def driver(chromium: Any) -> Any:
     """The browser in a tab of this file's own, which knows nothing of other files'."""
     new_tab(chromium)
     return chromium
+
+
+@pytest.fixture
+def in_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Runs that are asked for nothing else are measured in this process: for tests of what comes of their documents. That
+    no engine reaches the process that judges is asked in tests/test_tracker_gates.py and beside it."""
+    monkeypatch.setitem(Request.__init__.__kwdefaults__, "apart", False)
+    monkeypatch.setitem(Request.__init__.__kwdefaults__, "workers", 0)
 
 
 @pytest.fixture

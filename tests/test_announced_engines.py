@@ -26,7 +26,7 @@ torn = of_a_team.torn:CATALOGUE
 
 
 @pytest.fixture
-def tracker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
+def tracker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_process: None) -> Any:
     """The command where a package is installed that announces one good engine, one missing and one that is torn."""
     site = tmp_path / "site"
     (site / "of_a_team").mkdir(parents=True)

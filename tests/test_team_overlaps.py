@@ -201,10 +201,11 @@ def ci(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Result:
     monkeypatch.chdir(folder)
     for name in ("TRACKER_DB", "GITHUB_STEP_SUMMARY", "GITHUB_ACTIONS"):
         monkeypatch.delenv(name, raising=False)
-    toys = ["--engine", "toy_engine", "--catalogue", "toy_questions", "--workers", "1"]
+    toys = ["--engine", "toy_engine", "--catalogue", "toy_questions", "--workers", "0"]
     return CliRunner().invoke(main, ["ci", "night", "--quick", *toys], prog_name="tracker")
 
 
+@pytest.mark.usefixtures("in_process")
 @pytest.mark.parametrize("how", USELESS, ids=lambda how: how.__name__)
 def test_a_database_of_no_use_stops_no_night_whose_history_is_whole(
     how: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

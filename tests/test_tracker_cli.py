@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import shutil
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -40,7 +41,7 @@ COMMANDS = [
 
 
 @pytest.fixture(autouse=True)
-def _desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_process: None) -> None:
     """A folder of one's own, with the toy engine on the table."""
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
     monkeypatch.chdir(tmp_path)
@@ -62,10 +63,19 @@ def measure(monkeypatch: pytest.MonkeyPatch, *options: str, **toy: str) -> Resul
         return tracker("run", "--workers", "0", *options)
 
 
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    """Where the first test that needs both versions leaves them."""
+    return tmp_path_factory.mktemp("kept") / "tracker.db"
+
+
 @pytest.fixture
-def two_versions(monkeypatch):
-    measure(monkeypatch, VERSION="1.0.0", HASH=GOOD)
-    measure(monkeypatch, VERSION="1.1.0", HASH=BAD, PARENT=GOOD, ERROR="-0.2")
+def two_versions(monkeypatch, kept):
+    if not kept.exists():
+        measure(monkeypatch, VERSION="1.0.0", HASH=GOOD)
+        measure(monkeypatch, VERSION="1.1.0", HASH=BAD, PARENT=GOOD, ERROR="-0.2")
+        shutil.copyfile("tracker.db", kept)
+    shutil.copyfile(kept, "tracker.db")
 
 
 def test_tracker_alone_teaches_the_three_ways_in():
@@ -208,11 +218,8 @@ def test_compare_ends_with_2_for_an_unknown_version_and_for_no_data(two_versions
 
 
 def test_compare_ends_with_3_where_nothing_can_be_compared(monkeypatch, two_versions):
-    Path("elsewhere.py").write_text(
-        "import spook_tracker.tracker.measure.machine as machine\nfrom toy_engine import build_info, simulate\n"
-        "machine.float_environment = lambda: 'another'\n"
-    )
-    measure(monkeypatch, "--engine", "elsewhere", VERSION="1.2.0", HASH="c" * 40, PARENT=BAD)
+    monkeypatch.setattr("spook_tracker.tracker.measure.machine.float_environment", lambda: "another")
+    measure(monkeypatch, VERSION="1.2.0", HASH="c" * 40, PARENT=BAD)
     shown = tracker("compare", "1.1.0", "1.2.0")
 
     assert shown.exit_code == 3

@@ -21,7 +21,7 @@ DATABASE = "sqlite:///tracker.db"
 
 
 @pytest.fixture(autouse=True)
-def _desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_process: None) -> None:
     monkeypatch.syspath_prepend(str(HERE))
     monkeypatch.chdir(tmp_path)
     for name in ("TRACKER_DB", "GITHUB_ACTIONS"):
@@ -51,7 +51,7 @@ def test_a_night_tells_of_the_run_it_recorded(ahead: timedelta, monkeypatch: pyt
     record(dated(ahead, engine=engine(name="other")), DATABASE)
     monkeypatch.setenv("TOY_ERROR", "9.0")  # a red night
 
-    done = tracker("ci", "night", "--quick", "--workers", "1")
+    done = tracker("ci", "night", "--quick", "--workers", "0")
 
     assert done.exit_code == 1, done.output
     assert "### toy 1.0.0" in Path("summary.md").read_text(), "the summary is of another run"

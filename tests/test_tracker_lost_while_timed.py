@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -20,8 +21,9 @@ from spook_tracker.tracker.measure.workers import Lost
 
 ASKED = {
     "catalogue": "toy_questions:CATALOGUE", "engine": "toy_engine", "sweep": True, "repeats": 2,
-    "workers": 1, "time_limit": 2.0,
+    "workers": 1, "time_limit": 1.0,
 }  # fmt: skip
+HERE_TOO = ASKED | {"workers": 0}  # of an engine that leaves its process as it was
 RUNGS = "fall/{}/ladder:end-error/h={}"
 FAILED = RUNGS.format("plain", "0.05")
 REACHED = "fall/{}/ladder:end-error:time-to-error"
@@ -29,7 +31,7 @@ HERE = 0.05  # s, the time step at which it fails
 
 
 @pytest.fixture(autouse=True)
-def _toys(monkeypatch: pytest.MonkeyPatch) -> None:
+def _toys(monkeypatch: pytest.MonkeyPatch, in_process: None) -> None:
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
 
 
@@ -40,6 +42,14 @@ def failing(patch: pytest.MonkeyPatch, fault: str, step: float = HERE) -> None:
     patch.setenv("TOY_FAULT_STEP", str(step))
 
 
+@cache
+def document(fault: str) -> RunDocument:
+    """A run with this fault."""
+    with pytest.MonkeyPatch.context() as patch:
+        failing(patch, fault)
+        return library.run(**(HERE_TOO if fault in ("raise", "diverge") else ASKED))
+
+
 def by_key(document: RunDocument):
     return {sample.series: sample for sample in document.samples}
 
@@ -48,15 +58,14 @@ def by_key(document: RunDocument):
     ("fault", "outcome", "sentence"),
     [
         ("die", "crashed", "while it was timed: the engine's process died while answering"),
-        ("hang", "timed_out", "while it was timed: no answer within 2 s, so its process was ended"),
+        ("hang", "timed_out", "while it was timed: no answer within 1 s, so its process was ended"),
         ("hog", "crashed", "while it was timed: the test ran out of memory"),
         ("raise", "crashed", "while it was timed: ValueError: the toy refuses"),
         ("diverge", "diverged", "while it was timed: body 'ball' left the finite numbers at step 7"),
     ],
 )
-def test_the_rung_that_fails_has_the_class_of_how_it_failed(monkeypatch, fault, outcome, sentence):
-    failing(monkeypatch, fault)
-    samples = by_key(library.run(**ASKED))
+def test_the_rung_that_fails_has_the_class_of_how_it_failed(fault, outcome, sentence):
+    samples = by_key(document(fault))
 
     failed = samples[FAILED]
     assert (failed.outcome, failed.passed, failed.timing) == (outcome, False, None)
@@ -68,17 +77,14 @@ def test_the_rung_that_fails_has_the_class_of_how_it_failed(monkeypatch, fault, 
     assert samples["fall/plain/ladder:end-error:order"].outcome == "value", "its errors were measured"
 
 
-def test_what_was_to_be_read_off_the_clock_says_why_it_is_not(monkeypatch):
-    failing(monkeypatch, "die")
-    document = library.run(**ASKED)
-
+def test_what_was_to_be_read_off_the_clock_says_why_it_is_not():
     for configuration in ("plain", "half-step"):
-        lost = by_key(document)[REACHED.format(configuration)]
+        lost = by_key(document("die"))[REACHED.format(configuration)]
         assert (lost.outcome, lost.passed) == ("crashed", False)
         assert lost.failure == (
             "not timed: the engine's process died while answering, with [plain] at h = 0.05 s"
         )
-    table = unstyle(pass_table(document, room=120))
+    table = unstyle(pass_table(document("die"), room=120))
     assert "too slow" not in table and "never" not in table
     assert "crashed" in table
 
@@ -105,7 +111,7 @@ def test_the_night_the_comparison_and_the_pages_are_red_with_the_same_word(
     monkeypatch, tmp_path, fault, word
 ):
     url, out = f"sqlite:///{tmp_path / 'tracker.db'}", tmp_path / "public"
-    assert not library.nightly(url, out, **ASKED).red
+    assert not library.nightly(url, out, **HERE_TOO).red
     failing(monkeypatch, fault)
 
     report = library.nightly(url, out, **ASKED)
@@ -124,14 +130,14 @@ def test_the_night_the_comparison_and_the_pages_are_red_with_the_same_word(
 
 def test_a_night_that_is_timed_again_is_green_again(monkeypatch, tmp_path):
     url, out = f"sqlite:///{tmp_path / 'tracker.db'}", tmp_path / "public"
-    library.nightly(url, out, **ASKED)
+    library.nightly(url, out, **HERE_TOO)
     with monkeypatch.context() as patch:
         failing(patch, "die")
         assert library.nightly(url, out, **ASKED).red
     monkeypatch.setenv("TOY_HASH", "c" * 40)
     monkeypatch.setenv("TOY_PARENT", "b" * 40)
 
-    mended = library.nightly(url, out, **ASKED)
+    mended = library.nightly(url, out, **HERE_TOO)
 
     assert not mended.red
     (fixed,) = [f for f in mended.findings if f.series == FAILED]

@@ -8,20 +8,26 @@ import pytest
 from click.testing import CliRunner
 
 from spook_tracker.tracker.cli.main import main
-from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.store.history import History
 
 HERE = Path(__file__).parent
 ODD = """
 import dataclasses, toy_engine
 from toy_engine import build_info
+ODD = {odd}
 def simulate(scene, **more):
     result = toy_engine.simulate(scene, **more)
-    if more.get("time_step") != 0.01:  # of the one question alone
-        return result
-    return {answer}
+    return eval(ODD[more["time_step"]])
 """
-ANSWERS = {
+QUESTIONS = """
+from dataclasses import replace
+from toy_questions import PLAIN, STAND, error
+def asked(step):
+    (one,) = STAND.measurements
+    return replace(STAND, measurements=(replace(one, measure=lambda simulate: {{"sag": error(simulate, step, PLAIN)}}),))
+CATALOGUE = {{name: asked(step) for name, step in {steps}.items()}}
+"""
+WRONG = {
     "a status that is none": "dataclasses.replace(result, status='splendid', failure='so it says')",
     "a count of 400 digits": "dataclasses.replace(result, counters={'steps': 10**400})",
     "a count of 20 digits": "dataclasses.replace(result, counters={'steps': 10**19})",
@@ -30,36 +36,31 @@ ANSWERS = {
     "no result at all": "None",
     "text without end": "dataclasses.replace(result, state_hash='x' * 100_000)",
 }
+READABLE = {"text that is none": "dataclasses.replace(result, state_hash='\\ud800x')", "an answer": "result"}
 
 
-@pytest.fixture(autouse=True)
+@pytest.fixture
 def _desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.syspath_prepend(str(HERE))
     monkeypatch.chdir(tmp_path)
     monkeypatch.delenv("TRACKER_DB", raising=False)
 
 
-def asked(engine: str) -> tuple[int, RunDocument, str]:
-    Path("odd.py").write_text(engine)
-    command = ["run", "--engine", "odd", "--catalogue", "toy_questions", "--workers", "1"]
+@pytest.mark.usefixtures("_desk")
+def test_an_answer_of_the_wrong_form_costs_its_own_sample_and_text_that_can_be_made_readable_none() -> None:
+    """All of them in one run, each to a question of its own."""
+    answers = WRONG | READABLE
+    steps = {name: 0.1 / (k + 1) for k, name in enumerate(answers)}
+    Path("odd.py").write_text(ODD.format(odd={step: answers[name] for name, step in steps.items()}))
+    Path("asked.py").write_text(QUESTIONS.format(steps=steps))
+
+    command = ["run", "--engine", "odd", "--catalogue", "asked", "--workers", "1"]
     done = CliRunner().invoke(main, command, prog_name="tracker")
-    assert Path("tracker.db").exists(), done.output
+
+    assert done.exit_code == 1
     with History.open("sqlite:///tracker.db") as history:
         (found,) = history.runs()
-        return done.exit_code, history.document(found.id), done.output
-
-
-@pytest.mark.parametrize("what", ANSWERS)
-def test_an_answer_of_the_wrong_form_costs_its_own_sample(what: str) -> None:
-    code, document, told = asked(ODD.format(answer=ANSWERS[what]))
-
-    outcomes = {sample.series.split("/")[0]: sample for sample in document.samples}
-    assert (outcomes["fall"].outcome, outcomes["fall"].passed) == ("crashed", False), told
-    assert outcomes["stand"].outcome == "value", "another question's answer is lost with it"
-    assert code == 1
-
-
-def test_text_that_is_none_is_made_readable_and_costs_nothing() -> None:
-    _, document, told = asked(ODD.format(answer="dataclasses.replace(result, state_hash='\\ud800x')"))
-
-    assert {sample.outcome for sample in document.samples} == {"value"}, told
+        samples = {s.series.split("/")[0]: s for s in history.document(found.id).samples}
+    assert {name: (s.outcome, s.passed) for name, s in samples.items()} == {
+        **dict.fromkeys(WRONG, ("crashed", False)), **dict.fromkeys(READABLE, ("value", True)),
+    }, done.output  # fmt: skip

@@ -16,7 +16,7 @@ from tests.test_tracker_cli import tracker
 
 
 @pytest.fixture(autouse=True)
-def _desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def _desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_process: None) -> None:
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("TRACKER_ENGINE", "toy_engine")
@@ -84,7 +84,7 @@ def test_a_name_of_nothing_is_no_catalogue_and_no_engine(named: str) -> None:
     "named", ["", ":", ":x", "nosuch:x", "os:nosuch", "os:getcwd", "math:pi", "..:x", "dask://"]
 )
 def test_what_is_no_executor_is_named(named: str) -> None:
-    measured = ("run", "--no-record", "--workers", "1")
+    measured = ("run", "--no-record", "--workers", "0")
     refused(tracker(*measured, "--executor", named), "executor|Dask|dask")
 
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import pytest
 from click.testing import CliRunner
 
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
@@ -37,12 +38,13 @@ NEW = replace(
 )
 
 
+pytestmark = pytest.mark.usefixtures("in_process")
 BEFORE, AFTER = {"falling_object": OLD}, {"dropped_object": NEW}
 RENAMED = {"dropped_object": replace(OLD, formerly=("falling_object",))}
 
 
 def measured(catalogue: str) -> Any:
-    return run(catalogue=f"{__name__}:{catalogue}", workers=0)
+    return run(catalogue=f"{__name__}:{catalogue}")
 
 
 def test_a_renamed_test_and_metric_name_their_earlier_keys() -> None:

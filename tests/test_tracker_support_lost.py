@@ -17,17 +17,8 @@ from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.series_history import judge_history
 from tests.test_tracker_analyse import SERIES, history, sample, states
 
-pytestmark = pytest.mark.usefixtures("desk")
-HERE = Path(__file__).parent
+pytestmark = pytest.mark.usefixtures("desk", "in_process")
 LOST = "fall/plain/position_error"
-ENGINE = """
-from toy_engine import build_info, simulate as asked
-from spook_tracker.engine.protocol import NotSupported
-def simulate(scene, *, time_step, **more):
-    if {lacks}:
-        raise NotSupported("it does not support falling")
-    return asked(scene, time_step=time_step, **more)
-"""
 GIVEN_UP = """
 [[accepted]]
 series = "fall/plain/*"
@@ -37,20 +28,20 @@ why = "the team gave it up"
 """
 
 
-def tracker(*command: str, lacks: str = "False", error: str = "") -> Result:
-    """The command, with a toy engine that lacks something and whose answers are off by so much."""
-    Path("their_engine.py").write_text(
-        (f"import os; os.environ['TOY_ERROR'] = '{error}'\n" if error else "") + ENGINE.format(lacks=lacks)
-    )
-    of_engine = ["--engine", "their_engine", "--catalogue", "toy_questions:CATALOGUE", "--workers", "1"]
-    return CliRunner().invoke(main, [*command, *of_engine], prog_name="tracker")
+def tracker(*command: str, lacks: str = "nan", error: str = "0") -> Result:
+    """The command, with the toy engine, which lacks something and whose answers are off by so much."""
+    of_engine = ["--engine", "toy_engine", "--catalogue", "toy_questions:CATALOGUE", "--workers", "0"]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("TOY_LACKS", lacks)
+        patch.setenv("TOY_ERROR", error)
+        return CliRunner().invoke(main, [*command, *of_engine], prog_name="tracker")
 
 
-def night(lacks: str = "False", error: str = "") -> Result:
+def night(lacks: str = "nan", error: str = "0") -> Result:
     return tracker("nightly", "--quick", lacks=lacks, error=error)
 
 
-FALLING = "time_step == 0.01"  # what alone is asked with this step
+FALLING = "0.01"  # s: what alone is asked with this step
 
 
 def test_a_value_that_an_engine_no_longer_gives_is_red_until_it_is_accepted() -> None:

@@ -2,7 +2,7 @@
 
 What it was built from and how well it works are set by environment variables, so that a test has as many
 versions, good and bad, as it needs: TOY_VERSION, TOY_HASH, TOY_PARENT, TOY_ERROR (added to every position),
-TOY_DIRTY (with local changes), TOY_COST (times the work), TOY_FAULT (diverge, nan, raise, die, hang, hog: takes TOY_HOG bytes). TOY_FAULT_TIMED is the fault of runs of
+TOY_DIRTY (with local changes), TOY_LACKS (the only time step [s] that is not supported), TOY_COST (times the work), TOY_FAULT (diverge, nan, raise, die, hang, hog: takes TOY_HOG bytes). TOY_FAULT_TIMED is the fault of runs of
 which nothing is kept, as they are timed; TOY_FAULT_STEP the only time step [s] that has it.
 """
 
@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result
 from spook_tracker.engine.scene import Scene
 
@@ -53,6 +54,8 @@ def simulate(
     time_stages: bool = False,
 ) -> Result:
     begun = time.perf_counter()
+    if float(os.environ.get("TOY_LACKS", "nan")) == time_step:
+        raise NotSupported("it does not support falling")
     fault = os.environ.get("TOY_FAULT", "")
     if not observe and float(os.environ.get("TOY_FAULT_STEP", time_step)) == time_step:
         fault = os.environ.get("TOY_FAULT_TIMED", fault)
