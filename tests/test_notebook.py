@@ -25,7 +25,6 @@ from spook_tracker.engine import (
     RigidBody,
     Scene,
     Trace,
-    display,
     simulate,
     start,
 )
@@ -107,7 +106,7 @@ def test_a_document_says_nothing_that_could_end_its_frame() -> None:
 def test_a_long_run_is_not_run_again_because_a_cell_ends_with_it(
     fallen: Result, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(display, "entry_points", lambda group: pytest.fail("it was drawn"))
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: pytest.fail("it was drawn"))
 
     assert "<iframe" not in replace(fallen, seconds=2.1)._repr_html_()
     assert "<table>" in replace(fallen, seconds=2.1)._repr_html_()
@@ -117,7 +116,7 @@ def test_a_cell_that_ends_with_what_cannot_be_drawn_is_no_error(monkeypatch: pyt
     """A run that ended in its first step is a table; where nothing that draws is installed, a scene is its text."""
     pulled = Scene(bodies=SCENE.bodies, gravity=(0.0, 0.0, -1e308))
     shown = simulate(pulled, time_step=0.1, steps=9)._repr_html_()
-    monkeypatch.setattr(display, "entry_points", lambda group: ())
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: ())
 
     assert "ran away" in shown and "<iframe" not in shown
     assert SCENE._repr_html_() is None
@@ -146,7 +145,7 @@ def test_what_cannot_be_drawn_is_said_in_a_sentence(fallen: Result, monkeypatch:
         without.setitem(sys.modules, "plotly.graph_objects", None)
         with pytest.raises(TrackerError, match=re.escape("pip install 'spook-tracker[standard]'")):
             fallen.plot()
-    monkeypatch.setattr(display, "entry_points", lambda group: ())
+    monkeypatch.setattr("importlib.metadata.entry_points", lambda group: ())
     with pytest.raises(EngineError, match="nothing that draws is installed"):
         fallen.show()
 
