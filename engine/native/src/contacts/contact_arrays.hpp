@@ -65,34 +65,10 @@ struct DepthOfPair {
     std::vector<Item> items;  // in order of pairs
 };
 
-/// Of the search for impacts that act at their own time; by an island's first body.
-struct EventSearch {
-    std::vector<std::size_t> members;
-    std::vector<std::uint64_t> impact_pair;  // the pair of the island's impact, plus one
-    std::vector<char> plain, bouncy;
-    std::vector<double> when, speed;
-    std::vector<std::size_t> moving_along, may_move_along;  // how many move along the forces, and may
-};
-
 /// Of a closed point: which body the forces press on the other.
 struct SupportPair {
     int first, second;
     bool first_presses, second_presses, both;  // on each other, supported or not
-};
-
-/// Of one impact; energies, shares and flags by island.
-struct ImpactArrays {
-    MixedSystem hit, start, plastic;
-    std::vector<FrictionPoint> friction, fresh, plastic_friction, first_friction;
-    std::vector<std::size_t> hit_points,
-        pushed;  // points; rows against what moves as it is told, or along itself
-    std::vector<std::pair<int, int>> pairs;
-    std::vector<Vec6> before, mixed, next;
-    std::vector<std::array<double, 2>> returned;  // of the slip of each point, m/s
-    std::vector<double> limit, energy, share, low, high, asked, first, closing;
-    std::vector<char> rises, answered, touched, taking_part, balls, orderly;
-    std::vector<char> is_hit;  // by body
-    std::vector<std::uint64_t> island_pair;
 };
 
 struct EnergySums {
@@ -101,9 +77,6 @@ struct EnergySums {
 };
 
 struct ContactArrays {
-    EventSearch events;
-    ImpactArrays impact;
-    std::vector<std::size_t> joints_hit;  // blocks of the step's rows that take part in the impact
     // Of a solve:
     std::vector<FrictionPoint> friction;
     std::vector<char> answered;       // per row: the round before found it an answer
@@ -111,8 +84,7 @@ struct ContactArrays {
     std::vector<double> share;        // per moving body
     std::vector<EnergySums> sums;     // by island
     std::vector<Vec6> free_velocity;  // per moving body
-    // Which bodies are connected by rows of joints and points; where a solve is shortened.
-    IslandFinder connected, shortened;
+    IslandFinder shortened;
 };
 
 }  // namespace spook

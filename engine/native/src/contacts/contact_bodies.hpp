@@ -19,7 +19,11 @@ struct ContactBodies {
                   std::vector<IndexPair> joint_pairs);
 
     std::size_t count() const noexcept { return solver_index.size(); }
-    bool moves(int body) const noexcept { return solver_index[body] >= 0; }
+    bool moves(std::size_t body) const noexcept { return solver_index[body] >= 0; }
+    /// The index in MixedSystem of one of a contact's bodies that moves by itself.
+    int solver_body(const Contact& contact) const noexcept {
+        return std::max(solver_index[contact.first], solver_index[contact.second]);
+    }
     /// The larger of a contact's bodies, and the smaller of those that move by themselves, by their radius, m.
     double size(const Contact& contact) const noexcept {
         return std::max(radius[contact.first], radius[contact.second]);

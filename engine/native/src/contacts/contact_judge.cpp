@@ -119,47 +119,50 @@ SolveQuality judge(const JudgedStep& step, const MixedSystem& system,
                    const std::vector<FrictionPoint>& points, const FrictionReport& report) {
     SolveQuality quality;
     if (!report.finite || report.rounds + report.pgs_iterations == 0) return quality;
-    const RowsResidual worst = rows_residual(system, points, step.options.friction);
+    const RowsResidual worst = rows_residual(system, points, step.model.options.friction);
     quality.residual = worst.residual;
-    if (report.converged && step.options.solver == SolverKind::direct) return quality;
+    if (report.converged && step.model.options.solver == SolverKind::direct) return quality;
     const RowBlock& block = system.rows[worst.row];
-    blame(quality, step, worst.residual, std::max(block.first, block.second));
+    blame(quality, step.model, step.motion, worst.residual, std::max(block.first, block.second));
     if (quality.body < 0 && !report.converged) blame_sunk(quality, step);
     return quality;
 }
 
-void judge_impact(SolveQuality& quality, const JudgedStep& step, const MixedSystem& hit,
-                  const std::vector<FrictionPoint>& points, FrictionModel model) {
-    const RowsResidual worst = rows_residual(hit, points, model);
+void judge_impact(SolveQuality& quality, const ContactModel& model, const StepMotion& motion,
+                  const MixedSystem& hit, const std::vector<FrictionPoint>& points, FrictionModel friction) {
+    const RowsResidual worst = rows_residual(hit, points, friction);
     if (!(worst.residual > quality.residual)) return;
     quality.residual = worst.residual;
     const RowBlock& block = hit.rows[worst.row];
-    blame(quality, step, worst.residual, std::max(block.first, block.second));
+    blame(quality, model, motion, worst.residual, std::max(block.first, block.second));
 }
 
 void blame_sunk(SolveQuality& quality, const JudgedStep& step) {
     double worst = sunk;
-    for (const StepContact& point : step.points) {
+    for (const StepContact& point : step.points.all) {
         if (point.toi >= 0.0 || point.before < 0.0) continue;
         const auto given = step.initial_penetration.find(point.contact.key >> feature_bits);
-        const double known = elastic_depth(step.bodies, point) +
+        const double known = elastic_depth(step.model.bodies, point) +
                              (given == step.initial_penetration.end() ? 0.0 : given->second);
-        const double share = (-point.contact.point.gap - known) / step.bodies.moving_size(point.contact);
+        const double share =
+            (-point.contact.point.gap - known) / step.model.bodies.moving_size(point.contact);
         if (!(share > worst)) continue;
         worst = share;
         quality.by = quality.residual;
         quality.sunk = true;
-        quality.body = step.bodies.moves(point.contact.first) ? point.contact.first : point.contact.second;
+        quality.body =
+            step.model.bodies.moves(point.contact.first) ? point.contact.first : point.contact.second;
     }
 }
 
-void blame(SolveQuality& quality, const JudgedStep& step, double residual, int solver_index) {
+void blame(SolveQuality& quality, const ContactModel& model, const StepMotion& motion, double residual,
+           int solver_index) {
     double speed = 0.0;
-    for (const Vec6& v : step.velocity) speed = std::max(speed, norm(linear(v)));
+    for (const Vec6& v : motion.velocity) speed = std::max(speed, norm(linear(v)));
     // A billionth of the fastest body's speed, or so, is rounding wherever it stands.
-    if (!(residual > step.options.unsettled_residual + 1e-6 * speed)) return;
+    if (!(residual > model.options.unsettled_residual + 1e-6 * speed)) return;
     quality.by = residual;
-    quality.body = step.bodies.body_of[solver_index];
+    quality.body = model.bodies.body_of[solver_index];
 }
 
 /// `share`, per moving body: what is left of the impulses of its island, where a solve that did not settle would raise

@@ -77,7 +77,7 @@ bool ContactStage::find_more(bool over, PgsLook& look) {
     if (model_->bodies.swings) search_.edges.predict_sinking(search_.step(motion_), points_, next_);
     const std::size_t known = points_.all.size();
     const bool turned = search_.find_turned(next_, motion_, points_);
-    const CandidateSearch::Found found = find_impacts(cast, plastic_first_);
+    const CandidateSearch::Found found = find_impacts(cast, impacts_.plastic_too());
     look.left_out = look.left_out || found.left_out;
     if (found.pairs == 0 && !turned) return false;
     take_in(known);
@@ -109,11 +109,11 @@ ContactStage::PgsEnd ContactStage::judge_pgs(MixedSystem& system) {
     quality_.residual = std::max(contact.residual, joint.residual);
     if (contact.row >= 0 && contact.residual >= joint.residual) {
         const Contact& pair = points_.all[contact.row].contact;
-        blame(quality_, judged(), contact.residual,
+        blame(quality_, *model_, motion_, contact.residual,
               std::max(model_->bodies.solver_index[pair.first], model_->bodies.solver_index[pair.second]));
     } else if (!system.rows.empty()) {
         const RowBlock& block = system.rows[joint.row];
-        blame(quality_, judged(), joint.residual, std::max(block.first, block.second));
+        blame(quality_, *model_, motion_, joint.residual, std::max(block.first, block.second));
     }
     return {quality_.body<0, joint.residual> contact.residual};
 }
@@ -137,7 +137,7 @@ bool ContactStage::runs_away(const MixedSystem& system) const {
         return sum;
     };
     for (std::size_t b = 0; b < model_->bodies.count(); ++b) {
-        if (model_->bodies.solver_index[b] < 0) continue;
+        if (!model_->bodies.moves(b)) continue;
         const Mat6& mass = system.mass[model_->bodies.solver_index[b]];
         had += energy(mass, motion_.velocity[b]) + energy(mass, sum(motion_.velocity[b], motion_.dv_ext[b])) +
                mass[0] * speed * speed;
@@ -148,18 +148,14 @@ bool ContactStage::runs_away(const MixedSystem& system) const {
 
 /// The islands of the points, and which of them have points from `known` on: no solve has answered those yet.
 const ContactStage::Unanswered& ContactStage::find_unanswered(std::size_t bodies, std::size_t known) {
-    arrays_.connected.begin(static_cast<int>(bodies));
-    for (const Point& point : points_.all)
-        arrays_.connected.tie(model_->bodies.solver_index[point.contact.first],
-                              model_->bodies.solver_index[point.contact.second]);
-    const Islands& islands = arrays_.connected.find();
+    const Islands& islands = connected(bodies);
     Unanswered& found = unanswered_;
     found.open.assign(islands.count, 0);
     found.points.assign(islands.count, 0);
     found.island.clear();
     found.largest = 0;
     for (std::size_t k = 0; k < points_.all.size(); ++k) {
-        found.island.push_back(island_of(islands, points_.all[k]));
+        found.island.push_back(islands.of_body[model_->bodies.solver_body(points_.all[k].contact)]);
         ++found.points[found.island[k]];
         if (k >= known) found.open[found.island[k]] = 1;
     }
@@ -240,10 +236,10 @@ ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
         }
         look.left_out = false;  // it was one by velocities on the way
         for (std::size_t b = 0; b < model_->bodies.count(); ++b)
-            if (model_->bodies.solver_index[b] >= 0) next_[b] = pgs_.velocity(model_->bodies.solver_index[b]);
+            if (model_->bodies.moves(b)) next_[b] = pgs_.velocity(model_->bodies.solver_index[b]);
         changed_.assign(model_->bodies.count(), 1);
         const std::size_t known = points_.all.size();
-        const bool left_out = find_impacts({next_, Cast::When::solved}, plastic_first_).left_out;
+        const bool left_out = find_impacts({next_, Cast::When::solved}, impacts_.plastic_too()).left_out;
         if (needs_impact_first(system, begun, next_, left_out)) return {};
         again = points_.all.size() > known;
         if (again) take_in(known);
@@ -270,9 +266,10 @@ ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
         }
         shorten_unsettled(system, system.rows.size(), pushes, share);
     }
-    mark_rows(system);  // by joints; of contacts those that push, or did in an impact
+    mark_rows(system.mass.size(),
+              system.rows);  // by joints; of contacts those that push, or did in an impact
     for (std::size_t b = 0; b < model_->bodies.count(); ++b)
-        if (model_->bodies.solver_index[b] >= 0 && motion_.event_time[b] >= 0.0)
+        if (model_->bodies.moves(b) && motion_.event_time[b] >= 0.0)
             has_rows_[model_->bodies.solver_index[b]] = 1;
     state_.cache.points.clear();
     for (std::size_t k = 0; k < points_.all.size(); ++k) {
@@ -291,7 +288,7 @@ ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
         state_.counters.stopped += motion_.is_stopped(point, impulse[0]);
         if (impulse[0] == 0.0 && impulse[1] == 0.0 && impulse[2] == 0.0) continue;
         for (const int body : {point.contact.first, point.contact.second})
-            if (model_->bodies.solver_index[body] >= 0) has_rows_[model_->bodies.solver_index[body]] = 1;
+            if (model_->bodies.moves(body)) has_rows_[model_->bodies.solver_index[body]] = 1;
     }
     if (report.finite) correct_events(system);
     order_by_key(state_.cache.points, unordered_, places_);

@@ -7,6 +7,7 @@
 
 #include "contacts/contact_bodies.hpp"
 #include "contacts/contact_cache.hpp"
+#include "contacts/islands.hpp"
 #include "contacts/step_contact.hpp"
 #include "linear/large_array.hpp"
 
@@ -25,6 +26,12 @@ struct ContactPoints {
     }
     /// Sorts them by key and finds each one's predecessor in the step before.
     void order(const ContactCache& before, bool resists_turning);
+
+    /// Tells what they connect.
+    void tie(const ContactBodies& bodies, IslandFinder& finder) const {
+        for (const StepContact& point : all)
+            finder.tie(bodies.solver_index[point.contact.first], bodies.solver_index[point.contact.second]);
+    }
 
     const ContactExtras& extras(const StepContact& point) const noexcept {
         static constexpr ContactExtras none{};

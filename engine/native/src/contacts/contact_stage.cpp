@@ -22,11 +22,11 @@ ContactStage::ContactStage(Detection detection, const std::vector<SurfaceMateria
                                             ContactSurfaces{materials}, options)),
       motion_(model_),
       search_(std::move(detection), model_),
+      events_(model_),
+      impacts_(model_),
       projector_(model_, std::move(yielding)) {
-    for (IslandSolver* solver : {&resting_solver_, &impact_solver_}) {
-        solver->floor = options.floor;
-        solver->refinements = options.refinements;
-    }
+    resting_solver_.floor = options.floor;
+    resting_solver_.refinements = options.refinements;
 }
 
 bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6>& velocity,
@@ -38,18 +38,15 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     arrays_.sums.reserve(bodies);
     correction_.clear();
     points_.clear();
-    impact_needed_ = plastic_first_ = false;
+    impacts_.begin_step();
     ran_away_ = false;  // of a step that was taken back, or is over
-    impact_rounds_ = 0;
-    if (model_->surfaces.rebounds || model_->options.impacts == ImpactOrder::successive)
-        clock_.assign(bodies, 0.0), path_.assign(bodies, Vec6{}), in_order_.assign(bodies, 0);
 
     search_.begin(motion_, free_velocity, points_);
     motion_.predict(free_velocity);
     const std::size_t closed_points = points_.all.size();
     if (!state_.initial_penetration_known) note_initial_penetrations();
     if (search_.find_impacts({motion_.predicted}, changed_, false, motion_, points_).pairs > 0) {
-        find_events();
+        events_.find(search_, motion_, points_);
         search_.move_impacts_to_start(closed_points, motion_.predicted, motion_, points_);
     }
     if (points_.all.empty()) {
@@ -58,7 +55,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     }
     state_.counters.contacts += points_.all.size();
     motion_.apply_half_of_forces();
-    points_.order(state_.cache, model_->surfaces.resists_turning);
+    order_points();
     measure_points();
     return true;
 }
@@ -75,21 +72,23 @@ void ContactStage::note_initial_penetrations() {
 }
 
 bool ContactStage::meets(const std::vector<Vec6>& next, bool stop_hit, bool rebounds) {
-    plastic_first_ = rebounds;          // impacts that a stop's rebound leads to are found again after it
+    if (rebounds)
+        impacts_.meet_plastic_too();    // impacts that a stop's rebound leads to are found again after it
     changed_ = model_->bodies.jointed;  // others have been cast along what they fly with
     const Cast cast{next, Cast::When::solved};
     search_.widen(cast, changed_, motion_, points_);
     const std::size_t closed_points = points_.all.size();
-    CandidateSearch::Found found = search_.find_impacts(cast, changed_, plastic_first_, motion_, points_);
+    CandidateSearch::Found found =
+        search_.find_impacts(cast, changed_, impacts_.plastic_too(), motion_, points_);
     if (found.left_out && stop_hit) {  // as are those to a body that it only stops
-        plastic_first_ = true;
+        impacts_.meet_plastic_too();
         found.pairs += search_.find_impacts(cast, changed_, true, motion_, points_).pairs;
     }
     if (found.pairs > 0) search_.move_impacts_to_start(closed_points, next, motion_, points_);
     if (points_.all.empty()) return false;
     state_.counters.contacts += points_.all.size();
     motion_.apply_half_of_forces();
-    points_.order(state_.cache, model_->surfaces.resists_turning);
+    order_points();
     return true;
 }
 
@@ -102,10 +101,66 @@ CandidateSearch::Found ContactStage::find_impacts(const Cast& cast, bool keeps_r
     return found;
 }
 
-IslandRules ContactStage::rules_of(FrictionModel model, bool exact) const noexcept {
-    return {.friction = model,
-            .enough = exact ? model_->options.residual_tolerance : model_->options.unsettled_residual,
-            .few_enough = ran_away_ ? not_too_large : 0};
+void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
+    quality_ = impacts_.solve(system, search_.open(), ran_away_ ? not_too_large : 0, motion_, points_,
+                              impulses, state_.counters);
+    mark_rows(system.mass.size(), impacts_.hit_rows());
+    after_impact(system);
+}
+
+/// Impacts set bodies in motion that meet others within the same step.
+void ContactStage::after_impact(const MixedSystem& system) {
+    for (std::size_t b = 0; b < model_->bodies.count(); ++b)
+        if (const int u = model_->bodies.solver_index[b]; u >= 0 && has_rows_[u]) {
+            motion_.release_support(static_cast<int>(b), system.velocity[u]);
+            motion_.velocity[b] = system.velocity[u];
+        }
+    std::vector<Vec6>& next = next_ = motion_.velocity;
+    for (std::size_t b = 0; b < next.size(); ++b)
+        if (model_->bodies.moves(b) && motion_.is_free(b))
+            next[b] = sum(motion_.velocity[b], motion_.dv_ext[b]);
+    changed_.assign(next.size(), 1);
+    const Cast cast{next};
+    search_.widen(cast, changed_, motion_, points_);
+    const std::size_t known = points_.all.size();
+    if (search_.find_impacts(cast, changed_, false, motion_, points_).pairs > 0) {
+        for (std::size_t k = known; k < points_.all.size(); ++k)
+            if (impacts_.order().come_in_order(points_.all[k]))
+                impacts_.order().move_to_last_impact(motion_, points_.all[k]);
+        search_.move_impacts_to_start(known, next, motion_, points_);
+        state_.counters.contacts += points_.all.size() - known;
+        order_points();
+    }
+    measure_points();
+    if (!impacts_.look_again(points_)) motion_.lay_down(points_.all);
+}
+
+/// After a solve: whether an impact is to come first. Where impacts that rebound were left out, bodies that a plastic impact
+/// sets in motion may meet others with restitution in this very step. The resting rows that answer such impacts know of no
+/// bounce: plastic ones, too, are then met before, so that these are found in time. If there are none, what has been left out is
+/// met as if it did not rebound. So come impacts of bodies that a stop sends back with `next` with others that no row knew
+/// of: `known` is how many points there were.
+bool ContactStage::needs_impact_first(const MixedSystem& system, std::size_t known,
+                                      const std::vector<Vec6>& next, bool left_out) {
+    if (left_out) {
+        impacts_.meet_plastic_too();
+        if (measure_points()) {
+            order_points();
+            return true;
+        }
+        find_impacts({next, Cast::When::solved}, true);
+    }
+    if (points_.all.size() == known || !impacts_.stop_is_hit(system, points_)) return false;
+    order_points();
+    measure_points();
+    return true;
+}
+
+/// What is connected by the step's points.
+const Islands& ContactStage::connected(std::size_t bodies) {
+    connected_.begin(static_cast<int>(bodies));
+    points_.tie(model_->bodies, connected_);
+    return connected_.find();
 }
 
 ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity) {
@@ -135,13 +190,16 @@ ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vecto
         if (round == 0) {  // at rest, the velocities before are those after
             system.velocity.resize(system.mass.size());
             for (std::size_t b = 0; b < model_->bodies.count(); ++b)
-                if (model_->bodies.solver_index[b] >= 0)
+                if (model_->bodies.moves(b))
                     system.velocity[model_->bodies.solver_index[b]] = motion_.velocity[b];
         }
         const FrictionReport before = report;
         const bool late = round > 0 && model_->options.solver == SolverKind::direct;
         // What a resting solve leaves, the next step sees; what an impact leaves stays.
-        IslandRules rules = rules_of(model_->options.friction, state_.by_rows);
+        IslandRules rules{.friction = model_->options.friction,
+                          .enough = state_.by_rows ? model_->options.residual_tolerance
+                                                   : model_->options.unsettled_residual,
+                          .few_enough = ran_away_ ? not_too_large : 0};
         rules.warm_started = warm_started;
         if (by_rows()) rules.few_enough = few_jointed;
         report = solve_islands(system, friction, resting_solver_, model_->options, rules, state_.counters,
@@ -158,7 +216,8 @@ ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vecto
         const Cast cast{next, Cast::When::solved};
         search_.widen(cast, changed_, motion_, points_);
         search_.find_turned(next, motion_, points_);
-        if (needs_impact_first(system, known, next, find_impacts(cast, plastic_first_).left_out)) return {};
+        if (needs_impact_first(system, known, next, find_impacts(cast, impacts_.plastic_too()).left_out))
+            return {};
         if (points_.all.size() == known) {
             if (passes_other_ends(system, joints, model_->options.time_step)) return {.ends_passed = true};
             break;
@@ -168,9 +227,10 @@ ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vecto
             store_solution(*model_, system.rows[joints + k], points_, points_.all[k]);
         if (joints == 0 && model_->options.solver == SolverKind::direct)
             warm_started = warm_start_by_pgs(system, known, round) || warm_started;
-        points_.order(state_.cache, model_->surfaces.resists_turning);
+        order_points();
     }
-    mark_rows(system);  // the last round may have brought rows to bodies that had none
+    mark_rows(system.mass.size(),
+              system.rows);  // the last round may have brought rows to bodies that had none
     quality_ = judge(judged(), system, friction, report);
     if (!report.converged) {
         std::vector<double>& share = arrays_.share;
@@ -200,9 +260,9 @@ ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vecto
     return {.finite = report.finite};
 }
 
-void ContactStage::mark_rows(const MixedSystem& system) {
-    has_rows_.assign(system.mass.size(), 0);
-    for (const RowBlock& block : system.rows) {
+void ContactStage::mark_rows(std::size_t bodies, const std::vector<RowBlock>& rows) {
+    has_rows_.assign(bodies, 0);
+    for (const RowBlock& block : rows) {
         for (const int body : {block.first, block.second})
             if (body >= 0) has_rows_[body] = 1;
         for (const FurtherBody& other : block.further) has_rows_[other.body] = 1;
@@ -211,7 +271,7 @@ void ContactStage::mark_rows(const MixedSystem& system) {
 
 /// Velocities of all bodies after a solve; those without rows fly freely.
 void ContactStage::move_on(const MixedSystem& system, std::vector<Vec6>& next) {
-    mark_rows(system);
+    mark_rows(system.mass.size(), system.rows);
     next.resize(model_->bodies.count());
     for (std::size_t b = 0; b < model_->bodies.count(); ++b) {
         const int u = model_->bodies.solver_index[b];
@@ -233,7 +293,7 @@ void ContactStage::correct_events(const MixedSystem& system) {
         for (int i = 0; i < 3; ++i) correction_[u][i] += more[i];
     }
     if (motion_.supported.has_released())
-        motion_.supported.book(system, connected(system, 0), model_->bodies, state_.cache.points);
+        motion_.supported.book(system, connected(system.mass.size()), model_->bodies, state_.cache.points);
 }
 
 const PositionProjection* ContactStage::project_positions(const MixedSystem& system, std::size_t joints,
@@ -257,7 +317,7 @@ void ContactStage::apply_balancing_impulse(const Islands& islands, int island, V
 
 BlockLdlt::Counters ContactStage::factor_counters() const noexcept {
     BlockLdlt::Counters sum = resting_solver_.counters();
-    for (const IslandSolver* solver : {&impact_solver_, &projector_.solver()}) {
+    for (const IslandSolver* solver : {&impacts_.solver(), &projector_.solver()}) {
         const BlockLdlt::Counters more = solver->counters();
         sum.factorisations += more.factorisations;
         sum.block_operations += more.block_operations;

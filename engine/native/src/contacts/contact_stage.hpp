@@ -55,6 +55,8 @@
 #include "contacts/contact_islands.hpp"
 #include "contacts/contact_points.hpp"
 #include "contacts/contact_rows.hpp"
+#include "contacts/impact_events.hpp"
+#include "contacts/impact_solver.hpp"
 #include "contacts/pgs_solver.hpp"
 #include "contacts/position_projection.hpp"
 #include "contacts/solve_islands.hpp"
@@ -92,7 +94,7 @@ public:
 
     /// Whether a contact with restitution is approached faster than rounding, or a stop among the rows of joints in
     /// `system` is hit that is connected to bodies in contact; asked anew after each impact.
-    bool impact_needed(const MixedSystem& system) const { return impact_needed_ || stop_is_hit(system); }
+    bool impact_needed(const MixedSystem& system) { return impacts_.needed(system, points_); }
 
     /// The part of the step's forces that acts on `body` before the impact, or before the last one that hit it.
     double toi_fraction(int body) const noexcept { return motion_.toi_fraction[body]; }
@@ -165,14 +167,14 @@ public:
     void keep(Snapshot& kept) const {
         kept.state = state_;
         resting_solver_.backoff(kept.resting);
-        impact_solver_.backoff(kept.impact);
+        impacts_.solver().backoff(kept.impact);
         projector_.solver().backoff(kept.projection);
     }
     void go_back(const Snapshot& kept) {
         lie_as(kept.state);
         state_ = kept.state;
         resting_solver_.set_backoff(kept.resting);
-        impact_solver_.set_backoff(kept.impact);
+        impacts_.solver().set_backoff(kept.impact);
         projector_.solver().set_backoff(kept.projection);
     }
 
@@ -184,35 +186,15 @@ public:
 private:
     using Point = StepContact;
     void lie_as(const State& state);
-    bool is_impact(const Point& point) const noexcept;
     bool needs_impact_first(const MixedSystem& system, std::size_t known, const std::vector<Vec6>& next,
                             bool left_out);
     CandidateSearch::Found find_impacts(const Cast& cast, bool keeps_rebounds);
-    void find_events();
-    void measure_points();
+    void order_points() { points_.order(state_.cache, model_->surfaces.resists_turning); }
+    bool measure_points() { return impacts_.measure(motion_, search_.margins().reach(), points_); }
     ContactRows rows() const noexcept { return {*model_, motion_, points_}; }
-    IslandRules rules_of(FrictionModel model, bool exact) const noexcept;
-    const Islands& connected(const MixedSystem& system, std::size_t joints) const;
-    int island_of(const Islands& islands, const Point& point) const noexcept;
-    bool is_hit(const RowBlock& block) const noexcept;
-    bool stop_is_hit(const MixedSystem& system) const;
-    void find_earliest_impacts(MixedSystem& system, std::vector<std::size_t>& hit_points);
-    void find_orderly(const Islands& islands, const std::vector<double>& first,
-                      const std::vector<double>& closing);
-    bool come_in_order(const Point& point) const;
-    void apply_forces_before(std::size_t body, double part, MixedSystem& system);
-    Vec6 path_until(std::size_t body, double time) const;
-    double gap_at(const Point& point, double time) const;
-    double last_impact_time(const Point& point) const noexcept;
-    double closing_time(const Point& point) const;
-    void move_to_last_impact(Point& point);
-    void take_part(MixedSystem& system, std::vector<std::size_t>& hit_points,
-                   std::vector<RowBlock>& rows) const;
-    void share_impact(MixedSystem& hit, std::size_t joints, const std::vector<std::size_t>& hit_points) const;
-    void solve_impact(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
-                      FrictionModel model);
+    const Islands& connected(std::size_t bodies);
     void after_impact(const MixedSystem& system);
-    void mark_rows(const MixedSystem& system);
+    void mark_rows(std::size_t bodies, const std::vector<RowBlock>& rows);
     void move_on(const MixedSystem& system, std::vector<Vec6>& next);
     // contact_pgs.cpp: the same by PGS over compact contacts
     struct PgsSolveEnd : SolveEnd {
@@ -239,9 +221,7 @@ private:
              joint_is_worst = false;  // as near to their law as the method asks for; else a joint is furthest
     };
     PgsEnd judge_pgs(MixedSystem& system);
-    JudgedStep judged() const noexcept {
-        return {model_->bodies, model_->options, motion_.velocity, points_.all, state_.initial_penetration};
-    }
+    JudgedStep judged() const noexcept { return {*model_, motion_, points_, state_.initial_penetration}; }
     bool runs_away(const MixedSystem& system) const;
     void hand_over();
     void shorten_unsettled(MixedSystem& system, std::size_t joints, const std::vector<char>& pushes,
@@ -254,7 +234,9 @@ private:
     StepMotion motion_;
     CandidateSearch search_;
     ContactPoints points_;
-    IslandSolver resting_solver_, impact_solver_;
+    ImpactEvents events_;
+    ImpactSolver impacts_;
+    IslandSolver resting_solver_;
     PgsSolver pgs_;
     PositionProjector projector_;
     bool ran_away_ = false;        // in this solve: islands that are not too large are solved directly
@@ -265,16 +247,10 @@ private:
     std::vector<CachedContact> unordered_;
     mutable ContactArrays arrays_;  // what is in them is of one call
 
-    DisjointSets connected_;     // bodies, by contacts and joints
-    std::vector<double> clock_;  // of successive impacts: up to when a body's way in the step is known, s
-    std::vector<Vec6> path_;     // and that way, m and rad
-    std::vector<signed char> in_order_;  // bodies: 1 if impacts come one by one in this step, −1 if not
+    IslandFinder connected_;
     std::vector<std::pair<std::uint64_t, std::size_t>> places_;  // of points, by key
     std::vector<char> has_rows_;                                 // moving bodies with rows, by unknown
     std::vector<Vec6> correction_;
-    bool impact_needed_ = false;
-    bool plastic_first_ = false;  // plastic impacts are met in the impact as well
-    int impact_rounds_ = 0;
     SolveQuality quality_;
 };
 

@@ -15,8 +15,7 @@ void IslandFinder::tie(const RowBlock& block) {
 }
 
 const Islands& IslandFinder::find(const MixedSystem& system) {
-    begin(static_cast<int>(system.mass.size()));
-    for (const RowBlock& block : system.rows) tie(block);
+    begin(system, system.rows.size());
     return find();
 }
 

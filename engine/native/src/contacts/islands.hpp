@@ -28,6 +28,11 @@ struct Islands {
 class IslandFinder {
 public:
     void begin(int bodies);
+    /// The same, with a tie for each of the first `rows` blocks of rows.
+    void begin(const MixedSystem& system, std::size_t rows) {
+        begin(static_cast<int>(system.mass.size()));
+        for (std::size_t k = 0; k < rows; ++k) tie(system.rows[k]);
+    }
     void tie(int first, int second) {
         const Islands::Tie own{first, second};
         if (ties_.empty() || ties_.back() != own) ties_.push_back(own);  // of a pair's points one says all

@@ -4,10 +4,8 @@
 #include <vector>
 
 #include "contacts/contact_arrays.hpp"
-#include "contacts/contact_bodies.hpp"
-#include "contacts/contact_options.hpp"
-#include "contacts/step_contact.hpp"
-#include "linear/large_array.hpp"
+#include "contacts/contact_points.hpp"
+#include "contacts/step_motion.hpp"
 
 namespace spook {
 
@@ -20,10 +18,9 @@ struct SolveQuality {
 
 /// What a solve is judged by: bodies and v before it, points, and how deep pairs overlapped where the run began.
 struct JudgedStep {
-    const ContactBodies& bodies;
-    const ContactOptions& options;
-    const std::vector<Vec6>& velocity;
-    const LargeArray<StepContact>& points;
+    const ContactModel& model;
+    const StepMotion& motion;
+    const ContactPoints& points;
     const DepthOfPair& initial_penetration;
 };
 
@@ -33,7 +30,8 @@ inline double elastic_depth(const ContactBodies& bodies, const StepContact& poin
 }
 
 /// Takes down a row of the body of that solver index that is off by more than the method allows.
-void blame(SolveQuality& quality, const JudgedStep& step, double residual, int solver_index);
+void blame(SolveQuality& quality, const ContactModel& model, const StepMotion& motion, double residual,
+           int solver_index);
 /// Iterations that stop early let bodies sink by little each, in a tall stack step after step: no row is far off, and the
 /// load is not borne. What the projection could not lift again shows it.
 void blame_sunk(SolveQuality& quality, const JudgedStep& step);
@@ -41,7 +39,7 @@ void blame_sunk(SolveQuality& quality, const JudgedStep& step);
 SolveQuality judge(const JudgedStep& step, const MixedSystem& system,
                    const std::vector<FrictionPoint>& points, const FrictionReport& report);
 /// The same of an impact whose solve stopped at a limit; of several solves, as they follow each other in a step, the worst.
-void judge_impact(SolveQuality& quality, const JudgedStep& step, const MixedSystem& hit,
-                  const std::vector<FrictionPoint>& points, FrictionModel model);
+void judge_impact(SolveQuality& quality, const ContactModel& model, const StepMotion& motion,
+                  const MixedSystem& hit, const std::vector<FrictionPoint>& points, FrictionModel friction);
 
 }  // namespace spook

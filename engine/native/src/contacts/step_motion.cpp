@@ -25,8 +25,7 @@ void StepMotion::predict(const std::vector<Vec6>& free_velocity) {
     supported.find(model_->bodies);
     predicted.resize(velocity.size());
     for (std::size_t b = 0; b < predicted.size(); ++b)
-        predicted[b] =
-            is_free(b) && model_->bodies.moves(static_cast<int>(b)) ? free_velocity[b] : velocity[b];
+        predicted[b] = is_free(b) && model_->bodies.moves(b) ? free_velocity[b] : velocity[b];
 }
 
 bool StepMotion::moves_along_forces(int body) const {
@@ -42,7 +41,7 @@ void StepMotion::apply_forces_until(std::size_t b, double part) {
 void StepMotion::apply_half_of_forces() {
     const bool rebounds = model_->surfaces.rebounds;
     for (std::size_t b = 0; rebounds && b < velocity.size(); ++b)
-        if (model_->bodies.moves(static_cast<int>(b)) && is_free(b) && event_time[b] < 0.0)
+        if (model_->bodies.moves(b) && is_free(b) && event_time[b] < 0.0)
             apply_forces_until(b, part_of_forces(0.0, rebounds));
 }
 

@@ -53,7 +53,7 @@ void SupportedBodies::note(StepContact& point, const ContactBodies& bodies, cons
 
 void SupportedBodies::find(const ContactBodies& bodies) {
     for (std::size_t b = 0; b < bodies.count(); ++b)
-        supported_[b] = supported_[b] && (!bodies.moves(static_cast<int>(b)) || bodies.jointed[b]);
+        supported_[b] = supported_[b] && (!bodies.moves(b) || bodies.jointed[b]);
     const auto carry = [this](const SupportPair& at) {
         char &first = supported_[at.first], &second = supported_[at.second];
         const bool more = (at.first_presses && !first && (second || at.both)) ||

@@ -51,8 +51,8 @@ inline constexpr double vanishing = 1e-8;  // a direction so steep on the surfac
 inline constexpr double closed = 1e-9;  // gaps up to this part of the larger body's radius count as closed
 inline constexpr unsigned pairs_a_look = 256;  // of shapes, between two looks at the clock
 
-// contact_impact.cpp
-namespace tolerances::contact_impact {
+// impact_solver.cpp
+namespace tolerances::impact_solver {
 inline constexpr int simultaneous_rounds = 20;  // of impacts that follow from impacts in one step
 inline constexpr double gain = 1e-14;           // rise of kinetic energy that is rounding, relative
 inline constexpr double impact_compliance =
@@ -63,7 +63,7 @@ inline constexpr int most_again =
 inline constexpr double left = 1e-16;      // of the fastest row: a give that is rounding
 inline constexpr double broken = 1e-6;     // of the fastest row: what a row may be short of
 inline constexpr double tolerated = 1e-9;  // of the fastest row: a give that need not be told
-}  // namespace tolerances::contact_impact
+}  // namespace tolerances::impact_solver
 
 // Read by several parts
 inline constexpr std::size_t few_rows = 24;  // blocks: so many are solved directly at little cost
@@ -75,8 +75,8 @@ namespace tolerances::contact_judge {
 inline constexpr double sunk = 0.02;  // of the smaller body's radius: an overlap that a solve has left
 }
 
-// contact_order.cpp
-namespace tolerances::contact_order {
+// impact_events.cpp
+namespace tolerances::impact_events {
 inline constexpr std::size_t event_bodies =
     8;  // a larger island is not moved to the time of one impact in it
 }

@@ -1,5 +1,5 @@
 // Stage: impacts. 0 <= nu ⟂ C v₊ + psi C v₋ >= 0 with friction against the slip, joints included and forces dropped; again as
-// long as some contact or stop with restitution is approached. The law, and why it cannot raise the energy: contacts/contact_impact.cpp.
+// long as some contact or stop with restitution is approached. The law, and why it cannot raise the energy: contacts/impact_solver.hpp.
 //
 // reads: points, masses and rows of joints. writes: velocities of bodies and scratch_.velocities, impulses of impacts, share_ (the part of
 // the forces still to act after an event), stops that were hit.

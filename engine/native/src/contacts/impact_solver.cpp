@@ -1,24 +1,17 @@
-// The contact stage's second part: impacts.
-//
-// Why the impact cannot raise the kinetic energy E = ½ vᵀ M v. Let v_p be the plastic impact (psi = 0): with
-// impulse P, M (v_p − v₋) = P and E_p − E₋ = v_p·P − ½ |v_p − v₋|²_M, where v_p·P = Σ nu C v_p + beta·D v_p, whose
-// first part is zero by complementarity and whose second is negative, friction acting against the slip. So
-// E_p <= E₋. Newton's law, v_N, can raise E where restitutions differ, or where friction turns a slip round: then
-// v₊ = v_p + s (v_N − v_p) with the largest s in 0 … 1 for which E(v₊) <= E₋, island by island. It exists, E being
-// convex in s and E(v_p) <= E₋; and v₊ obeys all that v_p and v_N obey: C v₊ >= 0, nu >= 0, |beta| <= mu nu are convex.
+#include "contacts/impact_solver.hpp"
+
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "contacts/contact_geometry.hpp"
-#include "contacts/contact_stage.hpp"
+#include "contacts/contact_rows.hpp"
 #include "contacts/tolerances.hpp"
 
 namespace spook {
 
 namespace {
 
-using namespace tolerances::contact_impact;
+using namespace tolerances::impact_solver;
 
 /// Of successive impacts in one step.
 int most_rounds(std::size_t points) noexcept { return 100 + 20 * static_cast<int>(points); }
@@ -45,7 +38,7 @@ void find_kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& vel
 
 /// In islands whose energy rises, velocities between the plastic ones and those of Newton's law that keep it; `share` is
 /// how much of the latter.
-void blend(ImpactArrays& work, const Islands& islands) {
+template <class Work> void blend(Work& work, const Islands& islands) {
     MixedSystem& newton = work.hit;
     const MixedSystem& plastic = work.plastic;
     const std::vector<char>& rises = work.rises;
@@ -96,15 +89,26 @@ Vec3 impulse_of(const RowBlock& block) {
 
 }  // namespace
 
+ImpactSolver::ImpactSolver(std::shared_ptr<const ContactModel> model)
+    : model_(std::move(model)), order_(model_) {
+    solver_.floor = model_->options.floor;
+    solver_.refinements = model_->options.refinements;
+}
+
+void ImpactSolver::begin_step() {
+    needed_ = plastic_too_ = false;
+    rounds_ = 0;
+    order_.begin();
+}
+
 /// A pair that meets at more points than its motion can tell apart may share an impact among them in many ways, and
 /// friction turns the bodies otherwise with each. Points that give way alike share it in one: their rows get a
-/// softness, which solve_impact() takes back.
-void ContactStage::share_impact(MixedSystem& hit, std::size_t joints,
-                                const std::vector<std::size_t>& hit_points) const {
-    std::vector<std::pair<int, int>>& pairs =
-        arrays_.impact.pairs;  // points of compounds do not come together
+/// softness, which solve_rows() takes back.
+void ImpactSolver::share_impact(MixedSystem& hit, std::size_t joints, const ContactPoints& points) {
+    std::vector<std::pair<int, int>>& pairs = work_.pairs;  // points of compounds do not come together
+    const std::vector<std::size_t>& hit_points = work_.hit_points;
     const auto pair = [&](std::size_t k) {
-        const Contact& contact = points_.all[k].contact;
+        const Contact& contact = points.all[k].contact;
         return std::pair{contact.first, contact.second};
     };
     pairs.clear();
@@ -120,12 +124,11 @@ void ContactStage::share_impact(MixedSystem& hit, std::size_t joints,
 
 /// Solves an impact; where its rows are soft, again and again with their give added to what they ask, until none is left
 /// (the proximal point algorithm, Rockafellar 1976). Rows that contradict each other keep some: the solve is unsettled.
-void ContactStage::solve_impact(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
-                                FrictionModel model) {
-    const std::vector<FrictionPoint>& fresh = arrays_.impact.first_friction = friction;
-    const IslandRules rules = rules_of(model, true);
-    FrictionReport report =
-        solve_islands(hit, friction, impact_solver_, model_->options, rules, state_.counters);
+void ImpactSolver::solve_rows(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
+                              const IslandRules& rules, const StepMotion& motion, ContactCounters& counters,
+                              SolveQuality& quality) {
+    const std::vector<FrictionPoint>& fresh = work_.first_friction = friction;
+    FrictionReport report = solve_islands(hit, friction, solver_, model_->options, rules, counters);
     if (report.converged && is_broken(hit, joints)) {
         for (std::size_t k = joints; k < hit.rows.size(); ++k) {
             RowBlock& block = hit.rows[k];
@@ -134,11 +137,11 @@ void ContactStage::solve_impact(MixedSystem& hit, std::size_t joints, std::vecto
             block.softness[0] = impact_compliance * own_inertia(hit, block, 0);
         }
         friction = fresh;
-        report = solve_islands(hit, friction, impact_solver_, model_->options, rules, state_.counters);
+        report = solve_islands(hit, friction, solver_, model_->options, rules, counters);
     }
     bool settled = report.converged;
-    std::vector<double>& asked = filled(arrays_.impact.asked, 0);
-    std::vector<char>& answered = filled<char>(arrays_.impact.answered, hit.rows.size(), 1);
+    std::vector<double>& asked = filled(work_.asked, 0);
+    std::vector<char>& answered = filled<char>(work_.answered, hit.rows.size(), 1);
     double fastest = 0.0;
     bool soft = false;
     for (std::size_t k = joints; k < hit.rows.size(); ++k) {
@@ -158,68 +161,38 @@ void ContactStage::solve_impact(MixedSystem& hit, std::size_t joints, std::vecto
             block.right[0] = right;
         }
         if (change <= left * fastest || again == most_again) break;
-        report =
-            solve_islands(hit, friction, impact_solver_, model_->options, rules, state_.counters, &answered);
+        report = solve_islands(hit, friction, solver_, model_->options, rules, counters, &answered);
         settled = settled && report.converged;
     }
     const double enough =
         model_->options.solver == SolverKind::direct ? 0.0 : model_->options.residual_tolerance;
-    if (report.finite && change > std::max(enough, tolerated * fastest)) ++state_.counters.unsettled;
-    if (report.finite && !settled) judge_impact(quality_, judged(), hit, friction, model);
-}
-
-/// After a solve: whether an impact is to come first. Where impacts that rebound were left out, bodies that a plastic impact
-/// sets in motion may meet others with restitution in this very step. The resting rows that answer such impacts know of no
-/// bounce: plastic ones, too, are then met before, so that these are found in time. If there are none, what has been left out is
-/// met as if it did not rebound. So come impacts of bodies that a stop sends back with `next` with others that no row knew
-/// of: `known` is how many points there were.
-bool ContactStage::needs_impact_first(const MixedSystem& system, std::size_t known,
-                                      const std::vector<Vec6>& next, bool left_out) {
-    if (left_out) {
-        plastic_first_ = true;
-        measure_points();
-        if (impact_needed_) {
-            points_.order(state_.cache, model_->surfaces.resists_turning);
-            return true;
-        }
-        find_impacts({next, Cast::When::solved}, true);
-    }
-    if (points_.all.size() == known || !stop_is_hit(system)) return false;
-    points_.order(state_.cache, model_->surfaces.resists_turning);
-    measure_points();
-    return true;
-}
-
-/// What is connected by rows of joints, of which `system` has so many, and by the step's points.
-const Islands& ContactStage::connected(const MixedSystem& system, std::size_t joints) const {
-    arrays_.connected.begin(static_cast<int>(system.mass.size()));
-    for (std::size_t k = 0; k < joints; ++k) arrays_.connected.tie(system.rows[k]);
-    for (const Point& point : points_.all)
-        arrays_.connected.tie(model_->bodies.solver_index[point.contact.first],
-                              model_->bodies.solver_index[point.contact.second]);
-    return arrays_.connected.find();
-}
-
-int ContactStage::island_of(const Islands& islands, const Point& point) const noexcept {
-    return islands.of_body[std::max(model_->bodies.solver_index[point.contact.first],
-                                    model_->bodies.solver_index[point.contact.second])];
+    if (report.finite && change > std::max(enough, tolerated * fastest)) ++counters.unsettled;
+    if (report.finite && !settled) judge_impact(quality, *model_, motion, hit, friction, rules.friction);
 }
 
 /// Whether a joint's stop takes part in impacts: it sends back what hits it, or plastic impacts are met as well.
-bool ContactStage::is_hit(const RowBlock& block) const noexcept {
-    return block.stop.rebound != 0.0 || (plastic_first_ && block.stop.hit);
+bool ImpactSolver::is_hit(const RowBlock& block) const noexcept {
+    return block.stop.rebound != 0.0 || (plastic_too_ && block.stop.hit);
 }
 
-/// Whether some stop is hit where contacts are to hear of it: what it sets in motion may push them, and
-/// Newton's law for it and resting rows for them would raise the energy. A stop alone is left to the resting stage.
-bool ContactStage::stop_is_hit(const MixedSystem& system) const {
-    if (points_.all.empty()) return false;
+/// What is connected by rows of joints and by the step's points.
+const Islands& ImpactSolver::connected(const MixedSystem& system, const ContactPoints& points) {
+    connected_.begin(system, system.rows.size());
+    points.tie(model_->bodies, connected_);
+    return connected_.find();
+}
+
+bool ImpactSolver::stop_is_hit(const MixedSystem& system, const ContactPoints& points) {
+    if (points.all.empty()) return false;
     const auto hit = [this](const RowBlock& block) { return is_hit(block); };
     if (std::none_of(system.rows.begin(), system.rows.end(), hit)) return false;
-    if (impact_rounds_ > most_rounds(points_.all.size())) return false;
-    const Islands& islands = connected(system, system.rows.size());
-    std::vector<char>& touched = filled(arrays_.impact.touched, islands.count);
-    for (const Point& point : points_.all) touched[island_of(islands, point)] = 1;
+    if (rounds_ > most_rounds(points.all.size())) return false;
+    const Islands& islands = connected(system, points);
+    const auto own = [&](const StepContact& point) {
+        return islands.of_body[model_->bodies.solver_body(point.contact)];
+    };
+    std::vector<char>& touched = filled(work_.touched, islands.count);
+    for (const StepContact& point : points.all) touched[own(point)] = 1;
     return std::any_of(system.rows.begin(), system.rows.end(), [&](const RowBlock& block) {
         return is_hit(block) && touched[islands.of_body[std::max(block.first, block.second)]];
     });
@@ -228,31 +201,34 @@ bool ContactStage::stop_is_hit(const MixedSystem& system) const {
 /// Leaves out points that close where nothing is approached and no stop is hit: what goes on elsewhere is nothing to their
 /// bodies. Then the rows of joints as an impact sees them, of those that are connected to a point that is left, or that
 /// have a stop which is hit beside a point.
-void ContactStage::take_part(MixedSystem& system, std::vector<std::size_t>& hit_points,
-                             std::vector<RowBlock>& rows) const {
-    const Islands& islands = connected(system, system.rows.size());
+void ImpactSolver::take_part(MixedSystem& system, const ContactPoints& points) {
+    const Islands& islands = connected(system, points);
+    const auto own = [&](const StepContact& point) {
+        return islands.of_body[model_->bodies.solver_body(point.contact)];
+    };
     const auto island = [&](const RowBlock& block) {
         return islands.of_body[std::max(block.first, block.second)];
     };
+    std::vector<std::size_t>& hit_points = work_.hit_points;
     const auto is_met =
-        [&](const Point& point) {  // where impacts come in order, plastic ones have their turn
-            return come_in_order(point) ? point.approach < -point.rounding : is_impact(point);
+        [&](const StepContact& point) {  // where impacts come in order, plastic ones have their turn
+            return order_.come_in_order(point) ? point.approach < -point.rounding : is_impact(point);
         };
-    std::vector<char>&touched = filled(arrays_.impact.touched, islands.count),
-    &taking_part = filled(arrays_.impact.taking_part, islands.count);
-    for (const Point& point : points_.all) touched[island_of(islands, point)] = 1;
+    std::vector<char>&touched = filled(work_.touched, islands.count),
+    &taking_part = filled(work_.taking_part, islands.count);
+    for (const StepContact& point : points.all) touched[own(point)] = 1;
     for (const std::size_t k : hit_points)
-        if (is_met(points_.all[k])) taking_part[island_of(islands, points_.all[k])] = 1;
+        if (is_met(points.all[k])) taking_part[own(points.all[k])] = 1;
     for (const RowBlock& block : system.rows)
         if (is_hit(block) && touched[island(block)]) taking_part[island(block)] = 1;
-    std::erase_if(hit_points,
-                  [&](std::size_t k) { return !taking_part[island_of(islands, points_.all[k])]; });
-    arrays_.joints_hit.clear();
+    std::erase_if(hit_points, [&](std::size_t k) { return !taking_part[own(points.all[k])]; });
+    joints_hit_.clear();
+    std::vector<RowBlock>& rows = work_.hit.rows;
     for (RowBlock& given : system.rows) {
         if (!taking_part[island(given)]) continue;
         given.stop.answered = is_hit(given);
-        given.stop.limit_reached = impact_rounds_ > most_rounds(points_.all.size());
-        arrays_.joints_hit.push_back(static_cast<std::size_t>(&given - system.rows.data()));
+        given.stop.limit_reached = rounds_ > most_rounds(points.all.size());
+        joints_hit_.push_back(static_cast<std::size_t>(&given - system.rows.data()));
         RowBlock& block = rows.emplace_back(given);
         for (int i = 0; i < block.size; ++i) {
             const bool below = block.lower[i] == -unbounded, above = block.upper[i] == unbounded;
@@ -270,27 +246,30 @@ void ContactStage::take_part(MixedSystem& system, std::vector<std::size_t>& hit_
 }
 
 /// Whether a point is approached so that the impact is to answer it.
-bool ContactStage::is_impact(const Point& point) const noexcept {
-    const bool answered = point.bounce > 0.0 || (plastic_first_ && point.bounce == 0.0);
+bool ImpactSolver::is_impact(const StepContact& point) const noexcept {
+    const bool answered = point.bounce > 0.0 || (plastic_too_ && point.bounce == 0.0);
     return answered && point.approach < -point.rounding;
 }
 
-void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
-    ++state_.counters.impacts;
-    ++impact_rounds_;
-    quality_ = {};
-    const bool in_order = !clock_.empty() && impact_rounds_ <= most_rounds(points_.all.size());
-    ImpactArrays& work = arrays_.impact;
+SolveQuality ImpactSolver::solve(MixedSystem& system, const OpenPairs& open, std::size_t few_enough,
+                                 StepMotion& motion, ContactPoints& points, std::vector<Vec6>& impulses,
+                                 ContactCounters& counters) {
+    ++counters.impacts;
+    ++rounds_;
+    SolveQuality quality;
+    const bool in_order = order_.possible() && rounds_ <= most_rounds(points.all.size());
+    Arrays& work = work_;
     std::vector<std::size_t>& hit_points = filled(work.hit_points, 0);
-    if (in_order) find_earliest_impacts(system, hit_points);
-    for (std::size_t k = 0; !in_order && k < points_.all.size(); ++k)
-        if (points_.all[k].bounce >= 0.0) hit_points.push_back(k);
+    if (in_order) order_.find_earliest(system, open, motion, points, hit_points);
+    for (std::size_t k = 0; !in_order && k < points.all.size(); ++k)
+        if (points.all[k].bounce >= 0.0) hit_points.push_back(k);
     MixedSystem& hit = work.hit;
     hit.mass = system.mass;
     hit.momentum = system.momentum;
     hit.rows.clear(), hit.velocity.clear();
-    take_part(system, hit_points, hit.rows);
+    take_part(system, points);
     const std::size_t joints = hit.rows.size();
+    const ContactRows rows{*model_, motion, points};
     std::vector<FrictionPoint>& friction = filled(work.friction, 0);
     std::vector<std::size_t>& pushed = filled(work.pushed, 0);
     std::vector<Vec6>& before = work.before = hit.momentum;
@@ -298,8 +277,8 @@ void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
     auto& returned = work.returned;
     returned.assign(hit_points.size(), {});
     for (std::size_t j = 0; j < hit_points.size(); ++j) {
-        const Point& point = points_.all[hit_points[j]];
-        RowBlock block = rows().row_block(point, point.friction > 0.0 ? 3 : 1);
+        const StepContact& point = points.all[hit_points[j]];
+        RowBlock block = rows.row_block(point, point.friction > 0.0 ? 3 : 1);
         if (std::any_of(block.right.begin(), block.right.begin() + block.size,
                         [](double r) { return r != 0.0; }))
             pushed.push_back(hit.rows.size());
@@ -307,7 +286,7 @@ void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
         block.state[0] = point.approach < 0.0 ? RowState::free : RowState::at_lower;
         if (block.size == 3) {
             friction.push_back({static_cast<int>(hit.rows.size()), point.friction, 0.0, -1.0});
-            friction.back().anisotropic = points_.extras(point).is_anisotropic();
+            friction.back().anisotropic = points.extras(point).is_anisotropic();
             const double slip = point.bounce > 0.0 && is_impact(point)
                                     ? std::max(model_->surfaces[point.contact.first].tangential_restitution,
                                                model_->surfaces[point.contact.second].tangential_restitution)
@@ -319,13 +298,15 @@ void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
         hit.rows.push_back(block);
     }
     // No step before has anything to say about an impact: the box takes this one's own normal impulses.
-    const FrictionModel model =
-        model_->options.friction == FrictionModel::box ? FrictionModel::scaled_box : model_->options.friction;
-    share_impact(hit, joints, hit_points);
+    const bool box = model_->options.friction == FrictionModel::box;
+    const IslandRules rules{.friction = box ? FrictionModel::scaled_box : model_->options.friction,
+                            .enough = model_->options.residual_tolerance,
+                            .few_enough = few_enough};
+    share_impact(hit, joints, points);
     work.start = hit, work.fresh = friction;
-    solve_impact(hit, joints, friction, model);
+    solve_rows(hit, joints, friction, rules, motion, counters, quality);
 
-    const Islands& islands = arrays_.connected.find(hit);
+    const Islands& islands = connected_.find(hit);
     const auto island = [&islands](const RowBlock& block) {
         return islands.of_body[std::max(block.first, block.second)];
     };
@@ -344,22 +325,21 @@ void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
             plastic.rows[k].right[0] = 0.0;
             for (int i = 1; i < 3; ++i) plastic.rows[k].right[i] += returned[k - joints][i - 1];
         }
-        solve_impact(plastic, joints, work.plastic_friction, model);
+        solve_rows(plastic, joints, work.plastic_friction, rules, motion, counters, quality);
         blend(work, islands);
     }
     system.velocity = hit.velocity;
-    mark_rows(hit);
     impulses.resize(system.rows.size());
     for (std::size_t j = 0; j < joints; ++j) {
         const RowBlock& block = hit.rows[j];
         const double s = share[island(block)];
         for (int i = 0; i < block.size; ++i) {
             const double other = s < 1.0 ? plastic.rows[j].multiplier[i] : block.multiplier[i];
-            impulses[arrays_.joints_hit[j]][i] += other + s * (block.multiplier[i] - other);
+            impulses[joints_hit_[j]][i] += other + s * (block.multiplier[i] - other);
         }
     }
     for (std::size_t j = 0; j < hit_points.size(); ++j) {
-        Point& point = points_.all[hit_points[j]];
+        StepContact& point = points.all[hit_points[j]];
         const RowBlock& block = hit.rows[joints + j];
         const double s = share[island(block)];
         double normal = block.multiplier[0];
@@ -370,43 +350,50 @@ void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
             impulse = (1.0 - s) * impulse_of(soft) + s * impulse;
         }
         point.impact += normal;
-        points_.own_extras(point).impact_impulse += impulse;
+        points.own_extras(point).impact_impulse += impulse;
     }
-    after_impact(system);
+    return quality;
 }
 
-/// Impacts set bodies in motion that meet others within the same step.
-void ContactStage::after_impact(const MixedSystem& system) {
-    for (std::size_t b = 0; b < model_->bodies.count(); ++b)
-        if (model_->bodies.solver_index[b] >= 0 && has_rows_[model_->bodies.solver_index[b]]) {
-            motion_.release_support(static_cast<int>(b), system.velocity[model_->bodies.solver_index[b]]);
-            motion_.velocity[b] = system.velocity[model_->bodies.solver_index[b]];
+bool ImpactSolver::measure(const StepMotion& motion, const std::vector<double>& reach,
+                           ContactPoints& points) {
+    const double h = model_->options.time_step;
+    needed_ = false;
+    for (StepContact& point : points.all) {
+        const Contact& contact = point.contact;
+        const double gap = contact.point.gap;
+        motion.measure(point);
+        const double psi = model_->surfaces.pair(contact).restitution, speed = -point.approach;
+        point.bounce = -1.0;
+        if (model_->bodies.is_closed(contact)) {
+            point.bounce = speed > 0.0 ? psi : 0.0;
+        } else if (plastic_too_ && point.impact > 0.0) {  // an impact of this step has brought them together
+            point.bounce = 0.0;
+        } else if (speed > 0.0 && gap + motion.time_left(point) * (point.approach + point.dv_ext) < 0.0) {
+            const double push = relative_velocity(point, contact.point.normal, motion.whole_dv_ext);
+            const double ahead = 2.0 * (-push / h) * gap / (speed * speed);
+            const double left = psi > 0.0 ? psi * psi - (1.0 - psi * psi) * ahead : 0.0;
+            if (left > 0.0) point.bounce = std::min(1.0, std::sqrt(left));
+            else if (plastic_too_) point.bounce = 0.0;
         }
-    std::vector<Vec6>& next = arrays_.impact.next = motion_.velocity;
-    for (std::size_t b = 0; b < next.size(); ++b)
-        if (model_->bodies.solver_index[b] >= 0 && !motion_.supported[b] && !model_->bodies.jointed[b])
-            next[b] = sum(motion_.velocity[b], motion_.dv_ext[b]);
-    changed_.assign(next.size(), 1);
-    const Cast cast{next};
-    search_.widen(cast, changed_, motion_, points_);
-    const std::size_t known = points_.all.size();
-    if (search_.find_impacts(cast, changed_, false, motion_, points_).pairs > 0) {
-        for (std::size_t k = known; k < points_.all.size(); ++k)
-            if (come_in_order(points_.all[k])) move_to_last_impact(points_.all[k]);
-        search_.move_impacts_to_start(known, next, motion_, points_);
-        state_.counters.contacts += points_.all.size() - known;
-        points_.order(state_.cache, model_->surfaces.resists_turning);
+        const double kick =
+            norm(linear(motion.dv_ext[contact.first])) + norm(linear(motion.dv_ext[contact.second]));
+        point.rounding = 1e-6 * kick + 1e-12 * (reach[contact.first] + reach[contact.second]) / h;
+        needed_ = needed_ || is_impact(point);
     }
-    measure_points();
-    impact_needed_ = false;
-    const bool again = impact_rounds_ <= most_rounds(points_.all.size());
-    for (const Point& point : points_.all) {
-        if (come_in_order(point))
-            impact_needed_ |= again && point.bounce >= 0.0 && point.approach < -point.rounding;
-        else if (impact_rounds_ < simultaneous_rounds)  // what was hit already is not hit again
-            impact_needed_ |= point.impact == 0.0 && point.toi >= 0.0 && is_impact(point);
+    return needed_;
+}
+
+bool ImpactSolver::look_again(const ContactPoints& points) {
+    needed_ = false;
+    const bool again = rounds_ <= most_rounds(points.all.size());
+    for (const StepContact& point : points.all) {
+        if (order_.come_in_order(point))
+            needed_ |= again && point.bounce >= 0.0 && point.approach < -point.rounding;
+        else if (rounds_ < simultaneous_rounds)  // what was hit already is not hit again
+            needed_ |= point.impact == 0.0 && point.toi >= 0.0 && is_impact(point);
     }
-    if (!impact_needed_) motion_.lay_down(points_.all);
+    return needed_;
 }
 
 }  // namespace spook
