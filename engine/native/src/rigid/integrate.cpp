@@ -5,31 +5,42 @@
 // speeds of rotors.
 #include "rigid/rigid_system.hpp"
 #include "rigid/rotors.hpp"
+#include "rigid/runaway.hpp"
 
 namespace spook {
 
 void RigidSystem::integrate() {
-    if (in_plane_ && half_step_ && !at_hand_) take_plane();  // also where its velocities were found in space
-    if (at_hand_) return move_in_plane();
-    if (live_.whirling < 0) live_.whirling = find_whirling(constrained_);
-    if (!constrained_are_moved_)
-        for (int i : constrained_)
-            if (!asleep(i)) spook::integrate(constants_[i], h_, live_.bodies[i]);
-    constrained_are_moved_ = false;
-    for (int i : free_) spook::integrate(constants_[i], h_, live_.bodies[i]);
-    for (int i : driven_) spook::integrate(constants_[i], h_, live_.bodies[i]);
-    if (contacts_ && !contacts_->correction().empty()) {
-        const std::vector<Vec6>& extra = contacts_->correction();
-        for (std::size_t k = 0; k < constrained_.size(); ++k)
-            if (!asleep(constrained_[k]))
-                displace(constants_[constrained_[k]], h_, {extra[k][0], extra[k][1], extra[k][2]},
-                         {extra[k][3], extra[k][4], extra[k][5]}, live_.bodies[constrained_[k]]);
+    const auto find_whirling = [this](std::span<const int> bodies) {
+        if (live_.whirling < 0)
+            live_.whirling = spook::find_whirling(model_, live_, joints_, bodies, [this] { deliver(); });
+    };
+    if (plane_.is_used() && model_.half_step && !plane_.at_hand())
+        plane_.enter();  // also where its velocities were found in space
+    if (plane_.at_hand()) {
+        const int body = plane_.move();
+        if (body < 0 || live_.whirling >= 0) return;
+        deliver();
+        return find_whirling({&body, 1});
+    }
+    find_whirling(model_.constrained);
+    if (!bilateral_.take_moved())
+        for (int i : model_.constrained)
+            if (!live_.asleep(i)) spook::integrate(model_.constants[i], model_.h, live_.bodies[i]);
+    for (int i : model_.free) spook::integrate(model_.constants[i], model_.h, live_.bodies[i]);
+    for (int i : model_.driven) spook::integrate(model_.constants[i], model_.h, live_.bodies[i]);
+    if (mixed_.contacts() && !mixed_.contacts()->correction().empty()) {
+        const std::vector<Vec6>& extra = mixed_.contacts()->correction();
+        for (std::size_t k = 0; k < model_.constrained.size(); ++k)
+            if (!live_.asleep(model_.constrained[k]))
+                displace(model_.constants[model_.constrained[k]], model_.h,
+                         {extra[k][0], extra[k][1], extra[k][2]}, {extra[k][3], extra[k][4], extra[k][5]},
+                         live_.bodies[model_.constrained[k]]);
     }
     for (const int k : joints_.rotors()) {
         const JointBlock& block = joints_.blocks()[k];
         JointState& state = joints_.states[block.joint];
-        if (rests(k)) state.rotor = state.rotor_lead = 0.0;
-        else turn_rotor(joints_, k, live_.bodies, h_);
+        if (rests(block, live_)) state.rotor = state.rotor_lead = 0.0;
+        else turn_rotor(joints_, k, live_.bodies, model_.h);
     }
 }
 

@@ -15,6 +15,10 @@ namespace spook {
 struct JointState {
     std::array<double, 6> multiplier{};
     std::array<double, 6> axial_multiplier{};
+    double* multipliers(bool axial) noexcept { return axial ? axial_multiplier.data() : multiplier.data(); }
+    const double* multipliers(bool axial) const noexcept {
+        return axial ? axial_multiplier.data() : multiplier.data();
+    }
     Vec3 first_reach,
         second_reach;  // from the centres to the point where forces are read, at the last step
     bool broken = false;

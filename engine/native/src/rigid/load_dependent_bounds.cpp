@@ -4,7 +4,6 @@
 #include <cmath>
 
 #include "linear/elementary.hpp"
-#include "rigid/rigid_system.hpp"
 
 namespace spook {
 
@@ -139,43 +138,6 @@ void LoadDependentBounds::follow_bearing(int bearing, MixedSystem& solved, Joint
     state.bound[of.way] = answer;
     rows.lower[of.row] = -next;
     rows.upper[of.row] = next;
-}
-
-/// Rows without contacts: solved again while bounds that follow other rows move. Iterations that do not get there in a few
-/// rounds bound the next step by this one.
-bool RigidSystem::solve_joints() {
-    load_dependent_.begin();
-    const bool iterative = solver_ == RigidSolver::iterative;
-    bool same_matrix = false;
-    for (int round = 0;; ++round) {
-        bool finite = true;
-        if (iterative) {
-            finite = iterate_joints();
-        } else {
-            const PivotReport report = pivot_.solve(mixed_, same_matrix);
-            rounds_ += static_cast<std::uint64_t>(report.rounds);
-            finite = report.finite;
-        }
-        if (!finite || load_dependent_.empty()) return finite;
-        if (iterative && round == LoadDependentBounds::PATIENT) {
-            load_dependent_.begin();
-            load_dependent_.follow(mixed_, joints_, true);
-            return true;
-        }
-        const auto [off, same] = load_dependent_.follow(mixed_, joints_);
-        same_matrix = same;
-        if (off <= LoadDependentBounds::AGREED) return true;
-        if (round < LoadDependentBounds::MOST_ROUNDS) continue;
-        // In speeds: what the missing impulse would have given the lightest of its bodies.
-        const RowBlock& rows = mixed_.rows[load_dependent_.worst()];
-        const int body = constrained_[rows.second >= 0 ? rows.second : rows.first];
-        double most = 0.0;
-        for (int i = 0; i < rows.size; ++i) most = std::max(most, std::abs(rows.multiplier[i]));
-        const double missed = off * most / constants_[body].mass;
-        residual_ = std::max(residual_, missed);
-        if (missed > method_.unsettled_residual) note_unsettled(body, missed);
-        return true;
-    }
 }
 
 }  // namespace spook

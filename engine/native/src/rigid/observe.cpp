@@ -9,40 +9,38 @@
 namespace spook {
 
 void RigidSystem::observe(Recorder& recorder, std::int64_t sample) {
-    if (clock_) clock_->start();
-    if (velocities_seen_ && (composed_ || half_step_)) {
+    clock_.start();
+    if (velocities_seen_ && (model_.composed || model_.half_step)) {
         // What is seen lives at the sample; what goes on does not.
         LargeArray<BodyState> going;
-        if (half_step_) {
+        if (model_.half_step) {
             solve_ahead();
             going = live_.bodies;
-            read_half_step();
+            half_step_.read();
         } else {
             going = live_.bodies;
-            read_composition();
+            composition_.read();
         }
         recorder.sample(sample);
         live_.bodies = std::move(going);
     } else {
         recorder.sample(sample);
     }
-    if (clock_) clock_->mark(Stage::observe);
+    clock_.mark(Stage::observe);
 }
 
 /// What the coming steps do not read, and a reader between them does.
 void RigidSystem::deliver() {
-    if (undelivered_) locked_.deliver(joints_.states);
-    undelivered_ = false;
-    if (at_hand_) write_plane();
-    if (at_hand_ && plane_values_) plane_.deliver(joints_.states);
+    bilateral_.deliver();
+    plane_.deliver();
 }
 
 /// The velocities of the coming step, before it is begun.
 void RigidSystem::solve_ahead() {
     if (live_.velocity_ready) return;
-    if (contacts_) keep(before_solve_ahead_);
+    if (mixed_.contacts()) keep(before_solve_ahead_);
     find_velocities();
-    if (at_hand_) deliver();
+    if (plane_.at_hand()) deliver();
     live_.velocity_ready = true;
 }
 

@@ -280,7 +280,7 @@ bool PlaneStep::find_velocities() noexcept {
     return true;
 }
 
-/// As RigidSystem::bend_rows_back(): where the rows came from is known.
+/// As RowCurvature::bend_back(): where the rows came from is known.
 void PlaneStep::bend_back() noexcept {
     for (std::size_t r = 0; r < rows_.size(); ++r) {
         const double back = last_violation_[r] - violation_[r] + options_.time_step * rate_[r];
@@ -289,7 +289,7 @@ void PlaneStep::bend_back() noexcept {
     first_asked_ = asked_;
 }
 
-/// As RigidSystem::correct_curvature(): where the solution, then the corrected one, would take the rows.
+/// As RowCurvature::correct(): where the solution, then the corrected one, would take the rows.
 void PlaneStep::correct() noexcept {
     const double h = options_.time_step;
     for (int round = 0; round < options_.corrections; ++round) {

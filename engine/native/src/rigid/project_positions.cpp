@@ -21,7 +21,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rigid/rigid_system.hpp"
+#include "rigid/island_frame.hpp"
+#include "rigid/overlap_projection.hpp"
 #include "rigid/tolerances.hpp"
 
 namespace spook {
@@ -38,21 +39,21 @@ Vec3 solved(const Mat3& a, Vec3 b) noexcept {
 
 }  // namespace
 
-void RigidSystem::project_positions() {
-    if (at_hand_) return;  // in a plane nothing overlaps
+void OverlapProjection::project_positions() {
     if (joints_.take_given()) project_limits();
-    if (touching_) project_overlaps();
+    if (mixed_.touching()) project_overlaps();
 }
 
 /// Parts what overlaps where the step ends; again as long as it helps, since a displacement is only right to first
 /// order, and turns bring other points down.
-void RigidSystem::project_overlaps() {
+void OverlapProjection::project_overlaps() {
     for (int round = 0; round < max_projections; ++round) {
-        scratch_.end_poses.resize(constants_.size());
-        for (int i = 0; i < bodies(); ++i)
-            scratch_.end_poses[i] = {position_of(i), axes(constants_[i], live_.bodies[i])};
-        projection_ =
-            contacts_->project_positions(mixed_, joints_.blocks().size(), scratch_.end_poses, round > 0);
+        scratch_.end_poses.resize(model_.constants.size());
+        for (int i = 0; i < model_.bodies(); ++i)
+            scratch_.end_poses[i] = {model_.position(i, live_.bodies),
+                                     axes(model_.constants[i], live_.bodies[i])};
+        projection_ = mixed_.contacts()->project_positions(mixed_.system, joints_.blocks().size(),
+                                                           scratch_.end_poses, round > 0);
         if (projection_ == nullptr) return;
         project_bodies();
     }
@@ -60,27 +61,27 @@ void RigidSystem::project_overlaps() {
 
 /// The energy that contacts have taken from some bodies in this step so far, J: what forces and joints did on them,
 /// less what their kinetic energy has grown by; none if that is negative.
-double RigidSystem::dissipated_energy(const std::vector<int>& members,
-                                      const std::vector<int>& own_blocks) const {
+double OverlapProjection::dissipated_energy(const std::vector<int>& members,
+                                            const std::vector<int>& own_blocks) const {
     double sum = 0.0;
     for (const int k : members) {
-        const int i = constrained_[k];
+        const int i = model_.constrained[k];
         const BodyState& s = live_.bodies[i];
-        sum += 0.5 * (scratch_.start_of_contacts[i].energy - twice_energy(constants_[i], s)) +
-               dot(force(i), s.displacement - scratch_.start_of_contacts[i].displacement) +
-               h_ * dot(constants_[i].torque, s.angular_velocity);
+        sum += 0.5 * (scratch_.start_of_contacts[i].energy - twice_energy(model_.constants[i], s)) +
+               dot(forces_.force(i), s.displacement - scratch_.start_of_contacts[i].displacement) +
+               model_.h * dot(model_.constants[i].torque, s.angular_velocity);
     }
     for (const int k : own_blocks) {
-        const RowBlock& block = mixed_.rows[k];
+        const RowBlock& block = mixed_.system.rows[k];
         double work = 0.0;
         for (int i = 0; i < block.size; ++i) {
-            double speed = row_velocity(block, i, mixed_.velocity);
+            double speed = row_velocity(block, i, mixed_.system.velocity);
             if (block.first >= 0)
-                speed += dot(block.first_jacobian[i], scratch_.velocities[constrained_[block.first]]);
+                speed += dot(block.first_jacobian[i], scratch_.velocities[model_.constrained[block.first]]);
             if (block.second >= 0)
-                speed += dot(block.second_jacobian[i], scratch_.velocities[constrained_[block.second]]);
+                speed += dot(block.second_jacobian[i], scratch_.velocities[model_.constrained[block.second]]);
             for (const FurtherBody& other : block.further)
-                speed += dot(other.jacobian, scratch_.velocities[constrained_[other.body]]);
+                speed += dot(other.jacobian, scratch_.velocities[model_.constrained[other.body]]);
             work += 0.5 * block.multiplier[i] * speed;
         }
         sum += std::max(0.0, work);
@@ -89,43 +90,45 @@ double RigidSystem::dissipated_energy(const std::vector<int>& members,
 }
 
 /// What the displacement has cost against the forces, J.
-double RigidSystem::lifting_energy(const std::vector<int>& members) const {
+double OverlapProjection::lifting_energy(const std::vector<int>& members) const {
     double sum = 0.0;
     for (const int k : members) {
-        const int i = constrained_[k];
-        sum -= dot(force(i), live_.bodies[i].displacement - scratch_.before_projection[i].displacement);
+        const int i = model_.constrained[k];
+        sum -=
+            dot(forces_.force(i), live_.bodies[i].displacement - scratch_.before_projection[i].displacement);
     }
     return sum;
 }
 
 /// The part of an island's displacement that what contacts took and its kinetic energy can pay for.
-double RigidSystem::affordable_share(int island) const {
+double OverlapProjection::affordable_share(int island) const {
     const PositionProjection& projection = *projection_;
     if (projection.externally_driven[island] != 0) return 1.0;
     double cost = 0.0, twice = 0.0;
     for (const int k : scratch_.island_members[island]) {
         const Vec6& d = projection.velocity[k];
-        cost -= h_ * dot(force(constrained_[k]), {d[0], d[1], d[2]});
-        twice += twice_energy(constants_[constrained_[k]], scratch_.before_projection[constrained_[k]]);
+        cost -= model_.h * dot(forces_.force(model_.constrained[k]), {d[0], d[1], d[2]});
+        twice += twice_energy(model_.constants[model_.constrained[k]],
+                              scratch_.before_projection[model_.constrained[k]]);
     }
     const double available_energy = scratch_.dissipated[island] + 0.5 * twice;
     return cost <= available_energy ? 1.0 : 0.999 * available_energy / cost;
 }
 
 /// Which body belongs to which island, and how far its joints are from where they hold.
-void RigidSystem::gather_islands() {
+void OverlapProjection::gather_islands() {
     const Islands& islands = projection_->islands;
     const auto count = static_cast<std::size_t>(islands.count);
     if (scratch_.island_members.size() <
         count) {  // lists keep their memory; later there may be more, of a few bodies each
-        scratch_.island_members.resize(constrained_.size()),
-            scratch_.island_blocks.resize(constrained_.size());
+        scratch_.island_members.resize(model_.constrained.size()),
+            scratch_.island_blocks.resize(model_.constrained.size());
         for (std::vector<int>& members : scratch_.island_members) members.reserve(few_members);
-        scratch_.dissipated.reserve(constrained_.size());
+        scratch_.dissipated.reserve(model_.constrained.size());
     }
     for (std::size_t k = 0; k < count; ++k)
         scratch_.island_members[k].clear(), scratch_.island_blocks[k].clear();
-    for (std::size_t k = 0; k < constrained_.size(); ++k)
+    for (std::size_t k = 0; k < model_.constrained.size(); ++k)
         if (islands.of_body[k] >= 0)
             scratch_.island_members[islands.of_body[k]].push_back(static_cast<int>(k));
     const auto blocks = joints_.blocks();
@@ -134,7 +137,7 @@ void RigidSystem::gather_islands() {
     for (std::size_t k = 0; k < blocks.size(); ++k) {
         scratch_.overstep_at[k] = rows;
         rows += blocks[k].size;
-        const int tied = std::max(mixed_.rows[k].first, mixed_.rows[k].second);
+        const int tied = std::max(mixed_.system.rows[k].first, mixed_.system.rows[k].second);
         if (tied >= 0) scratch_.island_blocks[islands.of_body[tied]].push_back(static_cast<int>(k));
     }
     scratch_.overstep.resize(rows);
@@ -147,17 +150,18 @@ void RigidSystem::gather_islands() {
 
 /// Leads bodies that the scene has put beyond their joints' limits a part of the way back, at the rate of the limit's
 /// row: by positions, with all other rows where they are.
-void RigidSystem::project_limits() {
+void OverlapProjection::project_limits() {
     const auto blocks = joints_.blocks();
-    scratch_.finder.begin(static_cast<int>(constrained_.size()));
+    scratch_.finder.begin(static_cast<int>(model_.constrained.size()));
     for (std::size_t k = 0; k < blocks.size(); ++k)
-        scratch_.finder.tie(mixed_.rows[k].first, mixed_.rows[k].second);
+        scratch_.finder.tie(mixed_.system.rows[k].first, mixed_.system.rows[k].second);
     for (std::size_t k = 0; k < blocks.size(); ++k)
         for (int body : joints_.others(static_cast<int>(k)))
-            if (solver_index_[body] >= 0) scratch_.finder.tie(mixed_.rows[k].first, solver_index_[body]);
+            if (model_.solver_index[body] >= 0)
+                scratch_.finder.tie(mixed_.system.rows[k].first, model_.solver_index[body]);
     limit_projection_.islands = scratch_.finder.find();
     const std::size_t islands = static_cast<std::size_t>(limit_projection_.islands.count);
-    limit_projection_.velocity.assign(constrained_.size(), Vec6{});
+    limit_projection_.velocity.assign(model_.constrained.size(), Vec6{});
     limit_projection_.grounded.assign(islands, 0);
     limit_projection_.externally_driven.assign(islands, 1);
     projection_ = &limit_projection_;
@@ -165,8 +169,8 @@ void RigidSystem::project_limits() {
     std::vector<char>& beyond = scratch_.beyond;
     beyond.assign(islands, 0);
     for (std::size_t k = 0; k < blocks.size(); ++k) {
-        if (rests(static_cast<int>(k))) continue;
-        const int first = mixed_.rows[k].first, second = mixed_.rows[k].second;
+        if (rests(blocks[k], live_)) continue;
+        const int first = mixed_.system.rows[k].first, second = mixed_.system.rows[k].second;
         const int island = limit_projection_.islands.of_body[std::max(first, second)];
         if (std::min(first, second) < 0) limit_projection_.grounded[island] = 1;
         if (joints_.folds(static_cast<int>(k))) {  // to where it shall be, the zero of its overstep
@@ -185,13 +189,20 @@ void RigidSystem::project_limits() {
     for (int island = 0; island < limit_projection_.islands.count; ++island)
         if (beyond[island] != 0 && !project_island(island, 1.0))
             for (const int k : scratch_.island_members[island])
-                live_.bodies[constrained_[k]] = scratch_.before_projection[constrained_[k]];
+                live_.bodies[model_.constrained[k]] = scratch_.before_projection[model_.constrained[k]];
 }
 
-void RigidSystem::project_bodies() {
+/// Whether an island of what parts sleeps, and nothing is to be parted there.
+bool OverlapProjection::sleeps(const std::vector<int>& members) const {
+    return live_.sleep.sleepers > 0 && std::all_of(members.begin(), members.end(), [this](int k) {
+               return live_.asleep(model_.constrained[k]) && projection_->velocity[k] == Vec6{};
+           });
+}
+
+void OverlapProjection::project_bodies() {
     gather_islands();
     for (int island = 0; island < projection_->islands.count; ++island) {
-        if (rests(scratch_.island_members[island])) continue;
+        if (sleeps(scratch_.island_members[island])) continue;
         scratch_.dissipated[island] =
             dissipated_energy(scratch_.island_members[island], scratch_.island_blocks[island]);
         const double share = affordable_share(island);
@@ -200,78 +211,81 @@ void RigidSystem::project_bodies() {
         for (int halving = 0; halving < most_halvings; ++halving) {
             if (project_island(island, std::ldexp(share, -halving))) break;
             for (const int k : scratch_.island_members[island])
-                live_.bodies[constrained_[k]] = scratch_.before_projection[constrained_[k]];
+                live_.bodies[model_.constrained[k]] = scratch_.before_projection[model_.constrained[k]];
         }
     }
 }
 
-bool RigidSystem::project_island(int island, double share) {
+bool OverlapProjection::project_island(int island, double share) {
     const PositionProjection& projection = *projection_;
     const std::vector<int>& members = scratch_.island_members[island];
     for (const int k : members) {
         const Vec6& d = projection.velocity[k];
-        displace(constants_[constrained_[k]], share * h_, {d[0], d[1], d[2]}, {d[3], d[4], d[5]},
-                 live_.bodies[constrained_[k]]);
+        displace(model_.constants[model_.constrained[k]], share * model_.h, {d[0], d[1], d[2]},
+                 {d[3], d[4], d[5]}, live_.bodies[model_.constrained[k]]);
     }
     return hold_joints(members, scratch_.island_blocks[island]) && keep_energy(island);
 }
 
 /// Back to where the step began; false if that, too, cannot be.
-bool RigidSystem::take_back(int island) {
+bool OverlapProjection::take_back(int island) {
     const std::vector<int>& members = scratch_.island_members[island];
     for (const int k : members) {
-        const int i = constrained_[k];
+        const int i = model_.constrained[k];
         BodyState& s = live_.bodies[i];
         s.displacement = scratch_.start_of_contacts[i].displacement;
         s.turn = scratch_.start_of_contacts[i].turn;
-        if (!constants_[i].particle) refresh(constants_[i], s);
+        if (!model_.constants[i].particle) refresh(model_.constants[i], s);
     }
     if (keep_energy(island)) return true;
-    for (const int k : members) live_.bodies[constrained_[k]] = scratch_.before_projection[constrained_[k]];
+    for (const int k : members)
+        live_.bodies[model_.constrained[k]] = scratch_.before_projection[model_.constrained[k]];
     return false;
 }
 
 /// Momenta and energy of an island whose places have changed; false if they cannot be kept.
-bool RigidSystem::keep_energy(int island) {
+bool OverlapProjection::keep_energy(int island) {
     const PositionProjection& projection = *projection_;
     const std::vector<int>& members = scratch_.island_members[island];
     double limit = 0.0, now = 0.0;
     for (const int k : members)
-        limit += twice_energy(constants_[constrained_[k]], scratch_.before_projection[constrained_[k]]);
+        limit += twice_energy(model_.constants[model_.constrained[k]],
+                              scratch_.before_projection[model_.constrained[k]]);
     if (projection.externally_driven[island] == 0)
         limit -= 2.0 * std::max(0.0, lifting_energy(members) - scratch_.dissipated[island]);
     if (!(limit >= 0.0)) return false;
     if (projection.grounded[island] == 0) return keep_momenta(members, limit);
     for (const int k : members) {
-        keep_spin_energy(constrained_[k]);
-        now += twice_energy(constants_[constrained_[k]], live_.bodies[constrained_[k]]);
+        keep_spin_energy(model_.constrained[k]);
+        now += twice_energy(model_.constants[model_.constrained[k]], live_.bodies[model_.constrained[k]]);
     }
     if (now <= limit) return true;
     const double left = std::sqrt(limit / now);
     Vec3 lost;
     for (const int k : members) {
-        BodyState& s = live_.bodies[constrained_[k]];
-        lost += (1.0 - left) * constants_[constrained_[k]].mass * s.velocity;
+        BodyState& s = live_.bodies[model_.constrained[k]];
+        lost += (1.0 - left) * model_.constants[model_.constrained[k]].mass * s.velocity;
         s.velocity *= left;
         s.angular_momentum *= left;
-        if (!constants_[constrained_[k]].particle) refresh(constants_[constrained_[k]], s);
+        if (!model_.constants[model_.constrained[k]].particle)
+            refresh(model_.constants[model_.constrained[k]], s);
     }
     if (projection_ != &limit_projection_)
-        contacts_->apply_balancing_impulse(projection_->islands, island, lost);
+        mixed_.contacts()->apply_balancing_impulse(projection_->islands, island, lost);
     return true;
 }
 
 /// Brings the joints back to where they were before the displacement; false if they cannot be.
-bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector<int>& own_blocks) {
+bool OverlapProjection::hold_joints(const std::vector<int>& members, const std::vector<int>& own_blocks) {
     if (own_blocks.empty()) return true;
     const auto blocks = joints_.blocks();
     std::vector<int>& place = scratch_.place;
-    place.assign(constrained_.size(), -1);
+    place.assign(model_.constrained.size(), -1);
     MixedSystem& system = scratch_.holding;
     system.mass.clear();
     for (std::size_t i = 0; i < members.size(); ++i) {
         place[members[i]] = static_cast<int>(i);
-        system.mass.push_back(mixed_.mass[members[i]]);
+        system.mass.push_back(mixed_.system.mass[members[i]]);
     }
     system.rows.resize(own_blocks.size());
     scratch_.holding_further.resize(blocks.size());
@@ -284,7 +298,7 @@ bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector
         for (std::size_t i = 0; i < own_blocks.size(); ++i) {
             const int k = own_blocks[i];
             RowBlock& block = system.rows[i];
-            const RowBlock& given = mixed_.rows[k];
+            const RowBlock& given = mixed_.system.rows[k];
             block = RowBlock{};
             block.size = given.size;
             block.first = given.first < 0 ? -1 : place[given.first];
@@ -295,13 +309,13 @@ bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector
             joints_.assemble(k, live_.bodies, block.first_jacobian[0].data(), block.second_jacobian[0].data(),
                              unused);
             if (!joints_.others(k).empty()) {
-                fill_further(k, block, unused, scratch_.holding_further[k]);
+                mixed_.fill_further(k, block, unused, scratch_.holding_further[k]);
                 for (FurtherBody& other : scratch_.holding_further[k]) other.body = place[other.body];
             }
             for (int row = 0; row < block.size; ++row) {
                 const double wanted = scratch_.overstep[scratch_.overstep_at[k] + row],
                              change = now[row] - wanted;
-                block.right[row] = -change / h_;
+                block.right[row] = -change / model_.h;
                 if (now[row] == 0.0 && wanted == 0.0 && !joints_.always_holds(blocks[k]))
                     block.lower[row] = block.upper[row] = 0.0;
                 const double relative = std::abs(change) / joints_.gain(k, row).extent;
@@ -315,15 +329,15 @@ bool RigidSystem::hold_joints(const std::vector<int>& members, const std::vector
         if (!holding_pivot_.solve(system).finite) return false;
         for (std::size_t i = 0; i < members.size(); ++i) {
             const Vec6& d = system.velocity[i];
-            displace(constants_[constrained_[members[i]]], h_, {d[0], d[1], d[2]}, {d[3], d[4], d[5]},
-                     live_.bodies[constrained_[members[i]]]);
+            displace(model_.constants[model_.constrained[members[i]]], model_.h, {d[0], d[1], d[2]},
+                     {d[3], d[4], d[5]}, live_.bodies[model_.constrained[members[i]]]);
         }
     }
     return false;
 }
 
-void RigidSystem::keep_spin_energy(int body) {
-    const BodyConstants& constants = constants_[body];
+void OverlapProjection::keep_spin_energy(int body) {
+    const BodyConstants& constants = model_.constants[body];
     const BodyState& before = scratch_.before_projection[body];
     BodyState& s = live_.bodies[body];
     const double most = twice_energy(constants, before), now = twice_energy(constants, s);
@@ -335,25 +349,25 @@ void RigidSystem::keep_spin_energy(int body) {
 
 /// Brings an island back to the angular momentum it had, and to no more than `limit`, twice the kinetic energy allowed;
 /// false if it cannot be.
-bool RigidSystem::keep_momenta(const std::vector<int>& members, double limit) {
-    const auto [centre, inertia] = island_frame(members);
+bool OverlapProjection::keep_momenta(const std::vector<int>& members, double limit) {
+    const auto [centre, inertia] = island_frame(model_, live_.bodies, members);
     double mass = 0.0;
     Vec3 momentum, spin, gained;
     for (const int k : members) {
-        const int i = constrained_[k];
+        const int i = model_.constrained[k];
         const BodyState &old = scratch_.before_projection[i], &s = live_.bodies[i];
-        const Vec3 p = constants_[i].mass * s.velocity;
-        mass += constants_[i].mass;
+        const Vec3 p = model_.constants[i].mass * s.velocity;
+        mass += model_.constants[i].mass;
         momentum += p;
         gained += cross(s.displacement - old.displacement, p);
     }
     const auto turn_all = [&](Vec3 rate) {
         for (const int k : members) {
-            BodyState& s = live_.bodies[constrained_[k]];
-            s.velocity += cross(rate, position_of(constrained_[k]) - centre);
-            if (constants_[constrained_[k]].particle) continue;
+            BodyState& s = live_.bodies[model_.constrained[k]];
+            s.velocity += cross(rate, model_.position(model_.constrained[k], live_.bodies) - centre);
+            if (model_.constants[model_.constrained[k]].particle) continue;
             s.angular_momentum += s.inertia * rate;
-            refresh(constants_[constrained_[k]], s);
+            refresh(model_.constants[model_.constrained[k]], s);
         }
     };
     const Vec3 back = solved(inertia, -gained);
@@ -361,9 +375,10 @@ bool RigidSystem::keep_momenta(const std::vector<int>& members, double limit) {
     if (!is_zero(gained)) turn_all(back);
     double after = 0.0;
     for (const int k : members) {
-        const BodyState& s = live_.bodies[constrained_[k]];
-        after += twice_energy(constants_[constrained_[k]], s);
-        spin += constants_[constrained_[k]].mass * cross(position_of(constrained_[k]) - centre, s.velocity) +
+        const BodyState& s = live_.bodies[model_.constrained[k]];
+        after += twice_energy(model_.constants[model_.constrained[k]], s);
+        spin += model_.constants[model_.constrained[k]].mass *
+                    cross(model_.position(model_.constrained[k], live_.bodies) - centre, s.velocity) +
                 s.angular_momentum;
     }
     if (after <= limit * (1.0 + rounding)) return true;
@@ -372,9 +387,9 @@ bool RigidSystem::keep_momenta(const std::vector<int>& members, double limit) {
     if (!(rigid <= limit) || !finite(turn)) return false;
     const double share = std::sqrt((limit - rigid) / (after - rigid));
     for (const int k : members) {
-        const BodyConstants& body = constants_[constrained_[k]];
-        BodyState& s = live_.bodies[constrained_[k]];
-        const Vec3 v = drift + cross(turn, position_of(constrained_[k]) - centre);
+        const BodyConstants& body = model_.constants[model_.constrained[k]];
+        BodyState& s = live_.bodies[model_.constrained[k]];
+        const Vec3 v = drift + cross(turn, model_.position(model_.constrained[k], live_.bodies) - centre);
         s.velocity = v + share * (s.velocity - v);
         if (body.particle) continue;
         const Vec3 l = s.inertia * turn;

@@ -18,10 +18,12 @@
 
 #include "rigid/joint_pulls.hpp"
 #include "rigid/joint_spring_kicks.hpp"
-#include "rigid/rigid_system.hpp"
+#include "rigid/readings.hpp"
+#include "rigid/rigid_composition.hpp"
 #include "rigid/rotors.hpp"
 #include "rigid/tolerances.hpp"
 #include "run/composition.hpp"
+#include "run/watch.hpp"
 
 namespace spook {
 
@@ -31,94 +33,101 @@ using namespace tolerances::rigid_composition;
 
 }  // namespace
 
-void RigidSystem::start_composition() {
-    const std::size_t rows = static_cast<std::size_t>(rows_);
-    const std::size_t stages = composition_stages(method_.composition).size();
+void RigidComposition::take() {
+    const bool tilted =  // joint coordinates see inertias along the bodies' own axes
+        std::any_of(model_.constants.begin(), model_.constants.end(),
+                    [](const BodyConstants& body) { return body.tilted; });
+    if (model_.solver == RigidSolver::block && !tilted)
+        tree_.analyse(model_.constants, joints_, model_.constrained, model_.start);
+    in_tree_ = tree_.coordinates() > 0 && tree_.holds(model_.start);  // for those that ask before a run
+}
+
+void RigidComposition::begin() {
+    const std::size_t rows = rows_.rows();
+    const std::size_t stages = composition_stages(model_.method.composition).size();
     in_tree_ = tree_.coordinates() > 0 && tree_.holds(live_.bodies);
     unknowns_ = in_tree_ ? static_cast<std::size_t>(tree_.coordinates()) : rows;
     live_.history.assign(static_cast<std::size_t>(DIFFERENCES) * unknowns_ * stages, 0.0);
     live_.guess_order.assign(stages, 0);
-    trial_ = live_.bodies;
-    violation_.assign(rows, 0.0);
-    bias_.assign(std::max(rows, unknowns_), 0.0);
+    pace_.assign(std::max(rows, unknowns_), 0.0);
     multiplier_.assign(std::max(rows, unknowns_), 0.0);
-    prepare_hold();
-    if (solver_ != RigidSolver::block) return;
+    hold_.begin();
+    if (model_.solver != RigidSolver::block) return;
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
         for (int i = 0; i < joints_.blocks()[k].size; ++i)
-            if (i != joints_.blocks()[k].rotor) matrix_.diagonal(k)[i] = -0.0;
+            if (i != joints_.blocks()[k].rotor) rows_.matrix.diagonal(k)[i] = -0.0;
     for (const int k : joints_.rotors())
         joints_.states[joints_.blocks()[k].joint].rotor = rotor_speed(joints_, k, live_.bodies);
 }
 
-void RigidSystem::compose(std::int64_t steps) {
-    if (clock_) clock_->start();
+void RigidComposition::compose(std::int64_t steps) {
+    clock_.start();
     for (; steps > 0; --steps) {
-        if (solver_ == RigidSolver::block && live_.tension_look-- <= 0) look_at_tension();
-        for (int part = 0; part < live_.parts; ++part) composed_step(h_ / live_.parts, 0);
+        if (model_.solver == RigidSolver::block && live_.tension_look-- <= 0) look_at_tension();
+        for (int part = 0; part < live_.parts; ++part) step(model_.h / live_.parts, 0);
         live_.halved_steps += live_.parts - 1;
         joints_.follow(live_.bodies);
-        live_.energy.most_kinetic = std::max(live_.energy.most_kinetic, kinetic_energy());
+        live_.energy.most_kinetic =
+            std::max(live_.energy.most_kinetic, kinetic_energy(model_, live_, joints_));
     }
 }
 
 /// The square of the rate at which tension turns a body back, of the fastest one, 1/s²: a force F that pulls at its arm r does so with
 /// F r/I, and shakes it sideways with F/(m r). A light link under a heavy load does so at many times the rate of its swing.
-double RigidSystem::tension_rate(double allowed) {
+double RigidComposition::tension_rate(double allowed) {
     LargeArray<BodyState>& going = step_start_[0];
     going = live_.bodies;
-    read_composition();
+    read();
     live_.bodies.swap(going);
-    const auto rows = [this](int k) { return jacobian(k, true); };
-    std::vector<double>& rates = scratch_.rates;
-    rates.assign(constants_.size(), 0.0);
-    each_pull(joints_, solver_index_, constants_, rows, [&](int b, Vec3 arm, Vec3 impulse) {
-        const double pull = dot(arm, impulse) / h_, length2 = dot(arm, arm);
+    const auto rows = [this](int k) { return rows_.jacobian(k, true); };
+    std::vector<double>& rates = rates_;
+    rates.assign(model_.constants.size(), 0.0);
+    each_pull(joints_, model_.solver_index, model_.constants, rows, [&](int b, Vec3 arm, Vec3 impulse) {
+        const double pull = dot(arm, impulse) / model_.h, length2 = dot(arm, arm);
         if (!(pull > 0.0) || length2 == 0.0) return;
-        const Vec3 inertia = constants_[b].inertia;
+        const Vec3 inertia = model_.constants[b].inertia;
         // Of the two axes across the arm the easier one; the third, along a slender body, turns freely.
         const double across = inertia.x + inertia.y + inertia.z -
                               std::max({inertia.x, inertia.y, inertia.z}) -
                               std::min({inertia.x, inertia.y, inertia.z});
         // A body goes sideways by turning about its joint: near its centre that is a turn, however light it is.
-        rates[b] += pull * (1.0 / across + 1.0 / std::max(constants_[b].mass * length2, across));
+        rates[b] += pull * (1.0 / across + 1.0 / std::max(model_.constants[b].mass * length2, across));
     });
     const double most = *std::max_element(rates.begin(), rates.end());
     if (!(most > allowed)) return most;
 
     // Each body by itself would shake so; joints may tie light ones to heavy ones. The fastest turning that joints allow, by power
     // iteration of M⁻¹ K, with K of the forces on its arms, from a start in which light bodies turn most.
-    stiffness_.assign(constrained_.size(), Mat3{});
-    each_pull(joints_, solver_index_, constants_, rows, [&](int b, Vec3 arm, Vec3 impulse) {
-        const Vec3 force = (1.0 / h_) * impulse;
-        Mat3& held = stiffness_[solver_index_[b]];
+    std::vector<Mat3> stiffness(model_.constrained.size());
+    each_pull(joints_, model_.solver_index, model_.constants, rows, [&](int b, Vec3 arm, Vec3 impulse) {
+        const Vec3 force = (1.0 / model_.h) * impulse;
+        Mat3& held = stiffness[model_.solver_index[b]];
         for (int i = 0; i < 3; ++i)
             for (int j = 0; j < 3; ++j)
                 held(i, j) +=
                     (i == j ? dot(force, arm) : 0.0) - 0.5 * (force[i] * arm[j] + arm[i] * force[j]);
     });
-    const int row_blocks = static_cast<int>(joints_.blocks().size());
     std::vector<Vec3> turn;
-    for (const int i : constrained_) {
-        const Vec3 own = constants_[i].inertia;
-        const double light = constants_[i].particle ? 0.0 : 1.0 / (own.x + own.y + own.z);
+    for (const int i : model_.constrained) {
+        const Vec3 own = model_.constants[i].inertia;
+        const double light = model_.constants[i].particle ? 0.0 : 1.0 / (own.x + own.y + own.z);
         turn.push_back(light * Vec3{1.0 - 0.3 * (i % 4), 0.4 * (i % 3) - 0.5, 0.7 - 0.25 * (i % 5)});
     }
     double fastest = most;
     for (int round = 0; round < ROUNDS; ++round) {
-        std::fill(right_.begin(), right_.end(), 0.0);
-        for (std::size_t k = 0; k < constrained_.size(); ++k) {
-            if (constants_[constrained_[k]].particle) continue;
-            const Vec3 torque = stiffness_[k] * turn[k];
-            std::copy_n(&torque.x, 3, right_.data() + matrix_.offset(row_blocks + static_cast<int>(k)) + 3);
+        std::fill(rows_.right.begin(), rows_.right.end(), 0.0);
+        for (std::size_t k = 0; k < model_.constrained.size(); ++k) {
+            if (model_.constants[model_.constrained[k]].particle) continue;
+            const Vec3 torque = stiffness[k] * turn[k];
+            std::copy_n(&torque.x, 3, rows_.right.data() + rows_.body_at(k) + 3);
         }
-        solve_again();
+        rows_.solve_again();
         double size = 0.0;
-        for (std::size_t k = 0; k < constrained_.size(); ++k) {
-            const int i = constrained_[k];
-            const double* x = solution_.data() + matrix_.offset(row_blocks + static_cast<int>(k));
-            size += constants_[i].mass * (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
-            if (constants_[i].particle) continue;
+        for (std::size_t k = 0; k < model_.constrained.size(); ++k) {
+            const int i = model_.constrained[k];
+            const double* x = rows_.solution.data() + rows_.body_at(k);
+            size += model_.constants[i].mass * (x[0] * x[0] + x[1] * x[1] + x[2] * x[2]);
+            if (model_.constants[i].particle) continue;
             turn[k] = {x[3], x[4], x[5]};
             size += dot(turn[k], live_.bodies[i].inertia * turn[k]);
         }
@@ -131,10 +140,10 @@ double RigidSystem::tension_rate(double allowed) {
 }
 
 /// Steps whose longest stage is too long for the tension are taken in parts, in halves of halves; once parted they remain so.
-void RigidSystem::look_at_tension() {
+void RigidComposition::look_at_tension() {
     double longest = 0.0;
-    for (const double stage : composition_stages(method_.composition))
-        longest = std::max(longest, h_ * std::abs(stage));
+    for (const double stage : composition_stages(model_.method.composition))
+        longest = std::max(longest, model_.h * std::abs(stage));
     int parts = live_.parts;
     const double turned =
         longest * longest * tension_rate(NEAR * MOST_OF_RATE * parts * parts / (longest * longest));
@@ -143,16 +152,16 @@ void RigidSystem::look_at_tension() {
     if (parts == live_.parts) return;
     live_.parts = parts;
     live_.stage_steps = 0;
-    std::fill(live_.history.begin(), live_.history.end(), 0.0);
+    forget();
     std::fill(live_.guess_order.begin(), live_.guess_order.end(), 0);
 }
 
 /// One step of length h. Where the equations have no solution near, the step is taken back and done in two halves,
 /// and so on; the order stays, `halved_steps` counts it. When the smallest part has none either, the state is lost.
-void RigidSystem::composed_step(double h, int depth) {
+void RigidComposition::step(double h, int depth) {
     if (live_.lost >= 0) return;
     if (depth > 0) Watch::look();  // halves of halves are thousands
-    const std::span<const double> stages = composition_stages(method_.composition);
+    const std::span<const double> stages = composition_stages(model_.method.composition);
     LargeArray<BodyState>& start = step_start_[depth];
     start = live_.bodies;
     const double pending = live_.pending;
@@ -160,11 +169,11 @@ void RigidSystem::composed_step(double h, int depth) {
     for (const int k : joints_.rotors()) rotors.push_back(joints_.states[joints_.blocks()[k].joint].rotor);
     bool solved = true;
     for (std::size_t stage = 0; stage < stages.size() && solved; ++stage)
-        solved = composed_stage(stages[stage] * h, stage);
+        solved = this->stage(stages[stage] * h, stage);
     ++live_.stage_steps;
     if (solved) return;
     if (depth + 1 == MOST_HALVINGS) {
-        live_.lost = constrained_.empty() ? free_.front() : constrained_.front();
+        live_.lost = model_.constrained.empty() ? model_.free.front() : model_.constrained.front();
         return;
     }
     live_.bodies = start;
@@ -174,61 +183,41 @@ void RigidSystem::composed_step(double h, int depth) {
     ++live_.halved_steps;
     for (int half = 0; half < 2; ++half) {
         live_.stage_steps = half == 0 ? 0 : live_.stage_steps;
-        if (half == 0) std::fill(live_.history.begin(), live_.history.end(), 0.0);
-        composed_step(0.5 * h, depth + 1);
+        if (half == 0) forget();
+        step(0.5 * h, depth + 1);
     }
     live_.stage_steps = 0;
-    std::fill(live_.history.begin(), live_.history.end(), 0.0);
+    forget();
 }
 
-void RigidSystem::kick_all(double span) {
-    if (!load_follows_.empty())
-        find_loads(0.0);  // springs alone: a composition has nothing that follows time
-    if (!force_.empty()) find_forces();
-    for (int i = 0; i < bodies(); ++i) {
-        const BodyConstants& body = constants_[i];
+void RigidComposition::kick_all(double span) {
+    if (forces_.loads_change())
+        forces_.find_loads(0.0);  // springs alone: a composition has nothing that follows time
+    forces_.find();
+    for (int i = 0; i < model_.bodies(); ++i) {
+        const BodyConstants& body = model_.constants[i];
         if (!body.moves()) continue;
         BodyState& s = live_.bodies[i];
-        s.velocity += (span / h_) * kick(i);
+        s.velocity += (span / model_.h) * forces_.kick(i);
         s.angular_momentum += span * body.torque;
     }
-    pull_by_springs(joints_, constants_, live_.bodies, [&](const JointSpringPull& pull) {
+    pull_by_springs(joints_, model_.constants, live_.bodies, [&](const JointSpringPull& pull) {
         BodyState& s = live_.bodies[pull.body];
-        s.velocity += (span / constants_[pull.body].mass) * pull.force;
-        if (!constants_[pull.body].particle) s.angular_momentum += span * pull.torque;
+        s.velocity += (span / model_.constants[pull.body].mass) * pull.force;
+        if (!model_.constants[pull.body].particle) s.angular_momentum += span * pull.torque;
     });
 }
 
 /// What is set from outside acts from here on: up to here momenta are kicked as it was before.
-void RigidSystem::catch_up() {
+void RigidComposition::catch_up() {
     if (live_.pending == 0.0) return;
     kick_all(live_.pending);
     live_.pending = 0.0;
 }
 
-/// Momenta += Gᵀ Λ with the Jacobians as assembled.
-void RigidSystem::push(const double* multipliers) {
-    const auto blocks = joints_.blocks();
-    for (std::size_t k = 0; k < blocks.size(); ++k) {
-        for (int end = 0; end < ends(static_cast<int>(k)); ++end) {
-            const int body = end_body(static_cast<int>(k), end);
-            if (body < 0 || !constants_[body].moves()) continue;
-            const double* j = end_rows(static_cast<int>(k), end);
-            Vec3 force, torque;
-            for (int i = 0; i < blocks[k].size; ++i, j += 6) {
-                force += multipliers[i] * Vec3{j[0], j[1], j[2]};
-                torque += multipliers[i] * Vec3{j[3], j[4], j[5]};
-            }
-            live_.bodies[body].velocity += (1.0 / constants_[body].mass) * force;
-            if (!constants_[body].particle) live_.bodies[body].angular_momentum += torque;
-        }
-        multipliers += blocks[k].size;
-    }
-}
-
 /// What a stage will need, impulses or moves of joints, from their paces in the steps before: their differences from
 /// step to step, as many as would have told the last one best.
-void RigidSystem::guess(std::size_t stage, double span) {
+void RigidComposition::guess(std::size_t stage, double span) {
     const double* difference =
         live_.history.data() + static_cast<std::size_t>(DIFFERENCES) * unknowns_ * stage;
     std::fill(multiplier_.begin(), multiplier_.end(), 0.0);
@@ -237,23 +226,23 @@ void RigidSystem::guess(std::size_t stage, double span) {
 }
 
 /// The k-th difference of a new pace is what k differences before it failed to tell.
-void RigidSystem::remember(std::size_t stage, double span) {
+void RigidComposition::remember(std::size_t stage, double span) {
     double* difference = live_.history.data() + static_cast<std::size_t>(DIFFERENCES) * unknowns_ * stage;
     // A loop can come to a singular position, where long extrapolation leads into another of its branches.
-    const bool loops = !in_tree_ && joints_.count() > static_cast<int>(constrained_.size());
+    const bool loops = !in_tree_ && joints_.count() > static_cast<int>(model_.constrained.size());
     const auto known =
         static_cast<int>(std::min<std::int64_t>(live_.stage_steps, loops ? 3 : DIFFERENCES - 1));
-    for (std::size_t i = 0; i < unknowns_; ++i) bias_[i] = multiplier_[i] / span;
+    for (std::size_t i = 0; i < unknowns_; ++i) pace_[i] = multiplier_[i] / span;
     double least = std::numeric_limits<double>::infinity();
     bool falling = true;  // beyond the first that grows they tell of noise, or of a sudden change
     live_.guess_order[stage] = 1;
     for (int k = 0;; ++k) {
         double size = 0.0;
         for (std::size_t i = 0; i < unknowns_; ++i, ++difference) {
-            size += std::fabs(bias_[i]);
+            size += std::fabs(pace_[i]);
             const double before = *difference;
-            *difference = bias_[i];
-            bias_[i] -= before;
+            *difference = pace_[i];
+            pace_[i] -= before;
         }
         if (k > 0 && falling && size < least) least = size, live_.guess_order[stage] = k;
         else falling = k == 0;
@@ -261,14 +250,16 @@ void RigidSystem::remember(std::size_t stage, double span) {
     }
 }
 
-void RigidSystem::forget(std::size_t stage) {
+void RigidComposition::forget() { std::fill(live_.history.begin(), live_.history.end(), 0.0); }
+
+void RigidComposition::forget(std::size_t stage) {
     const std::size_t numbers = static_cast<std::size_t>(DIFFERENCES) * unknowns_;
     std::fill_n(live_.history.begin() + static_cast<std::ptrdiff_t>(numbers * stage), numbers, 0.0);
     live_.guess_order[stage] = 0;
 }
 
 /// Tied bodies to the end of a stage, on their rows. False if no solution was found.
-bool RigidSystem::hold_stage(double tau, double span, std::size_t stage) {
+bool RigidComposition::hold_stage(double tau, double span, std::size_t stage) {
     if (in_tree_) {
         guess(stage, tau);
         if (tree_.stage(tau, live_.bodies, joints_, multiplier_.data(), live_.newton_iterations)) {
@@ -278,85 +269,80 @@ bool RigidSystem::hold_stage(double tau, double span, std::size_t stage) {
         forget(stage);
         std::fill(multiplier_.begin(), multiplier_.end(), 0.0);
     }
-    assemble_blocks();
+    rows_.assemble();
     if (!in_tree_) guess(stage, span);
-    push(multiplier_.data());
-    if (clock_) clock_->mark(Stage::assemble_rows);
-    if (!hold_rows(tau)) return false;
+    rows_.push(multiplier_.data());
+    clock_.mark(Stage::assemble_rows);
+    if (!hold_.hold(tau, multiplier_)) return false;
     for (const int k : joints_.rotors()) {
         const JointBlock& block = joints_.blocks()[k];
         joints_.states[block.joint].rotor -=
-            block.softness[block.rotor] * multiplier_[matrix_.offset(k) + block.rotor];
+            block.softness[block.rotor] * multiplier_[rows_.matrix.offset(k) + block.rotor];
     }
     if (!in_tree_) remember(stage, span);
-    for (int i : constrained_) {
-        BodyState& s = live_.bodies[i];
-        s.displacement = trial_[i].displacement;
-        if (constants_[i].particle) continue;
-        s.turn = trial_[i].turn;
-        refresh(constants_[i], s);
-    }
     return true;
 }
 
 /// False if no solution was found.
-bool RigidSystem::composed_stage(double tau, std::size_t stage) {
+bool RigidComposition::stage(double tau, std::size_t stage) {
     const double span = live_.pending + 0.5 * tau;
     kick_all(span);
-    if (clock_) clock_->mark({Stage::apply_gravity, Stage::apply_loads});
-    if (solver_ == RigidSolver::block) {
+    clock_.mark({Stage::apply_gravity, Stage::apply_loads});
+    if (model_.solver == RigidSolver::block) {
         if (!hold_stage(tau, span, stage)) return false;
-        if (clock_) clock_->mark(Stage::solve_block);
+        clock_.mark(Stage::solve_block);
     } else {
-        for (int i : constrained_) spook::integrate(constants_[i], h_, live_.bodies[i]);
+        for (int i : model_.constrained) spook::integrate(model_.constants[i], model_.h, live_.bodies[i]);
     }
-    for (const std::vector<int>* some : {&free_, &driven_})
-        for (int i : *some) spook::integrate(constants_[i], tau, live_.bodies[i]);
+    for (const std::vector<int>* some : {&model_.free, &model_.driven})
+        for (int i : *some) spook::integrate(model_.constants[i], tau, live_.bodies[i]);
     live_.pending = 0.5 * tau;
-    if (clock_) clock_->mark(Stage::integrate_positions);
+    clock_.mark(Stage::integrate_positions);
     return true;
 }
 
 /// What is seen at the end of a step: momenta kicked and projected to the sample, forces from the accelerations
 /// there.
-void RigidSystem::read_composition() {
+void RigidComposition::read() {
     kick_all(live_.pending);
-    for (int i = 0; i < bodies(); ++i)
-        if (constants_[i].moves() && !constants_[i].particle) refresh(constants_[i], live_.bodies[i]);
-    if (solver_ != RigidSolver::block || live_.lost >= 0) return;
-    const std::size_t rows = static_cast<std::size_t>(rows_);
+    for (int i = 0; i < model_.bodies(); ++i)
+        if (model_.constants[i].moves() && !model_.constants[i].particle)
+            refresh(model_.constants[i], live_.bodies[i]);
+    if (model_.solver != RigidSolver::block || live_.lost >= 0) return;
+    const std::size_t rows = rows_.rows();
     const auto blocks = joints_.blocks();
     const auto take = [&] {
-        for (std::size_t row = 0; row < rows; ++row) multiplier_[row] = -solution_[row];
+        for (std::size_t row = 0; row < rows; ++row) multiplier_[row] = -rows_.solution[row];
     };
-    assemble_blocks();
-    fill_inertias();
-    std::fill(right_.begin(), right_.end(), 0.0);
+    rows_.assemble();
+    rows_.fill_inertias();
+    std::fill(rows_.right.begin(), rows_.right.end(), 0.0);
     std::size_t row = 0;
     for (int k = 0; k < static_cast<int>(blocks.size()); ++k)
         for (int i = 0; i < blocks[k].size; ++i, ++row)
-            right_[row] =
-                (i == blocks[k].rotor ? joints_.states[blocks[k].joint].rotor : 0.0) - row_speed(k, i, false);
-    if (!factor_and_solve()) live_.not_solved = constrained_.front();
+            rows_.right[row] = (i == blocks[k].rotor ? joints_.states[blocks[k].joint].rotor : 0.0) -
+                               rows_.row_speed(k, i, false);
+    if (!rows_.factor_and_solve()) live_.not_solved = model_.constrained.front();
     take();
-    push(multiplier_.data());
-    for (int i : constrained_)
-        if (!constants_[i].particle) refresh(constants_[i], live_.bodies[i]);
-    find_bias(bias_.data());
-    double* right = right_.data() + rows;
-    for (row = 0; row < rows; ++row) right_[row] = -h_ * bias_[row];
-    for (int i : constrained_) {
-        const Vec3 p = constants_[i].mass * kick(i), l = h_ * constants_[i].torque;
+    rows_.push(multiplier_.data());
+    for (int i : model_.constrained)
+        if (!model_.constants[i].particle) refresh(model_.constants[i], live_.bodies[i]);
+    rows_.find_bias(pace_.data());
+    double* right = rows_.right.data() + rows;
+    for (row = 0; row < rows; ++row) rows_.right[row] = -model_.h * pace_[row];
+    for (int i : model_.constrained) {
+        const Vec3 p = model_.constants[i].mass * forces_.kick(i), l = model_.h * model_.constants[i].torque;
         for (int k = 0; k < 3; ++k) *right++ = p[k];
-        for (int k = 0; k < 3 && !constants_[i].particle; ++k) *right++ = l[k];
+        for (int k = 0; k < 3 && !model_.constants[i].particle; ++k) *right++ = l[k];
     }
-    pull_by_springs(joints_, constants_, live_.bodies, [&](const JointSpringPull& pull) {
-        double* to =
-            right_.data() + matrix_.offset(static_cast<int>(blocks.size()) + solver_index_[pull.body]);
-        for (int k = 0; k < 3; ++k) to[k] += h_ * pull.force[k];
-        for (int k = 0; k < 3 && !constants_[pull.body].particle; ++k) to[3 + k] += h_ * pull.torque[k];
+    pull_by_springs(joints_, model_.constants, live_.bodies, [&](const JointSpringPull& pull) {
+        double* to = rows_.right.data() +
+                     rows_.matrix.offset(static_cast<int>(blocks.size()) + model_.solver_index[pull.body]);
+        for (int k = 0; k < 3; ++k) to[k] += model_.h * pull.force[k];
+        for (int k = 0; k < 3 && !model_.constants[pull.body].particle; ++k)
+            to[3 + k] += model_.h * pull.torque[k];
     });
-    solve_again();
+    rows_.solve_again();
     take();
     const double* multiplier = multiplier_.data();
     for (const JointBlock& block : blocks) {

@@ -6,18 +6,21 @@
 // half_step_velocities; a kinematic body's pace at mid-step, so that its place is second order; a path or an angle gives
 // the velocity that leads to where the step ends.
 #include "collision/submerged.hpp"
-#include "rigid/rigid_system.hpp"
+#include "rigid/forces.hpp"
 
 namespace spook {
 
-void RigidSystem::take_loads(const RigidScene& scene) {
-    if (stages_.runs(Stage::follow_time)) drives_ = scene.drives;
-    if (stages_.runs(Stage::apply_fluids)) {
+void Forces::take(const RigidScene& scene) {
+    for (const BodyConstants& body : model_.constants)
+        acceleration_.push_back(body.moves() ? gravity() + (1.0 / body.mass) * body.force : Vec3{});
+    if (!springs_.empty() || !fields_.empty()) force_.resize(model_.constants.size());
+    if (model_.stages.runs(Stage::follow_time)) drives_ = scene.drives;
+    if (model_.stages.runs(Stage::apply_fluids)) {
         fluids_ = scene.fluids;
-        floaters_.resize(constants_.size());
+        floaters_.resize(model_.constants.size());
         for (const Collider& floater : scene.floaters) floaters_[floater.body].push_back(floater);
     }
-    std::vector<char> follows(constants_.size(), 0);
+    std::vector<char> follows(model_.constants.size(), 0);
     for (const TimeDrive& drive : drives_) {
         if (drive.kind == DriveKind::load) follows[drive.index] = 1;
         if (drive.kind == DriveKind::rest) joints_.let_rest_move(drive.index);
@@ -27,15 +30,15 @@ void RigidSystem::take_loads(const RigidScene& scene) {
     for (const SpringForce& spring : turning_springs_)
         for (const End& end : spring.ends)
             if (end.body >= 0) follows[end.body] = 1;
-    for (int i = 0; i < bodies(); ++i)
-        if (follows[i] && constants_[i].moves()) load_follows_.push_back(i);
+    for (int i = 0; i < model_.bodies(); ++i)
+        if (follows[i] && model_.constants[i].moves()) load_follows_.push_back(i);
     if (load_follows_.empty()) return;
-    for (const BodyConstants& body : constants_) steady_.push_back({body.force, body.torque});
+    for (const BodyConstants& body : model_.constants) steady_.push_back({body.force, body.torque});
 }
 
-void RigidSystem::follow_time() {
-    const double now = static_cast<double>(live_.moved) * h_;
-    const double middle = now + 0.5 * h_, live = half_step_ ? middle : now + h_;
+void Forces::follow_time() {
+    const double now = static_cast<double>(live_.moved) * model_.h;
+    const double middle = now + 0.5 * model_.h, live = model_.half_step ? middle : now + model_.h;
     for (const TimeDrive& drive : drives_) {
         const TimeFunction& f = drive.function;
         switch (drive.kind) {
@@ -44,8 +47,8 @@ void RigidSystem::follow_time() {
             case DriveKind::push: joints_.set_push(drive.index, f.at(now)); break;
             case DriveKind::rest: {
                 const double rest = f.at(now);
-                joints_.set_moving_rest(drive.index, rest, (rest - f.at(now - h_)) / h_,
-                                        (f.at(now + h_) - rest) / h_);
+                joints_.set_moving_rest(drive.index, rest, (rest - f.at(now - model_.h)) / model_.h,
+                                        (f.at(now + model_.h) - rest) / model_.h);
                 break;
             }
             case DriveKind::pace: {
@@ -58,64 +61,63 @@ void RigidSystem::follow_time() {
                 live_.bodies[drive.index].angular_velocity = f.at(middle) * drive.angular;
                 break;
             case DriveKind::path: {
-                const Vec3 ahead = f.at(now + h_) * drive.linear;
-                const Vec3 here{drive.linear.x * position_of(drive.index).x,
-                                drive.linear.y * position_of(drive.index).y,
-                                drive.linear.z * position_of(drive.index).z};
+                const Vec3 ahead = f.at(now + model_.h) * drive.linear;
+                const Vec3 here{drive.linear.x * model_.position(drive.index, live_.bodies).x,
+                                drive.linear.y * model_.position(drive.index, live_.bodies).y,
+                                drive.linear.z * model_.position(drive.index, live_.bodies).z};
                 const Vec3 other{1.0 - drive.linear.x, 1.0 - drive.linear.y, 1.0 - drive.linear.z};
                 Vec3& v = live_.bodies[drive.index].velocity;
-                v = Vec3{other.x * v.x, other.y * v.y, other.z * v.z} + (1.0 / h_) * (ahead - here);
+                v = Vec3{other.x * v.x, other.y * v.y, other.z * v.z} + (1.0 / model_.h) * (ahead - here);
                 break;
             }
             case DriveKind::angle:
                 live_.bodies[drive.index].angular_velocity =
-                    ((f.at(now + h_) - f.at(now)) / h_) * drive.angular;
+                    ((f.at(now + model_.h) - f.at(now)) / model_.h) * drive.angular;
                 break;
         }
     }
-    if (clock_ && !drives_.empty()) clock_->mark(Stage::follow_time);
+    if (!drives_.empty()) clock_.mark(Stage::follow_time);
     if (!load_follows_.empty()) find_loads(now);
 }
 
-void RigidSystem::find_loads(double time) {
+void Forces::find_loads(double time) {
     for (int i : load_follows_) {
         acceleration_[i] = steady_[i].force;
-        constants_[i].torque = steady_[i].torque;
+        model_.constants[i].torque = steady_[i].torque;
     }
     for (const TimeDrive& drive : drives_) {
-        if (drive.kind != DriveKind::load || !constants_[drive.index].moves()) continue;
+        if (drive.kind != DriveKind::load || !model_.constants[drive.index].moves()) continue;
         const double part = drive.function.at(time);
         acceleration_[drive.index] += part * drive.linear;
-        constants_[drive.index].torque += part * drive.angular;
+        model_.constants[drive.index].torque += part * drive.angular;
     }
-    if (clock_ && !drives_.empty()) clock_->mark(Stage::follow_time);
+    if (!drives_.empty()) clock_.mark(Stage::follow_time);
     for (const SpringForce& spring : turning_springs_) pull_aside(spring);
-    if (clock_ && !turning_springs_.empty()) clock_->mark(Stage::apply_springs);
-    const Vec3 gravity = stages_.runs(Stage::apply_gravity) ? gravity_ : Vec3{};
+    if (!turning_springs_.empty()) clock_.mark(Stage::apply_springs);
     for (int i : load_follows_) {
-        for (const Fluid& fluid : fluids_) add_fluid(fluid, i, acceleration_[i], constants_[i].torque);
-        acceleration_[i] = gravity + (1.0 / constants_[i].mass) * acceleration_[i];
+        for (const Fluid& fluid : fluids_) add_fluid(fluid, i, acceleration_[i], model_.constants[i].torque);
+        acceleration_[i] = gravity() + (1.0 / model_.constants[i].mass) * acceleration_[i];
     }
-    if (clock_ && !fluids_.empty()) clock_->mark(Stage::apply_fluids);
+    if (!fluids_.empty()) clock_.mark(Stage::apply_fluids);
 }
 
 /// Where an end of a spring is, and how fast.
-RigidSystem::SpringEnd RigidSystem::spring_end(const End& end) const noexcept {
+Forces::SpringEnd Forces::spring_end(const End& end) const noexcept {
     if (end.body < 0) return {end.point, {}, {}};
     const BodyState& s = live_.bodies[end.body];
-    const Vec3 centre = position_of(end.body);
+    const Vec3 centre = model_.position(end.body, live_.bodies);
     if (is_zero(end.point)) return {centre, s.velocity, {}};
-    const Vec3 arm = axes(constants_[end.body], s) * end.point;
+    const Vec3 arm = axes(model_.constants[end.body], s) * end.point;
     return {centre + arm, s.velocity + cross(s.angular_velocity, arm), arm};
 }
 
-void RigidSystem::pull_aside(const SpringForce& spring) noexcept {
+void Forces::pull_aside(const SpringForce& spring) noexcept {
     const SpringEnd first = spring_end(spring.ends[0]), second = spring_end(spring.ends[1]);
     const Vec3 pull = spook::pull(spring, second.place - first.place, second.velocity - first.velocity);
     const auto act = [&](int body, Vec3 force, Vec3 arm) {
-        if (body < 0 || !constants_[body].moves()) return;
+        if (body < 0 || !model_.constants[body].moves()) return;
         acceleration_[body] += force;
-        constants_[body].torque += cross(arm, force);
+        model_.constants[body].torque += cross(arm, force);
     };
     act(spring.ends[0].body, pull, first.arm);
     act(spring.ends[1].body, -pull, second.arm);
@@ -123,15 +125,15 @@ void RigidSystem::pull_aside(const SpringForce& spring) noexcept {
 
 /// Archimedes' force, −ρ V g at the centre of the submerged volume V, and the drag −½ ρ C A |u| u there, u the speed
 /// of that point through the fluid and A the shadow of the whole part along u, times the submerged share of it.
-void RigidSystem::add_fluid(const Fluid& fluid, int body, Vec3& force, Vec3& torque) const noexcept {
+void Forces::add_fluid(const Fluid& fluid, int body, Vec3& force, Vec3& torque) const noexcept {
     const BodyState& s = live_.bodies[body];
-    const Pose pose{position_of(body), axes(constants_[body], s)};
+    const Pose pose{model_.position(body, live_.bodies), axes(model_.constants[body], s)};
     for (const Collider& floater : floaters_[body]) {
         const Pose at = placed(pose, floater.part);
         const Submerged below = submerged(floater.shape, at, fluid.up, fluid.level);
         if (below.volume == 0.0) continue;
         const Vec3 arm = below.centre - pose.position;
-        Vec3 push = -(fluid.density * below.volume) * gravity_;
+        Vec3 push = -(fluid.density * below.volume) * model_.gravity;
         const Vec3 through = s.velocity + cross(s.angular_velocity, arm) - fluid.velocity;
         const double speed = norm(through);
         if (fluid.drag > 0.0 && speed > 0.0) {

@@ -8,8 +8,9 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <utility>
 
-#include "rigid/rigid_system.hpp"
+#include "rigid/loop_watch.hpp"
 #include "rigid/tolerances.hpp"
 
 namespace spook {
@@ -22,11 +23,11 @@ using namespace tolerances::rigid_locking;
 
 /// The loops that joints close, each with all that joints hang on it: what else moves in the scene says nothing of it.
 /// Motors, limits and springs tie nothing here; they are loads.
-void RigidSystem::find_loops() {
-    if (composed_) return;
+void LoopWatch::take() {
+    if (model_.composed) return;
     const auto blocks = joints_.blocks();
-    const int world = static_cast<int>(constrained_.size());  // all that does not move by itself
-    std::vector<int> closing(constrained_.size() + 1), root(constrained_.size());
+    const int world = static_cast<int>(model_.constrained.size());  // all that does not move by itself
+    std::vector<int> closing(model_.constrained.size() + 1), root(model_.constrained.size());
     std::iota(closing.begin(), closing.end(), 0);
     std::iota(root.begin(), root.end(), 0);
     const auto find = [](std::vector<int>& up, int i) {
@@ -34,7 +35,7 @@ void RigidSystem::find_loops() {
         return i;
     };
     const auto place = [&](int body) {
-        return body < 0 || solver_index_[body] < 0 ? world : solver_index_[body];
+        return body < 0 || model_.solver_index[body] < 0 ? world : model_.solver_index[body];
     };
     std::vector<int> anchor(blocks.size(), -1),
         closes;  // per block: one of its members; some member of a loop
@@ -52,7 +53,7 @@ void RigidSystem::find_loops() {
         if (a == b && anchor[k] >= 0) closes.push_back(anchor[k]);
         closing[a] = b;
     }
-    std::vector<int> loop_of(constrained_.size(), -1), at(constrained_.size());
+    std::vector<int> loop_of(model_.constrained.size(), -1), at(model_.constrained.size());
     for (int member : closes) {
         int& loop = loop_of[find(root, member)];
         if (loop >= 0) continue;
@@ -78,8 +79,8 @@ void RigidSystem::find_loops() {
     std::vector<std::vector<BlockEdge>> edges(loops_.size());
     for (const Loop& loop : loops_)
         for (std::size_t k = 0; k < loop.blocks.size(); ++k) row_at[loop.blocks[k]] = static_cast<int>(k);
-    for (int edge = 0; edge < static_cast<int>(matrix_.edges().size()); ++edge) {
-        const BlockEdge& e = matrix_.edges()[edge];
+    for (int edge = 0; edge < static_cast<int>(rows_.matrix.edges().size()); ++edge) {
+        const BlockEdge& e = rows_.matrix.edges()[edge];
         if (anchor[e.first] < 0 || loop_at(anchor[e.first]) < 0) continue;
         const int index = loop_at(anchor[e.first]);
         Loop& loop = loops_[index];
@@ -91,7 +92,8 @@ void RigidSystem::find_loops() {
         Loop& loop = loops_[index];
         std::vector<int> sizes;
         for (int k : loop.blocks) sizes.push_back(blocks[k].size);
-        for (int member : loop.members) sizes.push_back(constants_[constrained_[member]].particle ? 3 : 6);
+        for (int member : loop.members)
+            sizes.push_back(model_.constants[model_.constrained[member]].particle ? 3 : 6);
         std::vector<std::uint8_t> is_row(sizes.size(), 0);
         std::fill_n(is_row.begin(), loop.blocks.size(), std::uint8_t{1});
         loop.probe.analyse(sizes, edges[index], is_row, true);
@@ -99,10 +101,10 @@ void RigidSystem::find_loops() {
 }
 
 /// In which loops some rows repeat others, and something is left to move.
-void RigidSystem::judge_loops() {
+void LoopWatch::begin() {
     live_.watched.assign(loops_.size(), {});
     if (loops_.empty()) return;
-    assemble_blocks();
+    rows_.assemble();
     for (Loop& loop : loops_) {
         take_probe(loop, 0.0);
         loop.probe.clear_counters();
@@ -117,7 +119,7 @@ void RigidSystem::judge_loops() {
 
 /// The matrix of a loop with rigid rows, but for a softness of that part of what each moves; and with every body as
 /// heavy as any other, as far across as its joints lie: whether rows repeat each other does not depend on masses.
-void RigidSystem::take_probe(Loop& loop, double part) {
+void LoopWatch::take_probe(Loop& loop, double part) {
     const int rows = static_cast<int>(loop.blocks.size());
     BlockLdlt& probe = loop.probe;
     find_extents(loop);
@@ -131,7 +133,7 @@ void RigidSystem::take_probe(Loop& loop, double part) {
     for (std::size_t e = 0; e < loop.edges.size(); ++e) {
         const BlockEdge& edge = probe.edges()[e];
         const int n = probe.size(edge.second), size = probe.size(edge.first);
-        const double* j = matrix_.coupling(loop.edges[e]);
+        const double* j = rows_.matrix.coupling(loop.edges[e]);
         std::copy_n(j, size * n, probe.coupling(static_cast<int>(e)));
         double* moved = loop.weakness.data() + probe.offset(edge.first);
         for (int i = 0; i < size; ++i, j += n) {
@@ -146,7 +148,7 @@ void RigidSystem::take_probe(Loop& loop, double part) {
 }
 
 /// The mean square of every member's arms to its joints [m²]; that of the others where all of its joints are at its centre.
-void RigidSystem::find_extents(Loop& loop) {
+void LoopWatch::find_extents(Loop& loop) {
     loop.square.assign(loop.members.size(), 0.0);
     std::vector<int> ends(loop.members.size(), 0);
     double sum = 0.0;
@@ -154,7 +156,7 @@ void RigidSystem::find_extents(Loop& loop) {
     const int rows = static_cast<int>(loop.blocks.size());
     for (const BlockEdge& edge : loop.probe.edges()) {
         const JointBlock& block = joints_.blocks()[loop.blocks[edge.first]];
-        const int k = edge.second - rows, body = constrained_[loop.members[k]];
+        const int k = edge.second - rows, body = model_.constrained[loop.members[k]];
         if (body != block.first && body != block.second) continue;
         const JointSet::State& state = joints_.states[block.joint];
         const Vec3 arm = body == block.second ? state.second_reach : state.first_reach;
@@ -167,37 +169,36 @@ void RigidSystem::find_extents(Loop& loop) {
 }
 
 /// After a solve, before its velocities are taken.
-void RigidSystem::watch_redundancy() {
+void LoopWatch::look() {
     for (std::size_t k = 0; k < loops_.size(); ++k)
         if (loops_[k].may_lock && live_.locked < 0) watch(loops_[k], live_.watched[k]);
 }
 
-double RigidSystem::motion_of(const Loop& loop) const {
+double LoopWatch::motion_of(const Loop& loop) const {
     double motion = 0.0;  // J
-    const int row_blocks = static_cast<int>(joints_.blocks().size());
     for (int member : loop.members) {
-        const int i = constrained_[member];
-        const double* x = solution_.data() + matrix_.offset(row_blocks + member);
+        const int i = model_.constrained[member];
+        const double* x = rows_.solution.data() + rows_.body_at(member);
         const Vec3 v{x[0], x[1], x[2]};
-        motion += 0.5 * constants_[i].mass * dot(v, v);
-        if (constants_[i].particle) continue;
+        motion += 0.5 * model_.constants[i].mass * dot(v, v);
+        if (model_.constants[i].particle) continue;
         const Vec3 w{x[3], x[4], x[5]};
         motion += 0.5 * dot(w, live_.bodies[i].inertia * w);
     }
     return motion;
 }
 
-bool RigidSystem::stops(const RigidState::Watched& seen, double motion) const noexcept {
+bool LoopWatch::stops(const RigidState::Watched& seen, double motion) const noexcept {
     // What stands moves by rounding, and that may stop as it likes: it would be looked at in nearly every step.
     const double told = LITTLE * TAKEN * std::max(seen.motion, AT_REST * seen.given);
     return motion < 0.5 * seen.last && seen.last > told;
 }
 
 /// Whether a step in a plane needs a look at some loop, which the rows of the space are for. If not, it is seen.
-bool RigidSystem::wants_look() {
-    const auto motion = [this](const Loop& loop) {
+bool LoopWatch::wants_look(const PlaneStep& plane) {
+    const auto motion = [&plane](const Loop& loop) {
         double sum = 0.0;
-        for (int member : loop.members) sum += plane_.motion(member);
+        for (int member : loop.members) sum += plane.motion(member);
         return 0.5 * sum;
     };
     const auto watched = [this](const Loop& loop) { return loop.may_lock && live_.locked < 0; };
@@ -214,7 +215,7 @@ bool RigidSystem::wants_look() {
     return false;
 }
 
-void RigidSystem::watch(Loop& loop, RigidState::Watched& seen) {
+void LoopWatch::watch(Loop& loop, RigidState::Watched& seen) {
     const double motion = motion_of(loop);
     const bool stopped = stops(seen, motion);
     const bool due = live_.step >= seen.next;
@@ -225,22 +226,21 @@ void RigidSystem::watch(Loop& loop, RigidState::Watched& seen) {
     if (!find_repeated(loop)) return;
 
     double work = 0.0, load = driven(loop);
-    const double held = loop.held_back(constants_, live_.bodies, constrained_);
-    const int row_blocks = static_cast<int>(joints_.blocks().size());
+    const double held = loop.held_back(model_.constants, live_.bodies, model_.constrained);
     const double* y =
         loop.repeated.data() + loop.weakness.size();  // minus the change of the probe's velocities
     for (std::size_t k = 0; k < loop.members.size(); ++k) {
-        const int i = constrained_[loop.members[k]];
-        const double* x = solution_.data() + matrix_.offset(row_blocks + loop.members[k]);
-        const BodyConstants& body = constants_[i];
+        const int i = model_.constrained[loop.members[k]];
+        const double* x = rows_.solution.data() + rows_.body_at(loop.members[k]);
+        const BodyConstants& body = model_.constants[i];
         const BodyState& s = live_.bodies[i];
-        const Vec3 v{x[0], x[1], x[2]}, impulse{-y[0], -y[1], -y[2]}, given = kick(i);
+        const Vec3 v{x[0], x[1], x[2]}, impulse{-y[0], -y[1], -y[2]}, given = forces_.kick(i);
         work += 0.5 * dot(impulse, v + s.velocity);
         load += body.mass * dot(given, given);
         y += 3;
         if (body.particle) continue;
         const Vec3 w{x[3], x[4], x[5]}, twist = -loop.square[k] * Vec3{y[0], y[1], y[2]},
-                                        given_twist = h_ * body.torque;
+                                        given_twist = model_.h * body.torque;
         work += 0.5 * dot(twist, w + s.angular_velocity);
         load += dot(given_twist, turned_by(body, s, given_twist));
         y += 3;
@@ -263,25 +263,25 @@ void RigidSystem::watch(Loop& loop, RigidState::Watched& seen) {
     if (!took && !holds) {
         if (!(held > told)) return;
         loop.repeat();
-        if (!(loop.held_back(constants_, live_.bodies, constrained_) > told)) return;
+        if (!(loop.held_back(model_.constants, live_.bodies, model_.constrained) > told)) return;
     }
-    if (!loop.bends(joints_, constants_, {live_.bodies.begin(), live_.bodies.end()}, constrained_,
-                    method_.floor))
+    if (!loop.bends(joints_, model_.constants, {live_.bodies.begin(), live_.bodies.end()}, model_.constrained,
+                    model_.method.floor))
         return note_locked(loop);
     seen.work = seen.held = seen.load = 0.0;
 }
 
 /// Of what hardly resists, the part that hardly resists: what rows that are all needed hold is a small part of it each time.
-void RigidSystem::Loop::repeat() {
+void LoopWatch::Loop::repeat() {
     for (std::size_t row = 0; row < repeated.size(); ++row)
         repeated[row] *= row < weakness.size() ? weakness[row] : 0.0;
     probe.solve(repeated.data());
 }
 
 /// 2 J of the velocities that it holds back in a step.
-double RigidSystem::Loop::held_back(const LargeArray<BodyConstants>& constants,
-                                    std::span<const BodyState> bodies,
-                                    const std::vector<int>& constrained) const {
+double LoopWatch::Loop::held_back(const LargeArray<BodyConstants>& constants,
+                                  std::span<const BodyState> bodies,
+                                  const std::vector<int>& constrained) const {
     const double* y = repeated.data() + weakness.size();
     double held = 0.0;
     for (std::size_t k = 0; k < members.size(); ++k) {
@@ -300,9 +300,9 @@ double RigidSystem::Loop::held_back(const LargeArray<BodyConstants>& constants,
 /// Whether rows that hardly resist a motion would soon, so that they are needed and repeat nothing: those of a lift that lies
 /// nearly flat, or of a toggle. In a mechanism that is put together slightly off they never do. Along the motion d that is
 /// held, |d| = 1, what the combination s of rows resists grows by sᵀ Ġ d, to second order of the way.
-bool RigidSystem::Loop::bends(const JointSet& joints, const LargeArray<BodyConstants>& constants,
-                              std::vector<BodyState> along, const std::vector<int>& constrained,
-                              double floor) const {
+bool LoopWatch::Loop::bends(const JointSet& joints, const LargeArray<BodyConstants>& constants,
+                            std::vector<BodyState> along, const std::vector<int>& constrained,
+                            double floor) const {
     for (BodyState& body : along) body.velocity = body.angular_velocity = {};
     const double* y = repeated.data() + weakness.size();
     double motion = 0.0, extent = 0.0;
@@ -333,34 +333,35 @@ bool RigidSystem::Loop::bends(const JointSet& joints, const LargeArray<BodyConst
 }
 
 /// 2 J of what motors and springs alone would set in motion.
-double RigidSystem::driven(const Loop& loop) {
+double LoopWatch::driven(const Loop& loop) {
     if (loop.drives.empty()) return 0.0;
-    push_.assign(constrained_.size(), {});
+    push_.assign(model_.constrained.size(), {});
     for (int k : loop.drives) {
         const JointBlock& block = joints_.blocks()[k];
         for (const bool second : {false, true}) {
             const int body = second ? block.second : block.first;
-            if (body < 0 || solver_index_[body] < 0) continue;
-            const double* j = jacobian(k, second);
+            if (body < 0 || model_.solver_index[body] < 0) continue;
+            const double* j = std::as_const(rows_).jacobian(k, second);
             for (int i = 0; i < block.size; ++i)
                 for (int axis = 0; axis < 6; ++axis, ++j)
                     if (i != block.rotor)  // inertia drives nothing
-                        push_[solver_index_[body]][axis] += *j * solution_[matrix_.offset(k) + i];
+                        push_[model_.solver_index[body]][axis] +=
+                            *j * rows_.solution[rows_.matrix.offset(k) + i];
         }
     }
     double sum = 0.0;
     for (int member : loop.members) {
-        const int i = constrained_[member];
+        const int i = model_.constrained[member];
         const Vec6& p = push_[member];
         const Vec3 linear{p[0], p[1], p[2]}, twist{p[3], p[4], p[5]};
-        sum += dot(linear, linear) / constants_[i].mass;
-        sum += dot(twist, turned_by(constants_[i], live_.bodies[i], twist));
+        sum += dot(linear, linear) / model_.constants[i].mass;
+        sum += dot(twist, turned_by(model_.constants[i], live_.bodies[i], twist));
     }
     return sum;
 }
 
 /// λ' of the last solve, with the sign of the solution, and what it changes of the velocities.
-bool RigidSystem::find_repeated(Loop& loop) {
+bool LoopWatch::find_repeated(Loop& loop) {
     const double size = static_cast<double>(loop.blocks.size());
     take_probe(loop, NEARLY / (size * size));  // the rows of a long chain move each other but little
     if (!loop.probe.factor(0.0)) return false;
@@ -368,23 +369,23 @@ bool RigidSystem::find_repeated(Loop& loop) {
     std::size_t row = 0;
     for (int k : loop.blocks)
         for (int i = 0; i < joints_.blocks()[k].size; ++i, ++row)
-            loop.repeated[row] = loop.weakness[row] * solution_[matrix_.offset(k) + i];
+            loop.repeated[row] = loop.weakness[row] * rows_.solution[rows_.matrix.offset(k) + i];
     loop.probe.solve(loop.repeated.data());
     return true;
 }
 
 /// The joints whose rows repeat each other by what was found, each by its largest share.
-void RigidSystem::note_locked(const Loop& loop) {
+void LoopWatch::note_locked(const Loop& loop) {
     const std::vector<double> share = shares(loop);
     const auto most = std::max_element(share.begin(), share.end());
     live_.named.clear();
     for (std::size_t k = 0; k < share.size(); ++k)
         if (share[k] > TOLD * *most) live_.named.push_back(joints_.blocks()[loop.blocks[k]].joint);
-    live_.locked = body_of(loop.blocks[most - share.begin()]);
+    live_.locked = model_.mover(joints_.blocks()[loop.blocks[most - share.begin()]]);
 }
 
 /// Per block of the loop: what its rows repeat of others.
-std::vector<double> RigidSystem::shares(const Loop& loop) const {
+std::vector<double> LoopWatch::shares(const Loop& loop) const {
     std::vector<double> share(loop.blocks.size(), 0.0);
     std::size_t row = 0;
     for (std::size_t k = 0; k < loop.blocks.size(); ++k)
@@ -394,7 +395,7 @@ std::vector<double> RigidSystem::shares(const Loop& loop) const {
 }
 
 /// Redundant rows had to be told apart, which those that agree need not: of which loop?
-void RigidSystem::note_projected() {
+void LoopWatch::note_projected() {
     const Loop* worst = nullptr;
     double largest = 0.0;
     for (Loop& loop : loops_) {
@@ -404,8 +405,9 @@ void RigidSystem::note_projected() {
         if (most > largest) largest = most, worst = &loop;
     }
     if (worst) return note_locked(*worst);
-    live_.named.assign(1, joints_.blocks()[busiest_block()].joint);
-    live_.locked = body_of(busiest_block());
+    const JointBlock& busiest = joints_.blocks()[rows_.busiest_block()];
+    live_.named.assign(1, busiest.joint);
+    live_.locked = model_.mover(busiest);
 }
 
 }  // namespace spook

@@ -3,14 +3,14 @@
 namespace spook {
 namespace {
 
-std::vector<int> distances(const RigidSystem& system) {
+std::vector<int> distances(const RigidReadings& system) {
     std::vector<int> found;
     for (int joint = 0; joint < system.joints().count(); ++joint)
         if (system.joints().constants(joint).kind == JointKind::distance) found.push_back(joint);
     return found;
 }
 
-Sampler joint_sampler(const RigidSystem* s, int joint, bool force) {
+Sampler joint_sampler(const RigidReadings* s, int joint, bool force) {
     const auto read_distance = [s, force](int distance, double* out) {
         if (force) *out = s->tension(distance);
         else s->violation(distance, out);
@@ -31,12 +31,12 @@ Sampler joint_sampler(const RigidSystem* s, int joint, bool force) {
 }
 
 /// From the centre of mass to a point given in body axes, world axes.
-Vec3 arm(const RigidSystem& system, int body, Vec3 point) {
+Vec3 arm(const RigidReadings& system, int body, Vec3 point) {
     if (point.x == 0.0 && point.y == 0.0 && point.z == 0.0) return {};
     return axes(system.constants(body), system.state(body)) * point;
 }
 
-Sampler momentum_sampler(const RigidSystem* s, bool angular, Vec3 about) {
+Sampler momentum_sampler(const RigidReadings* s, bool angular, Vec3 about) {
     return {3, [=](double* out) {
                 Vec3 sum;
                 for (int i = 0; i < s->bodies(); ++i) {
@@ -74,9 +74,9 @@ bool of_places(Quantity quantity) {
 }  // namespace
 
 Sampler sampler_of(RigidSystem& system, const QuantityRequest& request) {
-    const RigidSystem* s = &system;
+    const RigidReadings* s = &system.read();
     if (!of_places(from_text<Quantity>(request.kind, "quantity"))) system.see_velocities();
-    const int index = request.index, other = request.other, count = system.bodies();
+    const int index = request.index, other = request.other, count = s->bodies();
     switch (from_text<Quantity>(request.kind, "quantity")) {
         case Quantity::position:
             return one_or_all(index, count, 3, [s, point = request.point](int i, double* out) {
@@ -103,7 +103,7 @@ Sampler sampler_of(RigidSystem& system, const QuantityRequest& request) {
         case Quantity::violation: return joint_sampler(s, index, false);
         case Quantity::constraint_force: return joint_sampler(s, index, true);
         case Quantity::joint_coordinate:
-            system.joints().track(index);
+            system.track(index);
             return {1, [s, index](double* out) { *out = s->coordinate(index); }};
         case Quantity::contact_force:
             return {3, [s, index, other](double* out) { put(out, s->contact_force(index, other)); }};

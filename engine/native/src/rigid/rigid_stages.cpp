@@ -222,17 +222,18 @@ StageChoices choose_stages(const RigidScene& scene, bool observing) {
 
 void RigidSystem::tell(StageChoices& choices) const {
     std::string& solve = choices[static_cast<std::size_t>(Stage::solve_block)].reason;
-    if (!locked_.empty())
+    if (bilateral_.by_links())
         solve = std::string("locks make trees: solved link by link, leaves first, without a matrix") +
-                (contacts_ ? " (while nothing touches)" : "");
-    if (in_plane_)
-        solve = std::string("the mechanism lies in the plane across ") + "xyz"[plane_.normal()] + ": " +
-                std::to_string(plane_.rows()) + " rows of that plane, factored in an envelope";
-    if (!in_tree_) return;
-    solve = "joints make trees: " + std::to_string(tree_.coordinates()) + " joint coordinates, " +
-            std::to_string(tree_.rows()) + " rows to close loops, by Newton's method in a band";
-    if (tree_.across() >= 0) solve += std::string(", in the plane across ") + "xyz"[tree_.across()];
-    if (tree_.pivots()) solve = "bodies on balls of the world: each turns about its own as a free body does";
+                (mixed_.contacts() ? " (while nothing touches)" : "");
+    if (plane_.is_used())
+        solve = std::string("the mechanism lies in the plane across ") + "xyz"[plane_.step().normal()] +
+                ": " + std::to_string(plane_.step().rows()) + " rows of that plane, factored in an envelope";
+    if (!composition_.in_tree()) return;
+    const JointTree& tree = composition_.tree();
+    solve = "joints make trees: " + std::to_string(tree.coordinates()) + " joint coordinates, " +
+            std::to_string(tree.rows()) + " rows to close loops, by Newton's method in a band";
+    if (tree.across() >= 0) solve += std::string(", in the plane across ") + "xyz"[tree.across()];
+    if (tree.pivots()) solve = "bodies on balls of the world: each turns about its own as a free body does";
     choices[static_cast<std::size_t>(Stage::correct_curvature)].reason =
         "joint coordinates keep the joints by construction";
     choices[static_cast<std::size_t>(Stage::assemble_rows)].reason =

@@ -1,11 +1,11 @@
 #include "rigid/rigid_system.hpp"
-#include "rigid/rotors.hpp"
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <stdexcept>
 #include <utility>
+
+#include "rigid/runaway.hpp"
 
 namespace spook {
 
@@ -17,10 +17,6 @@ RigidBodySpec turning(RigidBodySpec body) {
     body.inertia = {body.mass, body.mass, body.mass};
     return body;
 }
-
-}  // namespace
-
-namespace {
 
 /// Whether no stop is connected to another: what one sends back does not reach any.
 bool stops_are_apart(const JointSet& joints, std::span<const int> index, int bodies) {
@@ -46,223 +42,160 @@ bool stops_are_apart(const JointSet& joints, std::span<const int> index, int bod
 }  // namespace
 
 RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
-    : stages_(std::move(stages)),
-      gravity_(scene.gravity),
-      method_(scene.method),
-      h_(scene.method.time_step / scene.method.substeps),
-      joints_(scene, h_) {
+    : model_(std::move(stages), scene.gravity, scene.method),
+      joints_(scene, model_.h),
+      forces_(model_, live_, joints_, clock_),
+      rows_(model_, live_, joints_, forces_, scratch_.last_rows),
+      curvature_(model_, live_, joints_, rows_),
+      mixed_(model_, live_, joints_, forces_, curvature_, scratch_, clock_),
+      bilateral_(model_, live_, joints_, forces_, rows_, mixed_, curvature_, scratch_, clock_),
+      plane_(model_, live_, joints_, forces_, bilateral_.loops, scratch_.last_rows),
+      composition_(model_, live_, joints_, forces_, rows_, clock_),
+      half_step_(model_, live_, joints_, forces_, rows_),
+      sleeping_(model_, live_, joints_, forces_, rows_, mixed_, scratch_),
+      projection_(model_, live_, joints_, forces_, mixed_, scratch_),
+      energy_(model_, live_, joints_, forces_),
+      readings_(model_, live_, joints_, forces_, rows_, bilateral_, plane_, mixed_, scratch_) {
     take_stages(scene);
-    const bool weighs = stages_.runs(Stage::apply_gravity), loaded = stages_.runs(Stage::apply_loads);
-    const bool turns = stages_.runs(Stage::integrate_rotations);
+    take_bodies(scene);
+    forces_.take(scene);
+    rows_.take();
+    if (model_.stages.runs(Stage::collision)) mixed_.take_contacts(scene);
+    const RigidMethod& method = model_.method;
+    const bool block = model_.solver == RigidSolver::block, may_touch = mixed_.may_touch();
+    model_.composed = method.composition > 2;
+    model_.half_step = model_.stages.runs(Stage::half_step) && !model_.composed;
+    model_.stiff = model_.stages.runs(Stage::string_stiffness) && block;
+    model_.curved = method.corrections > 0 && !model_.composed && rows_.rows() > 0 && (!block || may_touch);
+    if (!may_touch &&
+        stops_are_apart(joints_, model_.solver_index, static_cast<int>(model_.constrained.size())))
+        joints_.let_stops_fold();
+    bilateral_.take();
+    sleeping_.take(scene);
+    if (model_.composed) composition_.take();
+    // Nothing of the scene but its joints, steady forces and steps of the plain kind bears on the bodies:
+    if (block && !bilateral_.by_links() && !model_.composed && !model_.stiff && !mixed_.surfaces() &&
+        !method.force_block && !scene.loads_change && forces_.act_steadily() && model_.free.empty() &&
+        model_.driven.empty())
+        plane_.take();
+}
+
+/// Constants and start of all bodies, and which of them have rows.
+void RigidSystem::take_bodies(const RigidScene& scene) {
+    const bool loaded = model_.stages.runs(Stage::apply_loads);
+    const bool turns = model_.stages.runs(Stage::integrate_rotations);
     for (RigidBodySpec spec : scene.bodies) {
-        if (spec.particle && method_.force_rotation) spec = turning(spec);
+        if (spec.particle && model_.method.force_rotation) spec = turning(spec);
         if (!spec.particle && spec.motion != Motion::fixed && !turns)
             throw std::invalid_argument("bodies that turn need the stage integrate_rotations");
         if (!loaded) spec.force = spec.torque = {};
-        constants_.push_back(constants_of(spec));
-        start_.push_back(start_of(spec, constants_.back()));
-        const bool moves = constants_.back().moves();
-        acceleration_.push_back(moves ? (weighs ? scene.gravity : Vec3{}) + (1.0 / spec.mass) * spec.force
-                                      : Vec3{});
+        model_.constants.push_back(constants_of(spec));
+        model_.start.push_back(start_of(spec, model_.constants.back()));
     }
-    if (!springs_.empty() || !fields_.empty()) force_.resize(constants_.size());
-    take_loads(scene);
-
-    solver_index_.assign(constants_.size(), -1);
-    const bool touching = stages_.runs(Stage::collision);
-    std::size_t spare = 0;
-    for (const JointBlock& block : joints_.blocks()) {
-        rows_ += static_cast<std::uint64_t>(block.size);
-        spare_at_.push_back(spare);
-        spare += static_cast<std::size_t>(12 * block.size);
-        for (int body : {block.first, block.second})
-            if (body >= 0 && constants_[body].moves()) solver_index_[body] = 0;
-        for (int body : joints_.others(static_cast<int>(spare_at_.size()) - 1))
-            if (constants_[body].moves()) solver_index_[body] = 0;
+    model_.solver_index.assign(model_.constants.size(), -1);
+    const auto has_rows = [this](int body) {
+        if (body >= 0 && model_.constants[body].moves()) model_.solver_index[body] = 0;
+    };
+    for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k) {
+        has_rows(joints_.blocks()[k].first);
+        has_rows(joints_.blocks()[k].second);
+        for (int body : joints_.others(k)) has_rows(body);
     }
-    spare_.assign(spare, 0.0);
-    for (int body = 0; body < bodies(); ++body)
-        if (solver_index_[body] == 0 || (touching && constants_[body].moves())) {
-            solver_index_[body] = static_cast<int>(constrained_.size());
-            constrained_.push_back(body);
-        } else if (constants_[body].moves()) {
-            free_.push_back(body);
-        } else if (constants_[body].motion == Motion::kinematic) {
-            driven_.push_back(body);
+    const bool touching = model_.stages.runs(Stage::collision);
+    for (int body = 0; body < model_.bodies(); ++body) {
+        const BodyConstants& of = model_.constants[body];
+        if (model_.solver_index[body] == 0 || (touching && of.moves())) {
+            model_.solver_index[body] = static_cast<int>(model_.constrained.size());
+            model_.constrained.push_back(body);
+        } else if (of.moves()) {
+            model_.free.push_back(body);
+        } else if (of.motion == Motion::kinematic) {
+            model_.driven.push_back(body);
         }
-    if (touching) {
-        std::vector<char> dynamic;
-        std::vector<SurfaceMaterial> materials;
-        std::vector<IndexPair> joint_pairs;
-        std::vector<char> yielding;
-        for (const JointBlock& block : joints_.blocks()) {
-            joint_pairs.push_back({block.first, block.second});
-            yielding.push_back(joints_.has_spring(block) || gives_way(joints_.constants(block.joint).kind));
-        }
-        for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
-            for (int body : joints_.others(k)) joint_pairs.push_back({joints_.blocks()[k].first, body});
-        for (const RigidBodySpec& spec : scene.bodies) {
-            dynamic.push_back(spec.motion == Motion::dynamic);
-            materials.push_back(spec.material);
-            if (!stages_.runs(Stage::friction)) materials.back().friction = 0.0;
-            if (!stages_.runs(Stage::orient_friction)) materials.back().direction = {};
-            if (!stages_.runs(Stage::move_surfaces)) materials.back().surface_velocity = {};
-            if (!stages_.runs(Stage::roll)) materials.back().rolling = materials.back().torsional = 0.0;
-        }
-        const SolverKind solver =
-            stages_.runs(Stage::solve_iterative) ? SolverKind::iterative : SolverKind::direct;
-        fresh_contacts_.emplace(
-            Detection(scene.colliders, dynamic, scene.no_contact), materials, solver_index_,
-            ContactOptions{h_, method_.friction, solver, method_.iterations, method_.residual_tolerance,
-                           method_.floor, method_.refinements, method_.impacts, method_.unsettled_residual},
-            joint_pairs, yielding);
-        for (const JointBlock& block : joints_.blocks())
-            for (const int body : {block.first, block.second})
-                if (body >= 0 && joints_.may_stop(block)) fresh_contacts_->leave_at_start(body);
-        for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
-            for (const int body : joints_.others(k))
-                if (joints_.may_stop(joints_.blocks()[k])) fresh_contacts_->leave_at_start(body);
     }
-    composed_ = method_.composition > 2;
-    half_step_ = stages_.runs(Stage::half_step) && !composed_;
-    stiff_ = stages_.runs(Stage::string_stiffness) && solver_ == RigidSolver::block;
-    if ((!fresh_contacts_ || !fresh_contacts_->possible()) &&
-        stops_are_apart(joints_, solver_index_, static_cast<int>(constrained_.size())))
-        joints_.let_stops_fold();
-    curved_ = method_.corrections > 0 && !composed_ && rows_ > 0 &&
-              (solver_ != RigidSolver::block || (fresh_contacts_ && fresh_contacts_->possible()));
-    if (solver_ == RigidSolver::block && !composed_ && !half_step_ && !stiff_ && method_.corrections == 0 &&
-        !(method_.sleep_speed > 0.0))
-        locked_.analyse(constants_, joints_, constrained_);
-    if (solver_ == RigidSolver::block && locked_.empty()) analyse_block(), find_loops();
-    take_sleep(scene);
-    const bool tilted =  // joint coordinates see inertias along the bodies' own axes
-        std::any_of(constants_.begin(), constants_.end(),
-                    [](const BodyConstants& body) { return body.tilted; });
-    if (composed_ && solver_ == RigidSolver::block && !tilted)
-        tree_.analyse(constants_, joints_, constrained_, start_);
-    if (may_lie_in_plane(scene))
-        plane_.analyse(constants_, joints_, constrained_,
-                       {h_, method_.refinements, method_.corrections, method_.correction_cap});
-    in_tree_ = tree_.coordinates() > 0 && tree_.holds(start_);  // for those that ask before a run
-    in_plane_ = !plane_.empty() && plane_.holds(constants_, acceleration_, start_);
 }
 
 /// Which stages run here; what the scene has and no stage handles is refused.
 void RigidSystem::take_stages(const RigidScene& scene) {
     const bool joints = !scene.joints.empty();
-    if (stages_.take(Stage::collision)) {
-        stages_.take(Stage::impact);
-        if (stages_.take(Stage::tangents) && stages_.take(Stage::friction)) {
-            stages_.take(Stage::orient_friction);
-            stages_.take(Stage::move_surfaces);
-        }
-        stages_.take(Stage::roll);
-    }
-    const bool wires = stages_.take(Stage::rub_wires), tyres = stages_.take(Stage::roll_tyres);
-    const bool rub = stages_.take(Stage::rub_joints);
-    load_dependent_.take(joints_, wires, tyres, rub);
-    breaks_ = stages_.take(Stage::break_joints);
-    const bool coupled = stages_.take(Stage::couple_joints), held = stages_.take(Stage::hold_wires);
-    const bool wound = stages_.take(Stage::wind_wires), meshes = stages_.take(Stage::meet_meshes);
+    mixed_.take_stages(model_);
+    const bool rub = model_.stages.runs(Stage::rub_joints);
+    const bool coupled = model_.stages.take(Stage::couple_joints),
+               held = model_.stages.take(Stage::hold_wires);
+    const bool wound = model_.stages.take(Stage::wind_wires), meshes = model_.stages.take(Stage::meet_meshes);
     for (const JointSpec& joint : scene.joints)
         if ((joint.kind == JointKind::relation && !coupled) || (joint.kind == JointKind::wire && !held) ||
             (joint.kind == JointKind::wire && !joint.terms.empty() && !wound) || (rubs(joint) && !rub))
             throw std::invalid_argument(
                 "a relation, a wire or a joint that rubs needs the stage named for it");
     for (const Collider& collider : scene.colliders)
-        if (collider.shape.kind == ShapeKind::triangle && stages_.runs(Stage::collision) && !meshes)
+        if (collider.shape.kind == ShapeKind::triangle && model_.stages.runs(Stage::collision) && !meshes)
             throw std::invalid_argument("meshes need the stage meet_meshes");
-    if (stages_.take(Stage::assemble_rows)) {
-        const bool block = stages_.take(Stage::solve_block), iterative = stages_.take(Stage::solve_iterative);
-        const bool pivot = stages_.take(Stage::pivot);
+    if (model_.stages.take(Stage::assemble_rows)) {
+        const bool block = model_.stages.take(Stage::solve_block),
+                   iterative = model_.stages.take(Stage::solve_iterative);
+        const bool pivot = model_.stages.take(Stage::pivot);
         if (joints)
-            solver_ = iterative ? RigidSolver::iterative
-                      : block   ? RigidSolver::block
-                      : pivot   ? RigidSolver::pivot
-                                : RigidSolver::none;
+            model_.solver = iterative ? RigidSolver::iterative
+                            : block   ? RigidSolver::block
+                            : pivot   ? RigidSolver::pivot
+                                      : RigidSolver::none;
     }
-    if (joints && solver_ == RigidSolver::none)
+    if (joints && model_.solver == RigidSolver::none)
         throw std::invalid_argument("joints need the stage assemble_rows and one that solves them");
-    stages_.take(Stage::apply_gravity);
-    stages_.take(Stage::apply_loads);
-    stages_.take(Stage::follow_time);
-    stages_.take(Stage::apply_fluids);
-    if (stages_.take(Stage::apply_central_gravity)) fields_ = scene.fields;
-    if (stages_.take(Stage::apply_springs))
-        for (const SpringForce& spring : scene.springs)
-            (spring.turns() ? turning_springs_ : springs_).push_back(spring);
-    stages_.take(Stage::string_stiffness);
-    stages_.take(Stage::half_step);
-    stages_.take(Stage::correct_curvature);
-    stages_.take(Stage::integrate_positions);
-    stages_.take(Stage::integrate_rotations);
-    stages_.take(Stage::project_positions);
-    stages_.take(Stage::sleep);
-    stages_.take(Stage::observe);
-    stages_.expect_all_taken("rigid bodies");
+    forces_.take_stages(scene);
+    model_.stages.take(Stage::string_stiffness);
+    model_.stages.take(Stage::half_step);
+    model_.stages.take(Stage::correct_curvature);
+    model_.stages.take(Stage::integrate_positions);
+    model_.stages.take(Stage::integrate_rotations);
+    model_.stages.take(Stage::project_positions);
+    model_.stages.take(Stage::sleep);
+    model_.stages.take(Stage::observe);
+    model_.stages.expect_all_taken("rigid bodies");
 }
 
 void RigidSystem::reset(StageClock* clock) {
+    clock_ = StageTimer(clock);
     live_ = {};
-    constrained_are_moved_ = false;
-    at_hand_ = plane_values_ = false;
-    plane_solves_ = 0;
+    live_.bodies = model_.start;
     replaying_ = false;
     early_joints_.clear();
-    live_.bodies = start_;
-    begin_sleep();
-    if (!load_follows_.empty() || !drives_.empty()) follow_time();
-    redundant_.reset(matrix_);
+    plane_.forget();
+    forces_.act_wholly();
+    sleeping_.begin();
+    if (forces_.follow_the_time()) forces_.follow_time();
+    rows_.reset();
     std::fill(joints_.states.begin(), joints_.states.end(), JointSet::State{});
-    judge_loops();
     joints_.breaks.clear();
-    clock_ = clock;
-    rounds_ = pgs_iterations_ = 0;
+    bilateral_.begin();
+    rows_.matrix.clear_counters();
     work_kept_ = work_taken_back_ = {};
-    residual_ = 0.0;
-    pivot_ = PivotSolver{};
-    pivot_.floor = method_.floor;
-    pivot_.refinements = method_.refinements;
-    contacts_ = fresh_contacts_;
-    share_.clear();
-    matrix_.clear_counters();
-    locked_.clear_counters();
-    undelivered_ = false;
-    mixed_ = MixedSystem{};
-    mixed_values_ = solver_ != RigidSolver::block;
-    if (composed_) start_composition();
-    if (composed_ || method_.corrections > 0) begin_energy();
-    if (stiff_) find_tensions();
-    const bool may_touch = contacts_ && contacts_->possible();  // or the stage is only forced in
-    if (half_step_ || method_.corrections > 0) {
-        make_room_for_half_step();
-        if (!may_touch) start_half_step();
-    }
-    in_plane_ = !plane_.empty() && plane_.holds(constants_, acceleration_, live_.bodies);
-    if (!contacts_ && solver_ != RigidSolver::pivot && solver_ != RigidSolver::iterative) return;
-    mixed_.mass.assign(constrained_.size(), Mat6{});
-    mixed_.momentum.resize(constrained_.size());
-    mixed_.velocity.resize(constrained_.size());
-    for (const JointBlock& block : joints_.blocks()) {
-        RowBlock rows;
-        rows.first = block.first < 0 ? -1 : solver_index_[block.first];
-        rows.second = block.second < 0 ? -1 : solver_index_[block.second];
-        rows.size = block.size;
-        rows.softness = block.softness;
-        rows.rotor = block.rotor;
-        mixed_.rows.push_back(rows);
-    }
-    if (half_step_ && may_touch) start_half_step_touching();
+    mixed_.begin();
+    const bool corrected = model_.method.corrections > 0, may_touch = mixed_.may_touch();
+    if (model_.composed) composition_.begin();
+    if (model_.composed || corrected) energy_.begin();
+    if (model_.stiff) bilateral_.stiffness.find_tensions();
+    if (model_.half_step || corrected) curvature_.begin();
+    if (model_.half_step && !may_touch) half_step_.start();
+    if (corrected && !may_touch && model_.solver == RigidSolver::block && !model_.curved)
+        curvature_.begin_where_it_stands();
+    rows_.matrix.clear_counters();
+    plane_.begin();
+    if (model_.half_step && may_touch)
+        half_step_.start_touching([this] { find_velocities(); }, [this] { mixed_.begin_again(); });
 }
 
 void RigidSystem::advance(std::int64_t steps) {
-    if (composed_) return compose(steps * method_.substeps);
-    for (std::int64_t n = steps * method_.substeps; n > 0; --n) step();
+    if (model_.composed) return composition_.compose(steps * model_.method.substeps);
+    for (std::int64_t n = steps * model_.method.substeps; n > 0; --n) step();
     deliver();
 }
 
 Health RigidSystem::health() const {
+    const auto cause = [this](bool known = false) {
+        return cause_of_runaway(model_, joints_, early_joints_, mixed_.contacts() != nullptr, known);
+    };
     if (live_.whirling >= 0) return {Status::diverged, live_.whirling, cause(true)};
     if (live_.lost >= 0)
         return {
@@ -276,13 +209,13 @@ Health RigidSystem::health() const {
     if (live_.locked >= 0)
         return {
             Status::diverged, live_.locked,
-            method_.corrections > 0
+            model_.method.corrections > 0
                 ? "is locked by redundant joints, {joints}: they say nearly the same and yet not quite; put the loop "
                   "together more exactly, or give them more compliance"
                 : "is locked by redundant joints, {joints}: linearised rows pull them apart, or the loop does not fit; "
                   "use corrections=1 or a composition, or give them more compliance",
             live_.named};
-    for (int body = 0; body < bodies(); ++body) {
+    for (int body = 0; body < model_.bodies(); ++body) {
         const BodyState& s = live_.bodies[body];
         if (!finite(s.displacement) || !finite(s.velocity) || !finite(s.angular_momentum) ||
             !finite(s.angular_velocity))
@@ -298,68 +231,15 @@ Health RigidSystem::health() const {
     return {};
 }
 
-double RigidSystem::kinetic_energy() const noexcept {
-    double sum = 0.0;
-    for (int i = 0; i < bodies(); ++i) {
-        if (!constants_[i].moves()) continue;
-        const BodyState& s = live_.bodies[i];
-        sum += 0.5 * constants_[i].mass * dot(s.velocity, s.velocity);
-        if (!constants_[i].particle) sum += 0.5 * dot(s.angular_velocity, s.angular_momentum);
-    }
-    return sum + rotor_energy(joints_, live_.bodies);
-}
-
-double RigidSystem::potential_energy() const noexcept {
-    double sum = 0.0;
-    for (int i = 0; i < bodies(); ++i) {
-        if (!constants_[i].moves()) continue;
-        const Vec3 x = position_of(i);
-        sum -= constants_[i].mass * dot(gravity_, x);
-        for (const CentralField& field : fields_)
-            sum -= constants_[i].mass * field.strength / norm(x - field.centre);
-    }
-    for (const SpringForce& spring : springs_)
-        sum += energy(spring, place(spring.ends[1]) - place(spring.ends[0]));
-    for (const SpringForce& spring : turning_springs_)
-        sum += energy(spring, spring_end(spring.ends[1]).place - spring_end(spring.ends[0]).place);
-    sum += joints_.spring_energy(live_.bodies);
-    const double now = static_cast<double>(live_.moved) * h_;
-    for (const TimeDrive& drive : drives_)
-        if (drive.kind == DriveKind::rest)
-            sum += joints_.spring_energy(drive.index, drive.function.at(now), live_.bodies);
-    return sum;
-}
-
-std::vector<double> RigidSystem::places() const {
-    std::vector<double> out;
-    for (int i = 0; i < bodies(); ++i) {
-        const Vec3 x = position_of(i);
-        const Quat q = orientation_of(i);
-        out.insert(out.end(), {x.x, x.y, x.z, q.w, q.x, q.y, q.z});
-        out.insert(out.end(), 6, std::numeric_limits<double>::quiet_NaN());
-    }
-    return out;
-}
-
 std::vector<double> RigidSystem::final_state() {
     if (live_.lost < 0 && live_.not_solved < 0) {
-        if (composed_) read_composition();
-        if (half_step_) {
+        if (model_.composed) composition_.read();
+        if (model_.half_step) {
             solve_ahead();
-            read_half_step();
+            half_step_.read();
         }
     }
-    std::vector<double> out;
-    out.reserve(13 * constants_.size());
-    for (int i = 0; i < bodies(); ++i) {
-        const BodyState& s = live_.bodies[i];
-        const Vec3 x = position_of(i);
-        const Quat q = orientation_of(i);
-        for (double value : {x.x, x.y, x.z, q.w, q.x, q.y, q.z, s.velocity.x, s.velocity.y, s.velocity.z,
-                             s.angular_velocity.x, s.angular_velocity.y, s.angular_velocity.z})
-            out.push_back(value);
-    }
-    return out;
+    return readings_.states(true);
 }
 
 RigidSystem::Work RigidSystem::Work::operator+(const Work& more) const noexcept {
@@ -379,24 +259,25 @@ RigidSystem::Work RigidSystem::Work::operator-(const Work& less) const noexcept 
 }
 
 RigidSystem::Work RigidSystem::work_done() const noexcept {
-    const LockedTree::Counters locked = locked_.counters();
-    Work done{matrix_.counters(), rounds_, pgs_iterations_};
-    done = done + Work{pivot_.counters()};
+    const LockedTree::Counters locked = bilateral_.counters();
+    Work done{rows_.matrix.counters(), mixed_.rounds, mixed_.pgs_iterations};
+    done = done + Work{mixed_.counters()};
     done = done + Work{{locked.factorisations, locked.block_operations, 0, locked.solves}};
-    const std::uint64_t readings = (1 + static_cast<std::uint64_t>(method_.refinements)) *
-                                   (1 + static_cast<std::uint64_t>(method_.corrections));
-    done = done + Work{{plane_solves_, plane_solves_ * plane_.blocks(), 0, plane_solves_ * readings}};
-    return contacts_ ? done + Work{contacts_->factor_counters()} : done;
+    const std::uint64_t readings = (1 + static_cast<std::uint64_t>(model_.method.refinements)) *
+                                   (1 + static_cast<std::uint64_t>(model_.method.corrections));
+    done = done +
+           Work{{plane_.solves(), plane_.solves() * plane_.step().blocks(), 0, plane_.solves() * readings}};
+    return mixed_.contacts() ? done + Work{mixed_.contacts()->factor_counters()} : done;
 }
 
 void RigidSystem::count(RunReport& report, std::int64_t steps) const {
-    const std::int64_t substeps = steps * method_.substeps;
+    const std::int64_t substeps = steps * model_.method.substeps;
     for (const Break& at : joints_.breaks)
-        report.broken.push_back({at.joint, (at.step + method_.substeps - 1) / method_.substeps,
-                                 static_cast<double>(at.step) * h_, at.force, at.torque});
+        report.broken.push_back({at.joint, (at.step + model_.method.substeps - 1) / model_.method.substeps,
+                                 static_cast<double>(at.step) * model_.h, at.force, at.torque});
     report.counters["steps"] = steps;
     report.counters["substeps"] = substeps;
-    report.counters["rows_assembled"] = static_cast<std::int64_t>(rows_) * substeps;
+    report.counters["rows_assembled"] = static_cast<std::int64_t>(rows_.rows()) * substeps;
     const Work done = work_done() - work_taken_back_;
     const BlockLdlt::Counters& work = done.factors;
     const auto put = [&report](const char* name, std::uint64_t value) {
@@ -408,23 +289,19 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     put("back_substitutions", work.solves);
     put("pivot_rounds", done.rounds);
     put("sweeps", done.pgs_iterations);
-    if (composed_) {
+    if (model_.composed) {
         report.counters["newton_iterations"] = live_.newton_iterations;
         report.counters["halved_steps"] = live_.halved_steps;
     }
-    if (!loops_.empty()) report.counters["redundancy_looks"] = live_.looks;
-    if (sleep_rules_.on()) {
+    if (!bilateral_.loops.empty()) report.counters["redundancy_looks"] = live_.looks;
+    if (sleeping_.is_on()) {
         report.counters["asleep"] = static_cast<std::int64_t>(live_.sleep.sleepers);
         report.counters["slept_steps"] = live_.sleep.slept;
     }
     put("stopped_impacts", live_.stopped);
     put("contacts", 0);  // the same names with and without a collision stage, so that runs can be compared
-    std::int64_t moving = 0;
-    for (const BodyConstants& body : constants_) moving += body.moves() ? 1 : 0;
-    report.counters["force_evaluations"] =
-        substeps * (static_cast<std::int64_t>(springs_.size() + turning_springs_.size()) +
-                    static_cast<std::int64_t>(fields_.size()) * moving);
-    report.residual = residual_;
+    report.counters["force_evaluations"] = substeps * forces_.evaluations();
+    report.residual = mixed_.residual;
     if (const Unsettled& left = live_.unsettled; left.body >= 0) {
         report.residual = std::max(report.residual, left.residual);
         if (report.status == Status::completed) {
@@ -434,11 +311,11 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
                 report.reason =
                     "has sunk into another by a fiftieth of the smaller one's radius; use more iterations, "
                     "smaller time steps or the direct solver";
-            report.failed_step = (left.step + method_.substeps - 1) / method_.substeps;
+            report.failed_step = (left.step + model_.method.substeps - 1) / model_.method.substeps;
         }
     }
-    if (!contacts_) return;
-    const ContactCounters contact = contacts_->counters();
+    if (!mixed_.contacts()) return;
+    const ContactCounters contact = mixed_.contacts()->counters();
     put("contacts", contact.contacts);
     put("impacts", contact.impacts);
     put("stopped_impacts", contact.stopped + live_.stopped);

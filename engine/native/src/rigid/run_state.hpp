@@ -1,11 +1,13 @@
 // What a run of rigid bodies goes on from, beside its joints and contacts.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
 #include "linear/large_array.hpp"
 #include "linear/vec.hpp"
+#include "rigid/joint_set.hpp"
 #include "rigid/rigid_state.hpp"
 #include "rigid/sleep.hpp"
 
@@ -64,6 +66,17 @@ struct RigidState {
     std::vector<int> guess_order;
     int parts = 1;                  // of a step, each of which tension allows
     std::int64_t tension_look = 0;  // steps until the next look at it
+
+    bool asleep(int body) const noexcept { return sleep.sleepers > 0 && sleep.island[body] != 0; }
+    void note_unsettled(int body, double residual, bool sunk = false) {
+        if (unsettled.body < 0) unsettled.body = body, unsettled.step = step, unsettled.sunk = sunk;
+        unsettled.residual = std::max(unsettled.residual, residual);
+    }
 };
+
+/// Nothing is asked of a joint of sleepers: it holds what it held.
+inline bool rests(const JointBlock& block, const RigidState& live) noexcept {
+    return (block.first >= 0 && live.asleep(block.first)) || (block.second >= 0 && live.asleep(block.second));
+}
 
 }  // namespace spook

@@ -16,7 +16,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "rigid/rigid_system.hpp"
+#include "rigid/sleeping.hpp"
 #include "rigid/tolerances.hpp"
 
 namespace spook {
@@ -27,15 +27,15 @@ using namespace tolerances::sleep;
 
 }  // namespace
 
-void RigidSystem::take_sleep(const RigidScene& scene) {
-    if (!(method_.sleep_speed > 0.0) || !fresh_contacts_ || !fresh_contacts_->possible()) return;
-    SleepRules& rules = sleep_rules_;
-    rules.may.assign(constants_.size(), 0);
-    for (const int i : constrained_) rules.may[i] = 1;
-    for (std::size_t i = 0; i < floaters_.size(); ++i)
-        if (!floaters_[i].empty()) rules.may[i] = 0;
-    std::vector<char> driven(scene.joints.size(), !load_dependent_.empty());
-    for (const TimeDrive& drive : drives_) {
+void Sleeping::take(const RigidScene& scene) {
+    if (!(model_.method.sleep_speed > 0.0) || !mixed_.may_touch()) return;
+    SleepRules& rules = rules_;
+    rules.may.assign(model_.constants.size(), 0);
+    for (const int i : model_.constrained) rules.may[i] = 1;
+    for (const int i : model_.constrained)
+        if (forces_.floats(i)) rules.may[i] = 0;
+    std::vector<char> driven(scene.joints.size(), mixed_.follow_load());
+    for (const TimeDrive& drive : forces_.drives()) {
         if (drive.kind == DriveKind::load) rules.may[drive.index] = 0;
         if (drive.kind == DriveKind::motor || drive.kind == DriveKind::push || drive.kind == DriveKind::rest)
             driven[drive.index] = 1;
@@ -46,121 +46,113 @@ void RigidSystem::take_sleep(const RigidScene& scene) {
         bodies.insert(bodies.end(), joints_.others(k).begin(), joints_.others(k).end());
         std::erase_if(bodies, [](int body) { return body < 0; });
         const auto first =
-            std::find_if(bodies.begin(), bodies.end(), [this](int i) { return constants_[i].moves(); });
+            std::find_if(bodies.begin(), bodies.end(), [this](int i) { return model_.constants[i].moves(); });
         for (const int body : bodies) {
             if (driven[blocks[k].joint]) rules.may[body] = 0;
             if (first != bodies.end() && body != *first) rules.ties.emplace_back(*first, body);
         }
     }
-    for (const std::vector<SpringForce>* springs : {&springs_, &turning_springs_})
-        for (const SpringForce& spring : *springs)
-            if (spring.ends[0].body >= 0 && spring.ends[1].body >= 0)
-                rules.ties.emplace_back(spring.ends[0].body, spring.ends[1].body);
-    for (int i = 0; i < bodies(); ++i) {
-        const BodyConstants& body = constants_[i];
-        double reach = fresh_contacts_->bodies().radius[i];
+    forces_.each_spring([&rules](const SpringForce& spring) {
+        if (spring.ends[0].body >= 0 && spring.ends[1].body >= 0)
+            rules.ties.emplace_back(spring.ends[0].body, spring.ends[1].body);
+    });
+    for (int i = 0; i < model_.bodies(); ++i) {
+        const BodyConstants& body = model_.constants[i];
+        double reach = mixed_.surfaces()->bodies().radius[i];
         if (body.motion == Motion::kinematic && reach == 0.0) reach = far;  // a plane
         if (body.moves() && !body.particle)
             reach = std::max(
                 reach, std::sqrt(std::max({body.inertia.x, body.inertia.y, body.inertia.z}) / body.mass));
         rules.reach.push_back(reach);
     }
-    rules.after = static_cast<std::int64_t>(std::max(1.0, std::ceil(method_.sleep_after / h_ - 1e-9)));
-    start_places_.resize(constants_.size());
+    rules.after =
+        static_cast<std::int64_t>(std::max(1.0, std::ceil(model_.method.sleep_after / model_.h - 1e-9)));
+    start_places_.resize(model_.constants.size());
 }
 
-void RigidSystem::begin_sleep() {
+void Sleeping::begin() {
     live_.sleep = {};
-    if (!sleep_rules_.on()) return;
-    live_.sleep.island.assign(constants_.size(), 0);
-    live_.sleep.quiet.assign(constants_.size(), 0);
-}
-
-/// Nothing is asked of a joint of sleepers: it holds what it held.
-bool RigidSystem::rests(int block) const noexcept {
-    const JointBlock& of = joints_.blocks()[block];
-    return (of.first >= 0 && asleep(of.first)) || (of.second >= 0 && asleep(of.second));
-}
-
-/// Whether an island of what parts sleeps, and nothing is to be parted there.
-bool RigidSystem::rests(const std::vector<int>& members) const {
-    return live_.sleep.sleepers > 0 && std::all_of(members.begin(), members.end(), [this](int k) {
-               return asleep(constrained_[k]) && projection_->velocity[k] == Vec6{};
-           });
+    if (!rules_.on()) return;
+    live_.sleep.island.assign(model_.constants.size(), 0);
+    live_.sleep.quiet.assign(model_.constants.size(), 0);
 }
 
 /// Rows of sleepers are read where all rows are while others are solved with bounds.
-void RigidSystem::keep_jacobians() {
+void Sleeping::keep_jacobians() {
     for (std::size_t k = 0; k < joints_.blocks().size(); ++k) {
         const int block = static_cast<int>(k);
-        if (!rests(block)) continue;
-        RowBlock& rows = mixed_.rows[k];
+        if (!rests(joints_.blocks()[k], live_)) continue;
+        RowBlock& rows = mixed_.system.rows[k];
         const auto numbers = 6 * static_cast<std::size_t>(rows.size);
-        std::copy_n(jacobian(block, false), numbers, rows.first_jacobian[0].data());
-        std::copy_n(jacobian(block, true), numbers, rows.second_jacobian[0].data());
+        std::copy_n(rows_.jacobian(block, false), numbers, rows.first_jacobian[0].data());
+        std::copy_n(rows_.jacobian(block, true), numbers, rows.second_jacobian[0].data());
     }
 }
 
 /// Where bodies are as a step begins.
-void RigidSystem::note_places() {
-    for (const int i : constrained_) {
+void Sleeping::note_places() {
+    for (const int i : model_.constrained) {
         start_places_[i].displacement = live_.bodies[i].displacement;
         start_places_[i].turn = live_.bodies[i].turn;
     }
 }
 
+void Sleeping::note_velocities() {
+    for (const int i : model_.constrained) start_places_[i].velocity = live_.bodies[i].velocity;
+}
+
 /// Whether a body's surface was slower in the step than what sleeps may be, by its velocities and by where it got [m/s]; and
 /// at least half of its load was held: what falls is slow at first, and not at rest.
-bool RigidSystem::still(int i) const noexcept {
+bool Sleeping::still(int i) const noexcept {
     const BodyState& s = live_.bodies[i];
     const auto& [displacement, velocity, start_turn] = start_places_[i];
-    const Vec3 load = h_ * acceleration_[i], gained = s.velocity - velocity;
+    const Vec3 load = model_.h * forces_.acceleration(i), gained = s.velocity - velocity;
     if (dot(gained, load) > 0.5 * dot(load, load)) return false;
-    const double way = norm(s.displacement - displacement) / h_;
+    const double way = norm(s.displacement - displacement) / model_.h;
     const double speed = std::max(norm(s.velocity), way);
-    if (constants_[i].particle) return speed < method_.sleep_speed;
+    if (model_.constants[i].particle) return speed < model_.method.sleep_speed;
     const Quat turn = s.turn * conjugate(start_turn);
-    const double turned = 2.0 * norm(Vec3{turn.x, turn.y, turn.z}) / h_;
-    return speed + sleep_rules_.reach[i] * std::max(norm(s.angular_velocity), turned) < method_.sleep_speed;
+    const double turned = 2.0 * norm(Vec3{turn.x, turn.y, turn.z}) / model_.h;
+    return speed + rules_.reach[i] * std::max(norm(s.angular_velocity), turned) < model_.method.sleep_speed;
 }
 
 /// The end of a step: what was met by a displaced body is awake, and islands that have been at rest fall asleep.
-void RigidSystem::sleep() {
-    if (!sleep_rules_.on()) return;
+void Sleeping::sleep() {
+    if (!rules_.on()) return;
     Sleep& sleep = live_.sleep;
-    if (!contacts_->woken().empty()) wake(contacts_->woken());
+    if (!mixed_.contacts()->woken().empty()) wake(mixed_.contacts()->woken());
     sleep.slept += static_cast<std::int64_t>(sleep.sleepers);
     const bool broke = !joints_.breaks.empty() && joints_.breaks.back().step == live_.step;
     bool some = false;
-    for (const int i : constrained_) {
-        if (asleep(i)) continue;
-        const bool quiet = sleep_rules_.may[i] != 0 && !broke && still(i);
-        sleep.quiet[i] = quiet ? std::min(sleep.quiet[i] + 1, sleep_rules_.after) : 0;
-        some = some || sleep.quiet[i] == sleep_rules_.after;
+    for (const int i : model_.constrained) {
+        if (live_.asleep(i)) continue;
+        const bool quiet = rules_.may[i] != 0 && !broke && still(i);
+        sleep.quiet[i] = quiet ? std::min(sleep.quiet[i] + 1, rules_.after) : 0;
+        some = some || sleep.quiet[i] == rules_.after;
     }
     if (!some) return;
-    scratch_.finder.begin(bodies());
-    std::vector<char> kept_up(constants_.size(), 0);
+    scratch_.finder.begin(model_.bodies());
+    std::vector<char> kept_up(model_.constants.size(), 0);
     const auto tie = [&](int a, int b) {
         for (const auto& [one, other] : {IndexPair{a, b}, IndexPair{b, a}})
             if (is_moving(other)) kept_up[one] = 1;
-        scratch_.finder.tie(constants_[a].moves() ? a : -1, constants_[b].moves() ? b : -1);
+        scratch_.finder.tie(model_.constants[a].moves() ? a : -1, model_.constants[b].moves() ? b : -1);
     };
-    for (const auto& [a, b] : sleep_rules_.ties) tie(a, b);
-    for (const CachedContact& cached : contacts_->cache().points) {
+    for (const auto& [a, b] : rules_.ties) tie(a, b);
+    for (const CachedContact& cached : mixed_.contacts()->cache().points) {
         tie(cached.contact.first, cached.contact.second);
-        if (contacts_->surfaces().is_conveyed(cached.contact))
+        if (mixed_.contacts()->surfaces().is_conveyed(cached.contact))
             kept_up[cached.contact.first] = kept_up[cached.contact.second] = 1;
     }
-    for (const int i : constrained_) scratch_.finder.tie(i, i);
+    for (const int i : model_.constrained) scratch_.finder.tie(i, i);
     const Islands& islands = scratch_.finder.find();
     std::vector<char> awake(static_cast<std::size_t>(islands.count), 0);
-    for (const int i : constrained_)
-        if (sleep.quiet[i] < sleep_rules_.after || kept_up[i]) awake[islands.of_body[i]] = 1;
+    for (const int i : model_.constrained)
+        if (sleep.quiet[i] < rules_.after || kept_up[i]) awake[islands.of_body[i]] = 1;
     std::vector<int> tired, first(static_cast<std::size_t>(islands.count), 0);
-    for (const int i : constrained_) {
+    for (const int i : model_.constrained) {
         const int island = islands.of_body[i];
-        if (asleep(i) || awake[island]) continue;
+        if (live_.asleep(i) || awake[island]) continue;
         if (first[island] == 0) first[island] = i + 1;
         sleep.island[i] = first[island];
         tired.push_back(i);
@@ -169,8 +161,8 @@ void RigidSystem::sleep() {
     }
     if (tired.empty()) return;
     sleep.sleepers += tired.size();
-    if (!mixed_values_) keep_jacobians();
-    contacts_->put_to_sleep(tired);
+    if (scratch_.last_rows != LastRows::mixed) keep_jacobians();
+    mixed_.contacts()->put_to_sleep(tired);
 }
 
 }  // namespace spook

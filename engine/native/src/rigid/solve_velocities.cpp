@@ -2,8 +2,8 @@
 //
 //     M v₊ − Σ Gᵀ z = M v + h f,    w = G v₊ + Sig z − r,    lower <= z <= upper, w = 0 between the bounds.
 //
-// Bilateral rows alone go to one factorisation (rigid_solve.cpp); rows with bounds are written into mixed_ and solved by
-// pivoting, Newton's method on the cone or projected Gauss–Seidel, see contacts/. Impacts come first, and again where the
+// Bilateral rows alone go to one factorisation (rigid_solve.cpp); rows with bounds are written into MixedRows::system and
+// solved by pivoting, Newton's method on the cone or projected Gauss–Seidel, see contacts/. Impacts come first, and again where the
 // solve brings some about.
 //
 // reads: points, rows of joints, masses, momenta, dv_ext. writes: velocities and angular momenta of bodies, multipliers of
@@ -12,92 +12,163 @@
 #include <cmath>
 
 #include "contacts/friction_pgs.hpp"
-#include "rigid/rigid_system.hpp"
+#include "rigid/mixed_rows.hpp"
 
 namespace spook {
 
-void RigidSystem::solve_velocities() {
-    if (touching_) {
-        if (contacts_->woken().empty()) solve_mixed(true);  // else the step begins anew with their islands
-    } else if (solver_ == RigidSolver::block && live_.sleep.sleepers == 0) {
-        solve_block();
-    } else if (solver_ != RigidSolver::none) {
-        solve_mixed(false);
-    } else {
-        for (int i : constrained_) kick_free_body(i);  // bodies that could touch but do not
-        if (clock_) clock_->mark({Stage::apply_gravity, Stage::apply_loads});
+void MixedRows::take_stages(RigidModel& model) {
+    StageList& stages = model.stages;
+    if (stages.take(Stage::collision)) {
+        stages.take(Stage::impact);
+        if (stages.take(Stage::tangents) && stages.take(Stage::friction)) {
+            stages.take(Stage::orient_friction);
+            stages.take(Stage::move_surfaces);
+        }
+        stages.take(Stage::roll);
+    }
+    const bool wires = stages.take(Stage::rub_wires), tyres = stages.take(Stage::roll_tyres);
+    const bool rub = stages.take(Stage::rub_joints);
+    load_dependent_.take(joints_, wires, tyres, rub);
+    breaks_ = stages.take(Stage::break_joints);
+}
+
+void MixedRows::take_contacts(const RigidScene& scene) {
+    std::vector<char> dynamic;
+    std::vector<SurfaceMaterial> materials;
+    std::vector<IndexPair> joint_pairs;
+    std::vector<char> yielding;
+    for (const JointBlock& block : joints_.blocks()) {
+        joint_pairs.push_back({block.first, block.second});
+        yielding.push_back(joints_.has_spring(block) || gives_way(joints_.constants(block.joint).kind));
+    }
+    for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
+        for (int body : joints_.others(k)) joint_pairs.push_back({joints_.blocks()[k].first, body});
+    for (const RigidBodySpec& spec : scene.bodies) {
+        dynamic.push_back(spec.motion == Motion::dynamic);
+        materials.push_back(spec.material);
+        if (!model_.stages.runs(Stage::friction)) materials.back().friction = 0.0;
+        if (!model_.stages.runs(Stage::orient_friction)) materials.back().direction = {};
+        if (!model_.stages.runs(Stage::move_surfaces)) materials.back().surface_velocity = {};
+        if (!model_.stages.runs(Stage::roll)) materials.back().rolling = materials.back().torsional = 0.0;
+    }
+    const SolverKind solver =
+        model_.stages.runs(Stage::solve_iterative) ? SolverKind::iterative : SolverKind::direct;
+    fresh_contacts_.emplace(
+        Detection(scene.colliders, dynamic, scene.no_contact), materials, model_.solver_index,
+        ContactOptions{model_.h, model_.method.friction, solver, model_.method.iterations,
+                       model_.method.residual_tolerance, model_.method.floor, model_.method.refinements,
+                       model_.method.impacts, model_.method.unsettled_residual},
+        joint_pairs, yielding);
+    for (const JointBlock& block : joints_.blocks())
+        for (const int body : {block.first, block.second})
+            if (body >= 0 && joints_.may_stop(block)) fresh_contacts_->leave_at_start(body);
+    for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
+        for (const int body : joints_.others(k))
+            if (joints_.may_stop(joints_.blocks()[k])) fresh_contacts_->leave_at_start(body);
+}
+
+void MixedRows::begin() {
+    pivot_ = PivotSolver{};
+    pivot_.floor = model_.method.floor;
+    pivot_.refinements = model_.method.refinements;
+    scratch_.last_rows = model_.solver == RigidSolver::block ? LastRows::block : LastRows::mixed;
+    begin_again();
+}
+
+void MixedRows::begin_again() {
+    rounds = pgs_iterations = 0;
+    residual = 0.0;
+    contacts_ = fresh_contacts_;
+    system = MixedSystem{};
+    if (!contacts_ && model_.solver != RigidSolver::pivot && model_.solver != RigidSolver::iterative) return;
+    system.mass.assign(model_.constrained.size(), Mat6{});
+    system.momentum.resize(model_.constrained.size());
+    system.velocity.resize(model_.constrained.size());
+    for (const JointBlock& block : joints_.blocks()) {
+        RowBlock rows;
+        rows.first = block.first < 0 ? -1 : model_.solver_index[block.first];
+        rows.second = block.second < 0 ? -1 : model_.solver_index[block.second];
+        rows.size = block.size;
+        rows.softness = block.softness;
+        rows.rotor = block.rotor;
+        system.rows.push_back(rows);
     }
 }
 
-void RigidSystem::solve_mixed(bool touching) {
-    mixed_values_ = true;
+void MixedRows::solve(bool touching) {
+    scratch_.last_rows = LastRows::mixed;
     const auto blocks = joints_.blocks();
     fill_masses();
     if (touching) lead_events();
     const auto impact_needed = [&] {
-        return touching && stages_.runs(Stage::impact) && contacts_->impact_needed(mixed_);
+        return touching && model_.stages.runs(Stage::impact) && contacts_->impact_needed(system);
     };
-    const Stage solver = stages_.runs(Stage::solve_iterative) ? Stage::solve_iterative : Stage::pivot;
+    const Stage solver = model_.stages.runs(Stage::solve_iterative) ? Stage::solve_iterative : Stage::pivot;
     ContactStage::SolveEnd end;
     scratch_.other_ends.clear();
     scratch_.impulses.assign(blocks.size(), {});
     int corrected = 0;
-    const auto to_correct = [&] { return curved_ && corrected++ < method_.corrections; };
+    const auto to_correct = [&] { return model_.curved && corrected++ < model_.method.corrections; };
     do {
         fill_rows(corrected > 0);
-        if (clock_) clock_->mark(Stage::assemble_rows);
+        clock_.mark(Stage::assemble_rows);
         while (impact_needed()) impact(), corrected = 0;
-        if (clock_ && touching) clock_->mark(Stage::impact);
+        if (touching) clock_.mark(Stage::impact);
         fill_momenta(true);
-        if (clock_) clock_->mark(Stage::assemble_rows);
-        if (touching) end = contacts_->solve(mixed_, scratch_.velocities);
+        clock_.mark(Stage::assemble_rows);
+        if (touching) end = contacts_->solve(system, scratch_.velocities);
         else end.finite = solve_joints();
-        if (clock_) clock_->mark(solver);
+        clock_.mark(solver);
     } while (end.finite && (impact_needed() || ((!touching || end.ends_passed) && find_other_ends()) ||
                             to_correct()));  // the solve may find some that is to come first
     if (touching) judge_contacts();
-    else if (solver_ == RigidSolver::iterative) judge_pgs();
+    else if (model_.solver == RigidSolver::iterative) judge_pgs();
     if (!end.finite) {
-        live_.not_solved = constrained_.front();
+        live_.not_solved = model_.constrained.front();
         return;
     }
     if (contacts_ && !touching) {
         scratch_.next = scratch_.free_velocities;
-        for (std::size_t k = 0; k < constrained_.size(); ++k)
-            scratch_.next[constrained_[k]] = mixed_.velocity[k];
-        if (meet_late()) return solve_mixed(true);
+        for (std::size_t k = 0; k < model_.constrained.size(); ++k)
+            scratch_.next[model_.constrained[k]] = system.velocity[k];
+        if (meet_late()) return solve(true);
     }
     if (touching && !load_dependent_.empty()) {
         load_dependent_.begin();
-        load_dependent_.follow(mixed_, joints_, true);  // for the next step: here bounds are a step late
+        load_dependent_.follow(system, joints_, true);  // for the next step: here bounds are a step late
     }
+    take_multipliers();
+    if (touching) take_velocities(false, [this](int k) { return !contacts_->has_rows(k); });
+    else take_velocities(false, {});
+    forces_.act_wholly();
+    clock_.mark(solver);
+}
+
+void MixedRows::take_multipliers() {
+    const auto blocks = joints_.blocks();
     for (std::size_t k = 0; k < blocks.size(); ++k) {
-        if (rests(static_cast<int>(k))) continue;
+        if (rests(blocks[k], live_)) continue;
         JointSet::State& state = joints_.states[blocks[k].joint];
-        double* multiplier = blocks[k].axial ? state.axial_multiplier.data() : state.multiplier.data();
+        double* multiplier = state.multipliers(blocks[k].axial);
         for (int i = 0; i < blocks[k].size; ++i)
-            multiplier[i] = mixed_.rows[k].multiplier[i] + scratch_.impulses[k][i];
-        live_.stopped += mixed_.rows[k].stop.cut;
+            multiplier[i] = system.rows[k].multiplier[i] + scratch_.impulses[k][i];
+        live_.stopped += system.rows[k].stop.cut;
         if (breaks_ && !blocks[k].axial) joints_.break_overloaded(blocks[k].joint, live_.step);
     }
     std::size_t row = blocks.size();
     scratch_.impulses.resize(row + scratch_.other_ends.size());
     for (const int k : scratch_.other_ends) {
-        joints_.states[blocks[k].joint].axial_multiplier[mixed_.rows[k].stop.row] +=
-            mixed_.rows[row].multiplier[0] + scratch_.impulses[row][0];
+        joints_.states[blocks[k].joint].axial_multiplier[system.rows[k].stop.row] +=
+            system.rows[row].multiplier[0] + scratch_.impulses[row][0];
         ++row;
     }
-    if (touching) take_velocities(false, [this](int k) { return !contacts_->has_rows(k); });
-    else take_velocities(false, {});
-    share_.clear();
-    if (clock_) clock_->mark(solver);
 }
 
-void RigidSystem::fill_masses() {
-    for (std::size_t k = 0; k < constrained_.size(); ++k) {
-        const BodyConstants& body = constants_[constrained_[k]];
-        const BodyState& s = live_.bodies[constrained_[k]];
-        Mat6& mass = mixed_.mass[k];
+void MixedRows::fill_masses() {
+    for (std::size_t k = 0; k < model_.constrained.size(); ++k) {
+        const BodyConstants& body = model_.constants[model_.constrained[k]];
+        const BodyState& s = live_.bodies[model_.constrained[k]];
+        Mat6& mass = system.mass[k];
         for (int row = 0; row < 3; ++row) {
             mass[7 * row] = body.mass;
             for (int column = 0; column < 3; ++column)  // a particle's rotation is never touched
@@ -107,33 +178,33 @@ void RigidSystem::fill_masses() {
     }
 }
 
-void RigidSystem::fill_momenta(bool forces) {
-    for (std::size_t k = 0; k < constrained_.size(); ++k) {
-        const int i = constrained_[k];
+void MixedRows::fill_momenta(bool forces) {
+    for (std::size_t k = 0; k < model_.constrained.size(); ++k) {
+        const int i = model_.constrained[k];
         const BodyState& s = live_.bodies[i];
-        const Vec3 p = constants_[i].mass * (forces ? s.velocity + kick(i) : s.velocity);
-        const Vec3 l = forces ? s.angular_momentum + twist(i) : s.angular_momentum;
-        mixed_.momentum[k] = {p.x, p.y, p.z, l.x, l.y, l.z};
+        const Vec3 p = model_.constants[i].mass * (forces ? s.velocity + forces_.kick(i) : s.velocity);
+        const Vec3 l = forces ? s.angular_momentum + forces_.twist(i) : s.angular_momentum;
+        system.momentum[k] = {p.x, p.y, p.z, l.x, l.y, l.z};
     }
 }
 
-void RigidSystem::take_velocities(bool angular_too, const std::function<bool(int)>& untouched) {
-    for (std::size_t k = 0; k < constrained_.size(); ++k) {
-        const Vec6& v = mixed_.velocity[k];
-        BodyState& s = live_.bodies[constrained_[k]];
+void MixedRows::take_velocities(bool angular_too, const std::function<bool(int)>& untouched) {
+    for (std::size_t k = 0; k < model_.constrained.size(); ++k) {
+        const Vec6& v = system.velocity[k];
+        BodyState& s = live_.bodies[model_.constrained[k]];
         if (untouched && untouched(static_cast<int>(k))) {  // not a bit of it may change
-            if (!angular_too) kick_free_body(constrained_[k]);
+            if (!angular_too) forces_.kick_free_body(model_.constrained[k]);
             continue;
         }
         s.velocity = {v[0], v[1], v[2]};
-        if (constants_[constrained_[k]].particle) continue;
+        if (model_.constants[model_.constrained[k]].particle) continue;
         s.angular_momentum = s.inertia * Vec3{v[3], v[4], v[5]};
         if (angular_too) s.angular_velocity = {v[3], v[4], v[5]};
     }
 }
 
 /// The row of the other end of a block's stop: the coordinate may get there within the step, no further.
-RowBlock RigidSystem::other_end(const RowBlock& block) {
+RowBlock MixedRows::other_end(const RowBlock& block) {
     const int i = block.stop.row;
     RowBlock row;
     row.first = block.first, row.second = block.second;
@@ -146,85 +217,184 @@ RowBlock RigidSystem::other_end(const RowBlock& block) {
 }
 
 /// Whether velocities lead past such ends; in the next solve of this step they have rows.
-bool RigidSystem::find_other_ends() {
+bool MixedRows::find_other_ends() {
     const std::size_t known = scratch_.other_ends.size();
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
-        if (passes_other_end(mixed_.rows[k], mixed_.velocity, h_)) scratch_.other_ends.push_back(k);
+        if (passes_other_end(system.rows[k], system.velocity, model_.h)) scratch_.other_ends.push_back(k);
     return scratch_.other_ends.size() > known;
 }
 
-bool RigidSystem::iterate_joints() {
+bool MixedRows::iterate_joints() {
     std::vector<FrictionPoint> none;
-    const FrictionReport report =
-        solve_iterative(mixed_, none, method_.friction, method_.iterations, method_.residual_tolerance);
-    pgs_iterations_ += static_cast<std::uint64_t>(report.pgs_iterations);
+    const FrictionReport report = solve_iterative(system, none, model_.method.friction,
+                                                  model_.method.iterations, model_.method.residual_tolerance);
+    pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
     return report.finite && settle_joints();
 }
 
 /// Joints that iterations do not settle are solved directly where few are connected: what they leave in each step adds up.
-bool RigidSystem::settle_joints() {
+bool MixedRows::settle_joints() {
     const Islands* islands = nullptr;
     std::vector<std::size_t>& rows = scratch_.rows;
     while (true) {
-        const RowsResidual worst = rows_residual(mixed_, {}, method_.friction);
-        if (!(worst.residual > method_.residual_tolerance)) return true;
+        const RowsResidual worst = rows_residual(system, {}, model_.method.friction);
+        if (!(worst.residual > model_.method.residual_tolerance)) return true;
         const auto island = [&](const RowBlock& block) {
             return islands->of_body[std::max(block.first, block.second)];
         };
         if (!islands) {
-            islands = &scratch_.finder.find(mixed_);
+            islands = &scratch_.finder.find(system);
             rows.assign(islands->count, 0);
-            for (const RowBlock& block : mixed_.rows) ++rows[island(block)];
+            for (const RowBlock& block : system.rows) ++rows[island(block)];
         }
-        const int own = island(mixed_.rows[worst.row]);
+        const int own = island(system.rows[worst.row]);
         if (rows[own] > few_rows) return true;
         rows[own] = few_rows + 1;  // once
         std::vector<char>& answered = scratch_.answered;
         answered.clear();
-        for (const RowBlock& block : mixed_.rows) answered.push_back(island(block) != own);
+        for (const RowBlock& block : system.rows) answered.push_back(island(block) != own);
         IslandSolver& direct = scratch_.joint_solver;
         direct.set_backoff({});
-        direct.floor = method_.floor, direct.refinements = method_.refinements;
+        direct.floor = model_.method.floor, direct.refinements = model_.method.refinements;
         std::vector<FrictionPoint> none;
         const FrictionReport report = direct.run(
-            mixed_, none,
+            system, none,
             [this](MixedSystem& part, std::vector<FrictionPoint>& points, DirectSolver& solver) {
-                return solve_friction_direct(part, points, method_.friction, solver);
+                return solve_friction_direct(part, points, model_.method.friction, solver);
             },
             &answered);
-        rounds_ += static_cast<std::uint64_t>(report.pivots);
+        rounds += static_cast<std::uint64_t>(report.pivots);
         if (!report.finite) return false;
     }
 }
 
 /// What PGS may leave of a row, m/s.
-double RigidSystem::pgs_tolerance() const {
+double MixedRows::pgs_tolerance() const {
     double speed = 0.0;
-    for (const Vec6& v : mixed_.velocity) speed = std::max(speed, norm(Vec3{v[0], v[1], v[2]}));
-    return method_.unsettled_residual + 1e-6 * speed;
+    for (const Vec6& v : system.velocity) speed = std::max(speed, norm(Vec3{v[0], v[1], v[2]}));
+    return model_.method.unsettled_residual + 1e-6 * speed;
 }
 
 /// Holds PGS over joints alone to what contacts are held to.
-void RigidSystem::judge_pgs() {
-    const RowsResidual worst = rows_residual(mixed_, {}, method_.friction);
-    residual_ = std::max(residual_, worst.residual);
+void MixedRows::judge_pgs() {
+    const RowsResidual worst = rows_residual(system, {}, model_.method.friction);
+    residual = std::max(residual, worst.residual);
     if (!(worst.residual > pgs_tolerance())) return;
     const int blocks = static_cast<int>(joints_.blocks().size());
-    note_unsettled(body_of(worst.row < blocks ? worst.row : scratch_.other_ends[worst.row - blocks]),
-                   worst.residual);
+    live_.note_unsettled(
+        model_.mover(
+            joints_.blocks()[worst.row < blocks ? worst.row : scratch_.other_ends[worst.row - blocks]]),
+        worst.residual);
 }
 
 /// Takes over what the contact stage has found of its last solve.
-void RigidSystem::judge_contacts() {
+void MixedRows::judge_contacts() {
     const SolveQuality& found = contacts_->quality();
-    residual_ = std::max(residual_, found.residual);
-    if (found.body >= 0) note_unsettled(found.body, found.by, found.sunk);
+    residual = std::max(residual, found.residual);
+    if (found.body >= 0) live_.note_unsettled(found.body, found.by, found.sunk);
 }
 
-void RigidSystem::note_unsettled(int body, double residual, bool sunk) {
-    Unsettled& first = live_.unsettled;
-    if (first.body < 0) first.body = body, first.step = live_.step, first.sunk = sunk;
-    first.residual = std::max(first.residual, residual);
+/// The bodies of a row beyond its first two: into it those that move by themselves, of others their speed.
+void MixedRows::fill_further(int block, RowBlock& rows, BlockRight& numbers,
+                             std::vector<FurtherBody>& beyond) const {
+    beyond.clear();
+    const double* gradient = joints_.other_rows();
+    for (int body : joints_.others(block)) {
+        FurtherBody other{model_.solver_index[body], {}};
+        std::copy_n(gradient, 6, other.jacobian.data());
+        gradient += 6;
+        const BodyState& s = live_.bodies[body];
+        if (other.body >= 0) beyond.push_back(other);
+        else
+            numbers.right[0] -=
+                dot(other.jacobian, {s.velocity.x, s.velocity.y, s.velocity.z, s.angular_velocity.x,
+                                     s.angular_velocity.y, s.angular_velocity.z});
+    }
+    rows.further = beyond;
+}
+
+/// `solved`: whether the curvature of the rows is that of a solution, not of the velocities at hand.
+void MixedRows::fill_rows(bool solved) {
+    if (model_.curved) curvature_.curve(solved, &system.velocity);
+    const auto blocks = joints_.blocks();
+    system.rows.resize(blocks.size());
+    further_.resize(blocks.size());
+    std::size_t first_row = 0;
+    for (std::size_t k = 0; k < blocks.size(); ++k) {
+        RowBlock& rows = system.rows[k];
+        const std::size_t at = std::exchange(first_row, first_row + static_cast<std::size_t>(blocks[k].size));
+        if (rests(blocks[k], live_)) {
+            rows.right = rows.lower = rows.upper = rows.multiplier = Vec6{};
+            rows.stop = {};
+            continue;
+        }
+        BlockRight numbers;
+        joints_.assemble(static_cast<int>(k), live_.bodies, rows.first_jacobian[0].data(),
+                         rows.second_jacobian[0].data(), numbers);
+        if (!joints_.others(static_cast<int>(k)).empty())
+            fill_further(static_cast<int>(k), rows, numbers, further_[k]);
+        for (int body : {blocks[k].first, blocks[k].second}) {
+            if (body < 0 || model_.constants[body].motion != Motion::kinematic) continue;
+            const BodyState& s = live_.bodies[body];
+            const Vec6 given{s.velocity.x,         s.velocity.y,         s.velocity.z,
+                             s.angular_velocity.x, s.angular_velocity.y, s.angular_velocity.z};
+            const auto& jacobian = body == blocks[k].first ? rows.first_jacobian : rows.second_jacobian;
+            for (int i = 0; i < rows.size; ++i) numbers.right[i] -= dot(jacobian[i], given);
+            if (const int i = numbers.stop.row; i >= 0) numbers.stop.given += dot(jacobian[i], given);
+        }
+        for (int i = 0; i < rows.size; ++i)
+            numbers.right[i] -= curvature_.bend(at + static_cast<std::size_t>(i));
+        if (const int i = rows.rotor; i >= 0) numbers.right[i] -= rows.softness[i] * scratch_.impulses[k][i];
+        rows.right = numbers.right;
+        rows.lower = numbers.lower;
+        rows.upper = numbers.upper;
+        rows.stop = numbers.stop;
+        if (numbers.softness) std::copy_n(numbers.softness, rows.size, rows.softness.data());
+        if (const int i = rows.stop.row;
+            i >= 0)  // an impact is over long before the step is: its row does not give way
+            rows.softness[i] = rows.stop.rebound != 0.0 ? 0.0 : blocks[k].softness[i];
+    }
+    for (const int k : scratch_.other_ends) {
+        system.rows[k].stop.both = true;
+        system.rows.push_back(other_end(system.rows[k]));
+    }
+}
+
+/// Rows without contacts: solved again while bounds that follow other rows move. Iterations that do not get there in a few
+/// rounds bound the next step by this one.
+bool MixedRows::solve_joints() {
+    load_dependent_.begin();
+    const bool iterative = model_.solver == RigidSolver::iterative;
+    bool same_matrix = false;
+    for (int round = 0;; ++round) {
+        bool finite = true;
+        if (iterative) {
+            finite = iterate_joints();
+        } else {
+            const PivotReport report = pivot_.solve(system, same_matrix);
+            rounds += static_cast<std::uint64_t>(report.rounds);
+            finite = report.finite;
+        }
+        if (!finite || load_dependent_.empty()) return finite;
+        if (iterative && round == LoadDependentBounds::PATIENT) {
+            load_dependent_.begin();
+            load_dependent_.follow(system, joints_, true);
+            return true;
+        }
+        const auto [off, same] = load_dependent_.follow(system, joints_);
+        same_matrix = same;
+        if (off <= LoadDependentBounds::AGREED) return true;
+        if (round < LoadDependentBounds::MOST_ROUNDS) continue;
+        // In speeds: what the missing impulse would have given the lightest of its bodies.
+        const RowBlock& rows = system.rows[load_dependent_.worst()];
+        const int body = model_.constrained[rows.second >= 0 ? rows.second : rows.first];
+        double most = 0.0;
+        for (int i = 0; i < rows.size; ++i) most = std::max(most, std::abs(rows.multiplier[i]));
+        const double missed = off * most / model_.constants[body].mass;
+        residual = std::max(residual, missed);
+        if (missed > model_.method.unsettled_residual) live_.note_unsettled(body, missed);
+        return true;
+    }
 }
 
 }  // namespace spook

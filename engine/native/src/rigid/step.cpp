@@ -24,65 +24,94 @@ using namespace tolerances::step;
 }  // namespace
 
 void RigidSystem::step() {
-    begin_step();
+    if (mixed_.contacts() || model_.constants.size() >= looking_from) Watch::look();
+    ++live_.step;
+    clock_.start();
+    if (sleeping_.is_on()) sleeping_.note_places();
     if (!live_.velocity_ready) find_velocities();
     live_.velocity_ready = false;
-    keep_first_joints();
+    if (replaying_ &&
+        early_joints_.empty()) {  // of a block that is taken again: as its first step leaves them
+        deliver();
+        early_joints_ = joints_.states;
+    }
     integrate();
-    if (clock_) clock_->mark(Stage::integrate_positions);
-    project_positions();
-    if (clock_) clock_->mark(Stage::project_positions);
+    clock_.mark(Stage::integrate_positions);
+    if (!plane_.at_hand()) projection_.project_positions();  // in a plane nothing overlaps
+    clock_.mark(Stage::project_positions);
     end_step();
-    if (clock_) clock_->mark(Stage::integrate_positions);
-    sleep();
-    if (clock_) clock_->mark(Stage::sleep);
+    clock_.mark(Stage::integrate_positions);
+    if (sleeping_.is_on()) sleeping_.sleep();
+    clock_.mark(Stage::sleep);
 }
 
 /// From wake to solve velocities; also ahead of the step, for samples that need them.
 void RigidSystem::find_velocities() {
-    if (in_plane_ && plane_velocities()) return;
+    if (plane_.is_used() && plane_.solve()) return clock_.mark(Stage::solve_block);
     begin_velocities();
-    wake();
-    if (clock_) clock_->mark(Stage::sleep);
+    sleeping_.wake();
+    clock_.mark(Stage::sleep);
     do {
-        if (all_sleep()) return sleep_through();
-        leave_out_sleepers_for_now();
-        apply_forces();
-        detect();
-        solve_velocities();  // in turn with impact()
+        if (sleeping_.sleep_through()) return;
+        leave_out_sleepers();
+        forces_.apply_forces();
+        mixed_.detect();
+        solve_velocities();
     } while (wake_met());
-}
-
-void RigidSystem::begin_step() {
-    if (contacts_ || constants_.size() >= looking_from) Watch::look();
-    ++live_.step;
-    if (clock_) clock_->start();
-    if (sleep_rules_.on()) note_places();
 }
 
 /// What the velocities of a step begin with, however often they are found: those of the step before, and loads that follow the time.
 void RigidSystem::begin_velocities() {
     scratch_.begin();
-    if (half_step_)
-        for (int i = 0; i < bodies(); ++i)
-            live_.before[i] = {live_.bodies[i].velocity, live_.bodies[i].angular_momentum};
-    if (sleep_rules_.on())
-        for (const int i : constrained_) start_places_[i].velocity = live_.bodies[i].velocity;
-    if (!load_follows_.empty() || !drives_.empty()) follow_time();
+    if (model_.half_step) half_step_.note_before();
+    if (sleeping_.is_on()) sleeping_.note_velocities();
+    if (forces_.follow_the_time()) forces_.follow_time();
 }
 
-/// Of a block of steps that is taken again: its joints as the first step left them.
-void RigidSystem::keep_first_joints() {
-    if (!replaying_ || !early_joints_.empty()) return;
-    deliver();
-    early_joints_ = joints_.states;
+/// Sleepers get no part of their forces; the state is kept, since the velocities may show that some are met.
+void RigidSystem::leave_out_sleepers() {
+    if (live_.sleep.sleepers == 0) return;
+    keep(before_waking_);
+    residual_before_waking_ = mixed_.residual;
+    forces_.give_out();
+    forces_.leave_out_sleepers();
+}
+
+/// Whether sleepers were met: they are awake then, and all is as it was, to be found anew.
+bool RigidSystem::wake_met() {
+    if (live_.sleep.sleepers == 0) return false;
+    forces_.act_wholly();
+    if (mixed_.contacts()->woken().empty()) return false;
+    const std::vector<int> woken = mixed_.contacts()->woken();
+    go_back(before_waking_);
+    mixed_.residual = residual_before_waking_;
+    sleeping_.wake(woken);
+    return true;
+}
+
+/// By the solver of the method; rows that all hold go to one factorisation as long as nothing touches.
+void RigidSystem::solve_velocities() {
+    const ContactStage* contacts = mixed_.contacts();
+    if (!mixed_.touching() && model_.solver == RigidSolver::none) {
+        for (int i : model_.constrained) forces_.kick_free_body(i);  // bodies that could touch but do not
+        return clock_.mark({Stage::apply_gravity, Stage::apply_loads});
+    }
+    if (!mixed_.touching() && model_.solver == RigidSolver::block && live_.sleep.sleepers == 0) {
+        if (!bilateral_.find(contacts)) return;
+        if (!contacts || !mixed_.meet_late()) return bilateral_.take_velocities(contacts);
+    }
+    bilateral_.forget();
+    if (!mixed_.touching()) mixed_.solve(false);
+    else if (contacts->woken().empty()) mixed_.solve(true);  // else the step begins anew with their islands
 }
 
 void RigidSystem::end_step() {
     ++live_.moved;
-    if (at_hand_ && joints_.follows()) write_plane();
+    if (plane_.at_hand() && joints_.follows()) plane_.write();
     joints_.follow(live_.bodies);
-    if (method_.corrections > 0 && !composed_) note_energy();
+    if (model_.method.corrections == 0 || model_.composed || !energy_.is_due()) return;
+    if (plane_.at_hand()) plane_.write();
+    energy_.note(live_.moved == 1 ? readings_.penetration() : 0.0);
 }
 
 }  // namespace spook

@@ -9,11 +9,13 @@
 #include "linear/large_array.hpp"
 #include "linear/vec.hpp"
 #include "rigid/joint_state.hpp"
+#include "rigid/rigid_model.hpp"
 #include "rigid/rigid_state.hpp"
 
 namespace spook {
 
 struct StepScratch {
+    LastRows last_rows = LastRows::block;  // stays, for those that read joints between steps
     // detect(), per body of the scene:
     std::vector<Pose> poses;
     std::vector<Vec6> velocities, free_velocities, next;  // at the start; with forces; with joints as well
@@ -26,7 +28,6 @@ struct StepScratch {
     // solve_velocities():
     std::vector<int> other_ends;  // blocks of the step's joints whose stops have a row for each end
     std::vector<Vec6> impulses;   // of the step's impacts, per block of rows
-    std::vector<double> rates;    // of tension, by body
     IslandSolver joint_solver;
     std::vector<std::size_t> rows;  // by island
     std::vector<char> answered;     // rows

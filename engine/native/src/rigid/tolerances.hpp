@@ -16,13 +16,6 @@ inline constexpr int LOOKS =
     16;  // steps of joints alone from one look to the next: one costs a tenth of a plane step
 }  // namespace tolerances::energy_made
 
-// geometric_stiffness.cpp
-namespace tolerances::geometric_stiffness {
-inline constexpr double ASIDE = 1e-6;  // of the energy of its spin: what a body has by going round its joint
-inline constexpr double TAUT =
-    0.3;  // of h² F / (m r): a body that is lighter than this for its load is loaded
-}  // namespace tolerances::geometric_stiffness
-
 // impact.cpp
 namespace tolerances::impact {
 inline constexpr double again =
@@ -128,6 +121,13 @@ inline constexpr double STRETCH =
 inline constexpr double FAR = 1000.0;       // rad
 inline constexpr double STEADY = 0x1p-106;  // square of the rounding of a direction
 }  // namespace tolerances::rotation
+
+// runaway.cpp
+namespace tolerances::runaway {
+inline constexpr double ASIDE = 1e-6;  // of the energy of its spin: what a body has by going round its joint
+inline constexpr double TAUT =
+    0.3;  // of h² F / (m r): a body that is lighter than this for its load is loaded
+}  // namespace tolerances::runaway
 
 // sleep.cpp
 namespace tolerances::sleep {

@@ -39,4 +39,23 @@ private:
     std::array<bool, STAGES> kept_{};
 };
 
+/// The clock of a run, where one was asked for.
+class StageTimer {
+public:
+    explicit StageTimer(StageClock* clock = nullptr) noexcept : clock_(clock) {}
+    bool is_on() const noexcept { return clock_ != nullptr; }
+    void start() const noexcept {
+        if (clock_) clock_->start();
+    }
+    void mark(Stage stage) const noexcept {
+        if (clock_) clock_->mark(stage);
+    }
+    void mark(std::initializer_list<Stage> stages) const noexcept {
+        if (clock_) clock_->mark(stages);
+    }
+
+private:
+    StageClock* clock_;
+};
+
 }  // namespace spook

@@ -1,0 +1,31 @@
+// Energy that comes out of nothing; see energy_made.cpp.
+#pragma once
+
+#include "rigid/forces.hpp"
+#include "run/run_loop.hpp"
+
+namespace spook {
+
+class EnergyMade {
+public:
+    EnergyMade(const RigidModel& model, RigidState& live, const JointSet& joints,
+               const Forces& forces) noexcept
+        : model_(model), live_(live), joints_(joints), forces_(forces) {}
+
+    void begin();
+    /// Whether this step is to be noted, where position and velocity are of one moment: what it came to.
+    bool is_due() const noexcept;
+    void note(double penetration);
+    /// Asked once the final state was read.
+    void judge(RunReport& report) const;
+
+private:
+    bool has_power() const noexcept;
+
+    const RigidModel& model_;
+    RigidState& live_;
+    const JointSet& joints_;
+    const Forces& forces_;
+};
+
+}  // namespace spook

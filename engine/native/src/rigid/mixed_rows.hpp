@@ -1,0 +1,107 @@
+// Rows with bounds and contacts beside those of joints that all hold: impacts, and the velocities of the step, by pivoting,
+// Newton's method or projected Gauss–Seidel; see solve_velocities.cpp, detect.cpp and impact.cpp.
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "contacts/contact_stage.hpp"
+#include "contacts/pivot_solver.hpp"
+#include "rigid/forces.hpp"
+#include "rigid/load_dependent_bounds.hpp"
+#include "rigid/row_curvature.hpp"
+#include "rigid/step_scratch.hpp"
+
+namespace spook {
+
+class MixedRows {
+public:
+    MixedRows(const RigidModel& model, RigidState& live, JointSet& joints, Forces& forces,
+              RowCurvature& curvature, StepScratch& scratch, const StageTimer& clock) noexcept
+        : model_(model),
+          live_(live),
+          joints_(joints),
+          forces_(forces),
+          curvature_(curvature),
+          scratch_(scratch),
+          clock_(clock) {}
+
+    MixedSystem system;     // rows of joints first, block by block, then those of a step's contacts
+    double residual = 0.0;  // m/s, the largest an iterative solve stopped at
+    std::uint64_t rounds = 0, pgs_iterations = 0;
+
+    /// Which stages run here.
+    void take_stages(RigidModel& model);
+    /// The surfaces that may touch, of a scene with the stage collision; `dynamic` bodies are constrained then.
+    void take_contacts(const RigidScene& scene);
+    void begin();
+    /// Once more from the start of the run.
+    void begin_again();
+    bool follow_load() const noexcept { return !load_dependent_.empty(); }
+
+    /// The contacts of a run, and whether there can be any; null without the stage.
+    ContactStage* contacts() noexcept { return contacts_ ? &*contacts_ : nullptr; }
+    const ContactStage* contacts() const noexcept { return contacts_ ? &*contacts_ : nullptr; }
+    const ContactStage* surfaces() const noexcept { return fresh_contacts_ ? &*fresh_contacts_ : nullptr; }
+    bool may_touch() const noexcept { return fresh_contacts_ && fresh_contacts_->possible(); }
+    /// Whether the step has any.
+    bool touching() const noexcept { return touching_; }
+    void touch_nothing() noexcept { touching_ = false; }
+
+    /// The stage: contact points of the step.
+    void detect();
+    /// In a step that began without contacts, whether bodies meet because of what joints make of their velocities,
+    /// scratch.next: cast along their own they do not. Then the step is to be solved with contacts.
+    bool meet_late();
+    /// The stages: impacts, and velocities of all bodies that have rows.
+    void solve(bool touching);
+
+    /// Of a block of rows of joints, as the last solve had it, which may have been that of `rows`.
+    const double* jacobian(const BlockRows& rows, int block, bool second) const noexcept {
+        if (scratch_.last_rows != LastRows::mixed) return rows.jacobian(block, second);
+        const RowBlock& of = system.rows[block];
+        return (second ? of.second_jacobian : of.first_jacobian)[0].data();
+    }
+    double* jacobian(BlockRows& rows, int block, bool second) noexcept {
+        return const_cast<double*>(std::as_const(*this).jacobian(rows, block, second));
+    }
+
+    /// The bodies of a row of joints beyond its first two: into it those that move by themselves, of others their speed.
+    void fill_further(int block, RowBlock& rows, BlockRight& numbers, std::vector<FurtherBody>& beyond) const;
+    BlockLdlt::Counters counters() const noexcept { return pivot_.counters(); }
+
+private:
+    void note_start_of_contacts();
+    void lead_events();
+    void impact();
+    void fill_masses();
+    void fill_momenta(bool forces);
+    void fill_rows(bool solved = false);
+    static RowBlock other_end(const RowBlock& block);
+    bool find_other_ends();
+    void take_velocities(bool angular_too, const std::function<bool(int)>& untouched);
+    void take_multipliers();
+    bool solve_joints();
+    bool iterate_joints();
+    bool settle_joints();
+    double pgs_tolerance() const;
+    void judge_pgs();
+    void judge_contacts();
+
+    const RigidModel& model_;
+    RigidState& live_;
+    JointSet& joints_;
+    Forces& forces_;
+    RowCurvature& curvature_;
+    StepScratch& scratch_;
+    const StageTimer& clock_;
+    std::vector<std::vector<FurtherBody>> further_;  // per block of joints, of its rows
+    PivotSolver pivot_;
+    LoadDependentBounds load_dependent_;
+    bool breaks_ = false;  // whether some joint may
+    bool touching_ = false;
+    std::optional<ContactStage> contacts_, fresh_contacts_;
+};
+
+}  // namespace spook

@@ -1,0 +1,79 @@
+#include "rigid/runaway.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "rigid/tolerances.hpp"
+
+namespace spook {
+
+namespace {
+
+using namespace tolerances::runaway;
+
+/// Whether a joint pulls at one of its bodies, of mass m at an arm l, with a tension T of which T h²/(m l) is above TAUT.
+bool is_taut(const JointBlock& block, const JointSet::State& state, bool second, double mass,
+             double h) noexcept {
+    if (block.axial) return false;
+    double impulse = 0.0;
+    const int linear = std::min(block.size, 3);
+    for (int i = 0; i < linear; ++i) impulse = std::max(impulse, std::abs(state.multiplier[i]));
+    const double arm = norm(second ? state.second_reach : state.first_reach);
+    return arm > 0.0 && h * impulse > TAUT * mass * arm;
+}
+
+}  // namespace
+
+/// A body that a joint makes go round by a radian a step, and pulls at with a tension T of which T h²/(m l) is above
+/// TAUT: rows that stand still in the step no longer guide its way. −1 if there is none. An arm along the axis, as of a
+/// wheel beside its hinge, stays where it is, and so does the ground under a tyre.
+int find_whirling(const RigidModel& model, const RigidState& live, const JointSet& joints,
+                  std::span<const int> bodies, const std::function<void()>& deliver) {
+    if (joints.blocks().empty()) return -1;
+    for (const int i : bodies) {
+        const BodyConstants& body = model.constants[i];
+        const BodyState& s = live.bodies[i];
+        const double least = std::min({body.inertia.x, body.inertia.y, body.inertia.z});
+        if (body.particle || model.h * model.h * dot(s.angular_momentum, s.angular_momentum) < least * least)
+            continue;
+        const Vec3 spin = turned_by(body, s, s.angular_momentum);
+        if (model.h * norm(spin) < 1.0) continue;
+        deliver();
+        for (const JointBlock& block : joints.blocks()) {
+            if (joints.constants(block.joint).kind >= JointKind::relation) continue;
+            const JointSet::State& state = joints.states[block.joint];
+            for (const bool second : {false, true}) {
+                if ((second ? block.second : block.first) != i) continue;
+                const Vec3 around = cross(second ? state.second_reach : state.first_reach, spin);
+                if (body.mass * dot(around, around) > ASIDE * dot(spin, s.angular_momentum) &&
+                    is_taut(block, state, second, body.mass, model.h))
+                    return i;
+            }
+        }
+    }
+    return -1;
+}
+
+/// Why a run ended, if tension did it; `known`: that it did.
+const char* cause_of_runaway(const RigidModel& model, const JointSet& joints,
+                             const LargeArray<JointState>& early, bool touching, bool known) noexcept {
+    if (!known && (model.composed || early.size() != joints.states.size())) return "";
+    for (const JointBlock& block : joints.blocks())
+        for (const bool second : {false, true}) {
+            const int body = second ? block.second : block.first;
+            if (known || body < 0 || !model.constants[body].moves()) continue;
+            known = is_taut(block, early[block.joint], second, model.constants[body].mass, model.h);
+        }
+    if (!known) return "";
+    return model.stiff
+               ? "ran away: its joints carry more than so light a body can take in a step (T h²/(m l) is "
+                 "above 0.3), and their load changes within one, while string_stiffness knows that of "
+                 "the step before; use composition=\"order4\" without it, or a smaller time step"
+           : touching || model.solver != RigidSolver::block
+               ? "ran away: its joints carry more tension than so light a body can take in a step "
+                 "(T h²/(m l) is above 0.3); use a smaller time step"
+               : "ran away: its joints carry more tension than so light a body can take in a step "
+                 "(T h²/(m l) is above 0.3); use string_stiffness=True, or a smaller time step";
+}
+
+}  // namespace spook
