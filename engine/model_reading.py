@@ -27,7 +27,7 @@ from spook_tracker.engine.model_bodies import (
     urdf_bodies,
 )
 from spook_tracker.engine.model_file import Format, Watched
-from spook_tracker.engine.model_meshes import ENTITIES, wrong_mesh
+from spook_tracker.engine.model_meshes import ENTITIES, harm_in
 from spook_tracker.engine.model_parts import attach, settle_joint_types
 
 MOST_BYTES = 64_000_000  # of one file; the largest mesh of the robots people share has a third of that
@@ -35,9 +35,14 @@ MOST_XML = 16_000_000  # bytes of a file that is read as text: elements take ten
 MOST_FILES = 3_000
 MOST_COPIES = 10_000  # that one element makes: engines write out each of them before they look at the next
 MOST_ROOM = 100_000_000  # numbers that one element asks for without a file that holds them
-ROOM = {"hfield": ("nrow", "ncol"), "texture": ("width", "height")}  # whose product is that
-KEPT = ("nkey", "nuserdata")  # of <size>: rows of numbers
+ROOM = {
+    "hfield": ("nrow", "ncol"),
+    "texture": ("width", "height"),
+    "user": ("dim",),
+}  # whose product is that
+KEPT = ("nkey", "nuser")  # of <size>, as these begin: rows of numbers
 ROW = 100  # numbers in one, at least
+MOST_ITERATIONS = 100_000  # of a solver in a step, which is not looked into
 SHORTEST = 1e-6  # s, of a time step: with less a second takes hours
 COPYING = ("replicate", "composite", "flexcomp")  # elements with a count, or a product of counts
 MOST_ELEMENTS = 1_000_000  # of a model with all copies
@@ -146,7 +151,7 @@ class _Reader:
                 raise ModelError(
                     f"{path} is a pointer of Git LFS in place of the file itself; fetch it with: git lfs pull"
                 )
-        if found not in self.files and (wrong := wrong_mesh(found)):
+        if found not in self.files and (wrong := harm_in(found)):
             raise ModelError(f"{path} {wrong}")
         self.files.setdefault(found)
         if len(self.files) > MOST_FILES:
@@ -184,6 +189,14 @@ class _Reader:
                 own = copies * _copies(one) if one.tag in COPYING else copies
                 if own > MOST_COPIES:
                     raise ModelError(f"{path}: <{one.tag}> makes {own:.3g} copies; it may make {MOST_COPIES}")
+                for name in one.attrib if one.tag == "option" else ():
+                    if (
+                        name.endswith(("iterations", "initpoints"))
+                        and product_of(one.get(name, "")) > MOST_ITERATIONS
+                    ):
+                        raise ModelError(
+                            f"{path}: <option> asks for {one.get(name)} {name} in a step; it may ask for {MOST_ITERATIONS}"
+                        )
                 if (room := _room(one)) > MOST_ROOM:
                     raise ModelError(
                         f"{path}: <{one.tag}> asks for {room:.3g} numbers; it may ask for {MOST_ROOM:.0e}"
@@ -425,12 +438,13 @@ def _where(said: str, file: Path) -> str:
 def _room(element: ElementTree.Element) -> float:
     """How many numbers it asks for beside what files hold; what is no number is left to the engine."""
     asked: dict[str, float] = {}
-    for name in (*ROOM.get(element.tag, ()), *(KEPT if element.tag == "size" else ())):
+    kept = [name for name in element.attrib if name.startswith(KEPT)] if element.tag == "size" else []
+    for name in (*ROOM.get(element.tag, ()), *kept):
         try:
             asked[name] = float(element.get(name, "0"))
         except ValueError:
             return 0.0
-    return ROW * max(asked.values()) if element.tag == "size" else math.prod(asked.values())
+    return ROW * max(asked.values(), default=0.0) if element.tag == "size" else math.prod(asked.values())
 
 
 def _beside(file: Path, main: Path) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import struct
 import time
 from pathlib import Path
 
@@ -123,6 +124,10 @@ BOMB = '<!DOCTYPE m [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><mujoco><worldbody
             "makes 1e\\+06 copies",
         ),
         ('<mujoco><size nkey="10000000"/><worldbody><body/></worldbody></mujoco>', "asks for 1e\\+09 numbers"),
+        ('<mujoco><size nuser_geom="10000000"/><worldbody><body/></worldbody></mujoco>', "asks for 1e\\+09 numbers"),
+        ('<mujoco><sensor><user dim="2000000000"/></sensor></mujoco>', "<user> asks for 2e\\+09 numbers"),
+        ('<mujoco><option noslip_iterations="2000000000"/></mujoco>', "asks for 2000000000 noslip_iterations in a step"),
+        (CART.replace("wheel.stl", "../parts/bomb.png"), "bomb.png is a picture of 30000 by 30000 points"),
         ('<mujoco><asset><hfield nrow="60000" ncol="60000"/></asset></mujoco>', "asks for 3.6e\\+09 numbers"),
         ('<mujoco><option timestep="1e-12"/><worldbody><body><joint/></body></worldbody></mujoco>', "time step is 1e-12"),
         ("version https://git-lfs.github.com/spec/v1", "pointer of Git LFS"),
@@ -175,6 +180,9 @@ def test_what_cannot_be_read_is_one_sentence_that_names_the_file(
         "<sdf><model><mesh><uri>../../secret.stl</uri></mesh></model></sdf>"
     )
     (tmp_path / "models/parts/bomb.dae").write_text(BOMB)
+    (tmp_path / "models/parts/bomb.png").write_bytes(
+        b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + struct.pack(">II", 30000, 30000)
+    )
     (tmp_path / "models/parts/torn.dae").write_bytes(b"<COLLADA\xff\x00")
     (tmp_path / "models/parts/loop.xml").write_text(ATTACHED.replace("parts/arm.xml", "loop.xml"))
     for k in range(21):
@@ -189,7 +197,9 @@ def test_what_cannot_be_read_is_one_sentence_that_names_the_file(
         read(file)
 
     assert "\n" not in str(raised.value)
-    assert any(name in str(raised.value) for name in ("robot.xml", "loop.xml", "model.sdf", ".dae", ".obj"))
+    assert any(
+        name in str(raised.value) for name in ("robot.xml", "loop.xml", "model.sdf", ".dae", ".obj", ".png")
+    )
 
 
 def _names(found: Reading) -> list[str]:

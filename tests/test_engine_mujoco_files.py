@@ -266,6 +266,18 @@ PENDULUM = """<mujoco><option integrator="Euler" timestep=".005"/><worldbody><bo
 <geom type="sphere" size=".1" pos=".5 0 0" mass="1"/></body></worldbody></mujoco>"""
 
 
+def test_contacts_that_are_left_out_for_lack_of_memory_are_told(tmp_path: Path) -> None:
+    """MuJoCo says so in a log, and lets the box fall through the floor."""
+    sizes = {
+        size: BOX.replace("<worldbody>", f'<size memory="{size}"/><worldbody>', 1) for size in ("4K", "1K")
+    }
+
+    assert "for lack of memory" in _run(_model(tmp_path, sizes["4K"]), 0.5).failure
+    assert not _run(_model(tmp_path, BOX), 0.5).failure
+    with pytest.raises(EngineError, match=r"mujoco gives up on model\.xml: .*out of memory"):
+        _run(_model(tmp_path, sizes["1K"]), 0.5)
+
+
 def test_the_books_of_a_damped_pendulum_balance_without_its_damping(tmp_path: Path) -> None:
     asked = Asked(model=_model(tmp_path, PENDULUM), duration=1.0)
     found = books.measure(asked, _simulate())

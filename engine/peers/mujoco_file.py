@@ -24,6 +24,7 @@ from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result
 
 BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
+FULL = ("mjWARN_CONTACTFULL", "mjWARN_CNSTRFULL")
 READS = ("MJCF", "URDF")
 DAMPING = ("dof_damping", "dof_dampingpoly", "tendon_damping", "tendon_dampingpoly")  # of joints and tendons
 SWITCHES = {  # of the parts a model can be asked without
@@ -53,7 +54,10 @@ def run_model(run: ModelRun, time_step: float, duration: float, time_limit: floa
             began = time.perf_counter()
             load(run)
             loads.append(time.perf_counter() - began)
-    return _Simulation(run, first, time_step, time_limit).result(duration, min(loads))
+    try:
+        return _Simulation(run, first, time_step, time_limit).result(duration, min(loads))
+    except mujoco.FatalError as error:
+        raise EngineError(f"mujoco gives up on {Path(run.model.path).name}: {_line(error)}") from None
 
 
 def load(run: ModelRun) -> Any:
@@ -155,6 +159,9 @@ class _Simulation(LoadedModel):
         for kind in BAD:
             if self.data.warning[getattr(mujoco.mjtWarning, kind)].number:
                 return f"mujoco reset a state it calls bad ({kind[7:].lower()})"
+        for kind in FULL:
+            if self.data.warning[getattr(mujoco.mjtWarning, kind)].number:
+                return "mujoco leaves contacts or constraints out, for lack of memory (<size memory>)"
         return "" if np.isfinite(self.data.qpos).all() else "a place is not finite"
 
     def read(self) -> None:
