@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from contextlib import suppress
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from spook_tracker.engine.model_file import Drive, ModelFile, ModelRun, Watched
 from spook_tracker.engine.model_reading import read
 from spook_tracker.engine.peers.mujoco_file import load
 from spook_tracker.engine.protocol import NotSupported
+from spook_tracker.engine.result import Result, SimulationFailed
 from spook_tracker.scalar_tests.model_file import books, cost, ladder, motion, rest
 from spook_tracker.scalar_tests.model_file.facts import Asked, turns
 from spook_tracker.tracker.measure.model_motion import model_trajectory
@@ -82,9 +84,13 @@ def test_a_box_on_a_box_rests_carried_by_its_contacts(tmp_path: Path) -> None:
 
 
 def test_what_never_rests_is_said_to_be_unsettled(tmp_path: Path) -> None:
-    found = rest.measure(Asked(model=_model(tmp_path, FALL), duration=1.0), _simulate())
+    """And is run once: there is no rest that pushes or steps could move."""
+    runs = []
+    counted = lambda *asked, **how: runs.append(asked) or _simulate()(*asked, **how)  # noqa: E731
+    found = rest.measure(Asked(model=_model(tmp_path, FALL), duration=1.0), counted)
 
     assert "still moves at" in found["ball.rest_z"].unsettled
+    assert (len(runs), found["ball.rest_z"].rounding) == (1, math.inf)
 
 
 def test_the_step_error_of_a_fall_is_half_its_error(tmp_path: Path) -> None:
@@ -322,7 +328,26 @@ def test_euler_falls_to_the_finest_run_with_order_one(tmp_path: Path) -> None:
     errors = [ladder.error(asked, _simulate(), h, PLAIN) for h in (0.02, 0.01, 0.005)]
 
     assert [a / b for a, b in itertools.pairwise(errors)] == pytest.approx([2.0, 2.0], abs=0.4)
-    assert ladder.resolved(asked, _simulate())["resolved_time"] == ladder.MOST_RESOLVED
+    assert ladder.resolved(asked, _simulate())["resolved_time"] == ladder.LASTS
+
+
+def test_finest_runs_that_break_off_resolve_no_further(tmp_path: Path) -> None:
+    """They agree as far as the longer steps come, to .1 s: that is no agreement at .2 s, and no reference at .5 s."""
+    asked = Asked(model=_model(tmp_path, PENDULUM), duration=1.0)
+
+    def broken(run: ModelRun, **how: float) -> Result:
+        found = _simulate()(run, **how)
+        if how["time_step"] != asked.model.time_step / ladder.FINE:
+            return found
+        read = {
+            name: found[name] if name == "size" else found[name][:2]
+            for name in ("size", "position", "orientation")
+        }
+        return replace(found, status="diverged", failure="it broke off", observables=read)
+
+    assert ladder.resolved(asked, broken)["resolved_time"] == 0.2
+    with pytest.raises(SimulationFailed, match="broke off"):
+        ladder.error(asked, broken, 0.01, PLAIN)
 
 
 def test_the_longest_step_of_an_oscillator_is_that_of_semi_implicit_euler(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 
 import spook_tracker.tracker.measure.remembered as remembered
 from spook_tracker.engine import Final, Method, Particle, Position, Scene, Trace, simulate
+from spook_tracker.engine.model_file import ModelFile, ModelRun
 from spook_tracker.tracker.measure.remembered import Remembered, of_test
 
 STEPS = {"time_step": 1e-3, "steps": 100}
@@ -97,9 +98,22 @@ def test_no_more_is_kept_than_a_worker_can_hold(monkeypatch: pytest.MonkeyPatch)
     assert engine.runs == 5 + 2
 
 
+@pytest.mark.parametrize(("scenes", "runs"), [(True, 4), (False, 5)])
+def test_of_a_model_the_finest_runs_are_remembered_in_any_engine(scenes: bool, runs: int) -> None:
+    """And no others: whether a model repeats its bits is a question of its own. Scenes are in our engine alone."""
+    engine = Counted()
+    asked = Remembered(lambda run, **how: engine(falling(), **how), scenes)
+    model = ModelFile(path="a.xml", format="MJCF", digest="1", time_step=0.002, watched=())
+    for run in (ModelRun(model=model, accurate=True), ModelRun(model=model), falling()):
+        first, again = asked(run, **STEPS), asked(run, **STEPS)
+        assert first.state_hash == again.state_hash
+
+    assert engine.runs == runs
+
+
 def test_another_test_begins_with_nothing() -> None:
     engine = Counted()
     for name in ("one", "one", "two", "one"):
-        of_test(name, engine)(falling(), **STEPS)
+        of_test(name, engine, True)(falling(), **STEPS)
 
     assert engine.runs == 3

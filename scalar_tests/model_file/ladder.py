@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -26,7 +27,6 @@ LASTS = 0.5  # s that the runs of the ladder last
 RUNGS = (4.0, 2.0, 1.0, 0.5, 0.25)  # times the file's own step
 FINE, FINEST = 8, 16  # parts of the file's own step, by the most accurate setting
 RESOLVED = 1e-3  # of the size: where the two finest runs are further apart there is no reference
-MOST_RESOLVED = 0.5  # s: sixteen times the steps are looked at no further
 HOLDS = 2.0  # s that a run must hold
 LONGEST, STIFFEST = 64.0, 4096.0  # times the file's own
 BRACKET = 0.05  # relative width of the last bracket
@@ -47,15 +47,23 @@ def _place(
     return simulated(simulate, asked, times[-1], refined, samples=times, accurate=accurate)
 
 
-def resolved(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
-    """The first checkpoint at which the two finest runs disagree; the last one if they never do."""
-    times = tuple(t for t in asked.checkpoints if t <= MOST_RESOLVED) or asked.checkpoints[:1]
+def _finest(asked: Asked, simulate: Simulate) -> tuple[tuple[float, ...], Result, Result]:
+    """The two finest runs, and when [s] both are read, last at the end of the ladder's: asked by all in the same words, so
+    that they are made once where runs are remembered."""
+    end = _lasts(asked)
+    times = (*(t for t in asked.checkpoints if t < end - 1e-9), end)
     fine, finest = (
         _place(asked, simulate, asked.model.time_step / parts, True, times) for parts in (FINE, FINEST)
     )
+    return times, fine, finest
+
+
+def resolved(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
+    """The first checkpoint at which the two finest runs disagree; the last one if they never do."""
+    times, fine, finest = _finest(asked, simulate)
     size = float(finest["size"])
-    lost = np.flatnonzero(~(apart(fine, finest, size) <= RESOLVED * size))
-    until = times[int(lost[0])] if len(lost) else times[-1]
+    agree = apart(fine, finest, size) <= RESOLVED * size  # as far as both came
+    until = next((t for k, t in enumerate(times) if k >= len(agree) or not agree[k]), times[-1])
     return {"resolved_time": Estimate(until, rounding=0.0, scale=asked.duration)}
 
 
@@ -65,18 +73,17 @@ def _lasts(asked: Asked) -> float:
 
 def error(asked: Asked, simulate: Simulate, time_step: float, method: Method) -> float:
     """Distance [m] from the finest run at the end, of the watched body, or its rim, that is furthest off."""
-    at = (_lasts(asked),)
-    fine, finest = (
-        _place(asked, simulate, asked.model.time_step / parts, True, at) for parts in (FINE, FINEST)
-    )
+    times, fine, finest = _finest(asked, simulate)
+    fine["position"], finest["position"]  # of a run that broke off: the outcome is that
     size = float(finest["size"])
     if not (off := float(apart(fine, finest, size)[-1])) <= RESOLVED * size:
         raise NotSupported(
-            f"the two finest runs are {off:.2g} m apart after {at[0]:g} s: there is no reference"
+            f"the two finest runs are {off:.2g} m apart after {times[-1]:g} s: there is no reference"
         )
-    own = _place(asked, simulate, time_step, False, at)
+    own = _place(asked, simulate, time_step, False, times[-1:])
     own["position"]  # of a run that broke off: the outcome is that
-    return float(apart(own, finest, size)[-1])
+    last = {name: finest[name][-1:] for name in ("position", "orientation")}
+    return float(apart(own, replace(finest, observables=last), size)[-1])
 
 
 def run(asked: Asked, simulate: Simulate, time_step: float, method: Method) -> Result:

@@ -50,9 +50,17 @@ def metrics(asked: Asked, stands_free: bool) -> tuple[Metric, ...]:
 
 
 def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
-    """Run until it rests; again with pushes of the last bits, and with half the time step."""
+    """Run until it rests; again with pushes of the last bits, and with half the time step. Of what does not rest nothing more
+    is asked: where it is after so long is no rest, and its motion is compared elsewhere."""
     run = simulated(simulate, asked, LONGEST_REST, samples=(0.0,), until_settled=True)
-    values = _rest(asked, run)
+    values, size = _rest(asked, run), float(run["size"])
+    columns = {body.label: k for k, body in enumerate(asked.model.watched)}
+    if not math.isfinite(float(run["settled"])):
+        moves = f"still moves at {float(run['fastest']):.2g} m/s after {LONGEST_REST:g} s"
+        return {
+            name: Estimate(value, rounding=math.inf, scale=size, unsettled=moves)
+            for name, value in values.items()
+        }
     pushed = [
         _rest(
             asked,
@@ -65,14 +73,7 @@ def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
     halved = _rest(
         asked, simulated(simulate, asked, LONGEST_REST, refined=2, samples=(0.0,), until_settled=True)
     )
-    size = float(run["size"])
     creep = np.asarray(run["creep"])
-    moved = (
-        ""
-        if math.isfinite(float(run["settled"]))
-        else (f"still moves at {float(run['fastest']):.2g} m/s after {LONGEST_REST:g} s")
-    )
-    columns = {body.label: k for k, body in enumerate(asked.model.watched)}
     found: dict[str, float] = {}
     for name, value in values.items():
         column = columns.get(name.rpartition(".")[0])
@@ -84,7 +85,6 @@ def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
             rounding=max(rounded, crept, READ.get(name, 0.0) * (size if name == "creep" else 1.0)),
             step_error=abs(halved[name] - value) if name in halved else None,
             scale=unit,
-            unsettled=moved,
         )
     return found
 

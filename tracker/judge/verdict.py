@@ -208,7 +208,7 @@ def _by_sensitivity(definition: SeriesDefinition, known: Sensitivity, old: float
     moved, unit = abs(new - old), definition.unit
     if moved <= known.rounding:
         if math.isinf(known.rounding):
-            words = "beyond the time until which this can be predicted"
+            words = "beyond the time until which this can be predicted, or not at rest"
         else:
             words = f"rounding: {moved:.2g} {unit}, and pushes of the last bits grow to {known.rounding:.2g}"
         return Verdict(word="same", sentence=words)

@@ -1,7 +1,8 @@
 """What a test has simulated is not simulated again: equal input gives equal bits.
 
-A measurement and its figure, and ladders that read two errors off one run, ask for the same simulations. Of our engine
-alone, whose law that is; a run that was ended by a clock is asked again.
+A measurement and its figure, and ladders that read two errors off one run, ask for the same simulations. Of scenes in our
+engine alone, whose law that is, and of model files the finest runs, which are what others are measured by, in any engine; a
+run that was ended by a clock is asked again.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from spook_tracker.engine.method import Method
+from spook_tracker.engine.model_file import ModelRun
 from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.result import Array, Result
 from spook_tracker.engine.scene import Scene
@@ -32,16 +34,21 @@ class Remembered:
     """Forwards to the engine what was not asked before."""
 
     simulate: Callable[..., Result]
+    scenes: bool = True  # or of model files alone
     kept: dict[tuple[Option, ...], list[tuple[bytes, Result]]] = field(
         default_factory=dict
     )  # by what is cheap to compare
     size: int = 0  # bytes
 
-    def __call__(self, scene: Scene, **options: Option) -> Result:
-        if not isinstance(scene, Scene):
+    def __call__(self, scene: Scene | ModelRun, **options: Option) -> Result:
+        known_again = (
+            self.scenes if isinstance(scene, Scene) else isinstance(scene, ModelRun) and scene.accurate
+        )
+        if not known_again:
             return self.simulate(scene, **options)
         asked = {name: option for name, option in options.items() if name not in HOW}
-        place = (len(scene.bodies), *(asked.get(name) for name in ("time_step", "duration", "steps")))
+        bodies = len(scene.bodies) if isinstance(scene, Scene) else 0
+        place = (bodies, *(asked.get(name) for name in ("time_step", "duration", "steps")))
         known = self.kept.get(place)
         if known and (found := dict(known).get(_bytes(scene, asked))) is not None:
             return _copy(found)
@@ -54,7 +61,7 @@ class Remembered:
         return result
 
 
-def _bytes(scene: Scene, asked: Mapping[str, Option]) -> bytes:
+def _bytes(scene: Scene | ModelRun, asked: Mapping[str, Option]) -> bytes:
     """All that a run is decided by, to the bit; nothing where it cannot be told, as of a function."""
     try:
         return pickle.dumps((scene, sorted(asked.items())))
@@ -83,9 +90,9 @@ def _copy(result: Result) -> Result:
 _of_thread = threading.local()  # an executor may answer in several threads at once
 
 
-def of_test(test: str, simulate: Simulate) -> Simulate:
+def of_test(test: str, simulate: Simulate, scenes: bool) -> Simulate:
     """This simulator with what it has simulated for the test in this thread; what it did for another is forgotten."""
     if getattr(_of_thread, "test", None) != (test, simulate):
-        _of_thread.test, _of_thread.simulate = (test, simulate), Remembered(simulate)
+        _of_thread.test, _of_thread.simulate = (test, simulate), Remembered(simulate, scenes)
     remembered: Simulate = _of_thread.simulate
     return remembered

@@ -241,8 +241,7 @@ def perform(source: Questions, task: Task) -> Parts | crew.Lost:
 
 def _performed(source: Questions, task: Task) -> Parts:
     test, simulate = source.tests()[task.test], source.simulate()
-    if source.module() is ours:
-        simulate = of_test(task.test, simulate)
+    simulate = of_test(task.test, simulate, source.module() is ours)
     first = task.index[0]
     if task.kind == "measure":
         return (measure(task.test, test, test.measurements[first], simulate),)
