@@ -53,15 +53,16 @@ def test_the_first_night_is_green_and_a_planted_breach_red(
     for name in [name for name in os.environ if name.startswith("TRACKER")]:
         monkeypatch.delenv(name)
     service = Service(origin, tmp_path / "ci", programs)
+    given = called(clone)["with"] | {"options": "--quick --workers 1"}
 
-    first = service.run(TRACK, "schedule", "main", **called(clone)["with"])
+    first = service.run(TRACK, "schedule", "main", **given)
     adapter = clone / "tracking" / "adapter.py"
     right = "self.velocities += self.time_step * self.gravity"
     assert right in adapter.read_text()
     adapter.write_text(adapter.read_text().replace(right, f"{right} * 1.001"))
     git(clone, "commit", "-q", "-a", "-m", "Pull a little harder")
     git(clone, "push", "-q", str(origin), "main")
-    second = service.run(TRACK, "schedule", "main", **called(clone)["with"])
+    second = service.run(TRACK, "schedule", "main", **given)
 
     assert first["verdict"].result == "success", first["night"].log
     assert "falling_object" in first["night"].log

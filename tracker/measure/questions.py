@@ -92,7 +92,11 @@ class Questions:
         return {field.name: getattr(self, field.name) for field in fields(self)}
 
     def module(self) -> Engine:
-        """The engine: simulate, build_info, and its configurations if it is not ours."""
+        """The engine: simulate, build_info, and its configurations if it is not ours; found once."""
+        return self._module
+
+    @cached_property
+    def _module(self) -> Engine:
         from spook_tracker.engine.find import EngineMissing, find, look_beside
 
         look_beside(self.folder)
