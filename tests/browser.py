@@ -25,6 +25,35 @@ SEEN = """[...document.querySelectorAll('figure.chart')].every((box) => 'drawn' 
   !box.checkVisibility() || box.getBoundingClientRect().top > innerHeight || box.getBoundingClientRect().bottom < 0)"""
 STILL = """[...document.querySelectorAll('figure.replay, .live')].every((box) => box.player || box.page ||
   box.getBoundingClientRect().top > innerHeight || box.getBoundingClientRect().bottom < 0)"""
+CONTRAST = """
+const shades = [];
+function parse(text) {
+  const n = (text.match(/[\\d.]+/g) || []).map(Number);
+  return text.startsWith('color(srgb') ? [n[0] * 255, n[1] * 255, n[2] * 255, n[3] ?? 1] : [n[0], n[1], n[2], n[3] ?? 1];
+}
+function over(top, bottom) { return top.slice(0, 3).map((v, i) => v * top[3] + bottom[i] * (1 - top[3])).concat(1); }
+function ground(element) {
+  const layers = [];
+  for (let e = element; e; e = e.parentElement) { layers.push(parse(getComputedStyle(e).backgroundColor)); }
+  return layers.reverse().reduce((below, layer) => over(layer, below), [255, 255, 255, 1]);
+}
+function light(c) {
+  const [r, g, b] = c.slice(0, 3).map((v) => { v /= 255; return v <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4; });
+  return .2126 * r + .7152 * g + .0722 * b;
+}
+const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+while (walker.nextNode()) {
+  const node = walker.currentNode, element = node.parentElement;
+  if (!node.textContent.trim() || !element.checkVisibility() || element.closest('script,.plot,.skip,template')) continue;
+  const style = getComputedStyle(element), svg = element.closest('svg');
+  const ink = parse(svg ? style.fill : style.color), paper = ground(svg ? svg.parentElement : element);
+  const [a, b] = [light(over(ink, paper)), light(paper)];
+  const ratio = (Math.max(a, b) + .05) / (Math.min(a, b) + .05);
+  const large = parseFloat(style.fontSize) >= 24 || (parseFloat(style.fontSize) >= 18.66 && style.fontWeight >= 700);
+  if (ratio < (large ? 3 : 4.5) && !element.closest('.letter')) shades.push(node.textContent.trim().slice(0, 40) + ' ' + ratio.toFixed(2));
+}
+return [...new Set(shades)];
+"""
 MODULE = Path(__file__).parent.parent / "site" / "static" / "live.wasm"
 LIVE = ("live.html",) if MODULE.exists() else ()  # the pages that need it
 CHROMES = ("chromium", "chromium-browser", "google-chrome")

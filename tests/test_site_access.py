@@ -13,7 +13,7 @@ import pytest
 from spook_tracker.tracker.website import page_test
 from spook_tracker.tracker.website.options import SiteOptions
 from spook_tracker.tracker.website.publish import publish
-from tests.browser import LIVE, SEEN, STILL, arrive, look, wait_for
+from tests.browser import CONTRAST, LIVE, SEEN, STILL, arrive, look, wait_for
 from tests.synthetic_history import DocumentHistory, with_rival
 from tests.test_site_causes import nights
 from tests.test_site_causes import recorded as recorded  # a fixture
@@ -120,6 +120,12 @@ def test_a_page_is_accessible_at_every_width(driver, site, axe, page):
         arrive(driver, (site / page).resolve().as_uri())
         driver.execute_script(axe)
         driver.execute_script(OPENED)
+        assert driver.execute_script("return document.documentElement.dataset.theme") == (
+            "dark" if dark else "light"
+        )
+        found += [
+            f"{page} {'dark' if dark else 'light'}: pale: {text}" for text in driver.execute_script(CONTRAST)
+        ]
         for width in WIDTHS:
             look(driver, width=width, height=900, dark=dark)
             settle(driver)

@@ -12,42 +12,16 @@ from spook_tracker.tracker.judge.compare import ComparedRun, compare_in, side_of
 from spook_tracker.tracker.judge.judged import commit_of
 from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.website.publish import publish
-from tests.browser import LIVE, SEEN, arrive, look, wait_for
+from tests.browser import CONTRAST, LIVE, SEEN, arrive, look, wait_for
 from tests.synthetic_history import SEVEN, history
 
 PAGES = (
     "index.html", "tests/pendulum.html", "tests/friction.html", "error-time.html", "stability.html",
     "compare.html", "regressions.html", "versions.html", "data.html", "document.html", *LIVE,
 )  # fmt: skip
-CONTRAST = """
-const shades = [];
-function parse(text) {
-  const n = (text.match(/[\\d.]+/g) || []).map(Number);
-  return text.startsWith('color(srgb') ? [n[0] * 255, n[1] * 255, n[2] * 255, n[3] ?? 1] : [n[0], n[1], n[2], n[3] ?? 1];
-}
-function over(top, bottom) { return top.slice(0, 3).map((v, i) => v * top[3] + bottom[i] * (1 - top[3])).concat(1); }
-function ground(element) {
-  const layers = [];
-  for (let e = element; e; e = e.parentElement) { layers.push(parse(getComputedStyle(e).backgroundColor)); }
-  return layers.reverse().reduce((below, layer) => over(layer, below), [255, 255, 255, 1]);
-}
-function light(c) {
-  const [r, g, b] = c.slice(0, 3).map((v) => { v /= 255; return v <= .03928 ? v / 12.92 : ((v + .055) / 1.055) ** 2.4; });
-  return .2126 * r + .7152 * g + .0722 * b;
-}
-const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
-while (walker.nextNode()) {
-  const node = walker.currentNode, element = node.parentElement;
-  if (!node.textContent.trim() || !element.checkVisibility() || element.closest('script,.plot,.skip,template')) continue;
-  const style = getComputedStyle(element), svg = element.closest('svg');
-  const ink = parse(svg ? style.fill : style.color), paper = ground(svg ? svg.parentElement : element);
-  const [a, b] = [light(over(ink, paper)), light(paper)];
-  const ratio = (Math.max(a, b) + .05) / (Math.min(a, b) + .05);
-  const large = parseFloat(style.fontSize) >= 24 || (parseFloat(style.fontSize) >= 18.66 && style.fontWeight >= 700);
-  if (ratio < (large ? 3 : 4.5) && !element.closest('.letter')) shades.push(node.textContent.trim().slice(0, 40) + ' ' + ratio.toFixed(2));
-}
-return [...new Set(shades)];
-"""
+WIDE = """return [[...document.querySelectorAll('body *')].filter((e) => e.getBoundingClientRect().right > 361 &&
+  !e.closest('.scroll, .bar nav, svg, .plot, .visually-hidden, .skip')).map((e) => e.tagName + '.' + e.className),
+  document.documentElement.scrollWidth <= 360]"""
 COMPARED = "document.getElementById('told').dataset.shown === arguments[0]"
 DRAWN = """
 const [done] = arguments;
@@ -97,35 +71,19 @@ def complaints(driver: Any) -> list[str]:
 def test_a_page_opens_from_a_file_without_complaint_draws_every_chart_and_its_text_stands_out(
     driver: Any, site: Path, page: str
 ) -> None:
-    visit(driver, site, page)
+    """And nothing is wider than a narrow screen. In the dark: tests/test_site_access.py."""
+    visit(driver, site, page, width=360, height=740)
+    wide = driver.execute_script(WIDE)
+    look(driver)
     pale = driver.execute_script(CONTRAST)
 
     drawn = driver.execute_async_script(DRAWN) if page != "document.html" else []
 
+    assert wide == [[], True]
     assert [place for place, traces in enumerate(drawn) if traces == 0] == []
     assert complaints(driver) == []
     assert driver.execute_script("return document.documentElement.dataset.theme") == "light"
     assert pale == []
-
-
-@pytest.mark.parametrize("page", PAGES)
-def test_text_stands_out_from_its_ground_in_the_dark(driver: Any, site: Path, page: str) -> None:
-    visit(driver, site, page, dark=True)
-
-    assert driver.execute_script("return document.documentElement.dataset.theme") == "dark"
-    assert driver.execute_script(CONTRAST) == []
-
-
-@pytest.mark.parametrize("page", PAGES)
-def test_nothing_is_wider_than_a_narrow_screen(driver: Any, site: Path, page: str) -> None:
-    visit(driver, site, page, width=360, height=740)
-
-    wide = driver.execute_script(
-        "return [...document.querySelectorAll('body *')].filter((e) => e.getBoundingClientRect().right > 361 &&"
-        " !e.closest('.scroll, .bar nav, svg, .plot, .visually-hidden, .skip')).map((e) => e.tagName + '.' + e.className)"
-    )
-    assert wide == []
-    assert driver.execute_script("return document.documentElement.scrollWidth") <= 360
 
 
 def test_hostile_names_and_versions_show_as_text(driver: Any, site: Path) -> None:
