@@ -8,34 +8,32 @@ import pytest
 from spook_tracker.engine import EngineError, SimulationFailed, simulate
 from spook_tracker.scalar_tests.case import Figure, Measurement, ScalarTest, Simulate
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.tracker.measure.remembered import Remembered
 from tests.broken_engines import BROKEN
 
-MEASUREMENTS = [
-    pytest.param(m, id=f"{name}-{m.configuration}-{i}")
-    for name, test in CATALOGUE.items()
-    for i, m in enumerate(test.measurements)
-]
-FIGURES = [
-    pytest.param(figure, id=f"{name}-{figure.name}")
-    for name, test in CATALOGUE.items()
-    for figure in test.figures
-]
+
+@pytest.mark.parametrize("name", CATALOGUE)
+def test_every_value_keeps_its_limit_and_its_set_point_and_every_figure_is_drawn(name: str) -> None:
+    """As in a night nothing of a test is simulated twice."""
+    once = Remembered(simulate)
+    for measurement in CATALOGUE[name].measurements:
+        keeps(measurement, once)
+    for figure in CATALOGUE[name].figures:
+        is_drawn(figure, once)
 
 
-@pytest.mark.parametrize("measurement", MEASUREMENTS)
-def test_every_value_keeps_its_limit_and_its_set_point(measurement: Measurement) -> None:
+def keeps(measurement: Measurement, simulate: Simulate) -> None:
     values = measurement.measure(simulate)
 
     assert set(values) >= {metric.name for metric in measurement.metrics}
     for metric in measurement.metrics:
         value = values[metric.name]
         assert type(value) is float, metric.name
-        assert metric.passes(value), (metric.name, value)
-        assert metric.holds_set_point(value), (metric.name, value)
+        assert metric.passes(value), (measurement.configuration, metric.name, value)
+        assert metric.holds_set_point(value), (measurement.configuration, metric.name, value)
 
 
-@pytest.mark.parametrize("figure", FIGURES)
-def test_every_figure_is_drawn_from_the_run(figure: Figure) -> None:
+def is_drawn(figure: Figure, simulate: Simulate) -> None:
     drawing = figure.draw(simulate)
 
     assert drawing.x_label and drawing.y_label and drawing.curves
