@@ -7,7 +7,20 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spook_tracker.engine import WORLD, Load, Lock, Method, Program, RigidBody, Scene, compile
+from spook_tracker.engine import (
+    WORLD,
+    Box,
+    ConstraintForce,
+    Load,
+    Lock,
+    Method,
+    Plane,
+    Program,
+    RigidBody,
+    Scene,
+    compile,
+    start,
+)
 from tests.rigid_scenes import GRAVITY, TIME_STEP, between, rigid_body, vector
 from tests.test_engine_rigid_oracle import largest_differences
 
@@ -105,3 +118,31 @@ def test_more_refinements_change_less_than_rounding_adds_up_to() -> None:
 
     np.testing.assert_allclose(ends[0], ends[1], rtol=0.0, atol=1e-9)
     np.testing.assert_allclose(ends[1], ends[2], rtol=0.0, atol=1e-12)
+
+
+def test_what_a_lock_carries_does_not_depend_on_how_many_steps_are_taken_at_once() -> None:
+    """Bodies that fall in the first of them and touch in the last: contacts are solved with other rows."""
+    box, ground = (
+        Box((0.2, 0.2, 0.2)),
+        RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0)),
+    )
+    pair = [
+        RigidBody(name=n, mass=1.0, shape=box, position=(x, 0.0, 0.35)) for n, x in (("a", 0.0), ("b", 0.2))
+    ]
+    post = RigidBody(name="post", motion="static", shape=Box((0.2, 0.2, 0.1)), position=(0.25, 0.0, 0.05))
+    scene = Scene(
+        bodies=(ground, post, *pair),
+        constraints=(Lock(name="lock", between=("a", "b"), at=(0.1, 0.0, 0.35)),),
+        gravity=(0.0, 0.0, -9.81),
+    )
+
+    def carried(steps: int) -> np.ndarray:
+        with start(scene, time_step=1 / 60, observe={"force": ConstraintForce("lock")}) as run:
+            for _ in range(12 // steps):
+                run.step(steps)
+            return np.array(run["force"])
+
+    each = carried(1)
+    assert np.abs(each).max() > 1.0
+    for steps in (2, 6, 12):
+        np.testing.assert_array_equal(carried(steps), each)
