@@ -42,10 +42,12 @@ struct Contact {
     std::uint64_t key = 0;  // colliders and feature: the same point has the same key from step to step
 };
 
+inline std::uint64_t pair_of(const Contact& contact) noexcept { return contact.key >> feature_bits; }
+
 /// The colliders of a contact.
 inline IndexPair colliders_of(const Contact& contact) noexcept {
     constexpr std::uint64_t second = (std::uint64_t{1} << collider_bits) - 1;
-    const std::uint64_t pair = contact.key >> feature_bits;
+    const std::uint64_t pair = pair_of(contact);
     return {static_cast<int>(pair >> collider_bits), static_cast<int>(pair & second)};
 }
 

@@ -7,11 +7,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::bilateral_rows;
-
-}  // namespace
 
 void BilateralRows::read(const MixedSystem& system, const MassFactors& mass) {
     nodes_.clear();

@@ -23,7 +23,7 @@ bool is_turned_through(const Detection& detection, const Contact& contact, const
                        const Pose& second, const std::vector<Vec6>& velocity, const std::vector<Vec6>& dv_ext,
                        double h) noexcept {
     constexpr std::uint64_t lower = (std::uint64_t{1} << collider_bits) - 1;
-    const std::uint64_t pair = contact.key >> feature_bits;
+    const std::uint64_t pair = pair_of(contact);
     const Collider::View one = detection.collider(static_cast<int>(pair >> collider_bits)),
                          two = detection.collider(static_cast<int>(pair & lower));
     const bool swapped = one.shape.kind == ShapeKind::plane;
@@ -51,17 +51,19 @@ bool CandidateSearch::reachable(const StepMotion& motion, const Contact& contact
         return std::max(std::abs(dot(n, linear(motion.velocity[b]))), std::abs(dot(n, linear(free)))) +
                spin * radius[b];
     };
-    return contact.point.gap <= model_->options.time_step * (speed(contact.first) + speed(contact.second)) +
-                                    closed * model_->bodies.size(contact);
+    return contact.point.gap <=
+           motion.model().options.time_step * (speed(contact.first) + speed(contact.second)) +
+               closed * motion.model().bodies.size(contact);
 }
 
 void CandidateSearch::begin(StepMotion& motion, const std::vector<Vec6>& free_velocity,
                             ContactPoints& points) {
+    const ContactBodies& bodies = motion.model().bodies;
+    const ContactOptions& options = motion.model().options;
     woken.clear();
-    edges.begin(model_->bodies.count());
-    margins_.begin(model_->bodies, model_->options.time_step, motion.velocity, free_velocity,
-                   model_->options.solver == SolverKind::iterative ||
-                       model_->options.impacts == ImpactOrder::successive);
+    edges.begin(bodies.count());
+    margins_.begin(bodies, options.time_step, motion.velocity, free_velocity,
+                   options.solver == SolverKind::iterative || options.impacts == ImpactOrder::successive);
     find_open(motion, points, Cast::When::solved);
 }
 
@@ -72,9 +74,10 @@ void CandidateSearch::find_open(StepMotion& motion, ContactPoints& points, Cast:
 
 void CandidateSearch::widen(const Cast& cast, std::vector<char>& changed, StepMotion& motion,
                             ContactPoints& points) {
-    if (!margins_.outrun(model_->bodies, model_->options.time_step, cast.velocity, changed)) return;
+    const ContactBodies& bodies = motion.model().bodies;
+    if (!margins_.outrun(bodies, motion.model().options.time_step, cast.velocity, changed)) return;
     if (!detection.near_again(margins_.grown(), margins_.search(), near_)) {
-        changed.assign(model_->bodies.count(), 1);
+        changed.assign(bodies.count(), 1);
         return find_open(motion, points, cast.when);
     }
     for (const int body : margins_.grown()) changed[body] = 1;
@@ -86,12 +89,13 @@ void CandidateSearch::widen(const Cast& cast, std::vector<char>& changed, StepMo
 
 void CandidateSearch::look_at(const std::vector<IndexPair>& near, StepMotion& motion, ContactPoints& points,
                               Cast::When when) {
-    const double h = model_->options.time_step;
+    const ContactBodies& bodies = motion.model().bodies;
+    const double h = motion.model().options.time_step;
     known_.clear();
     open_.bodies.clear();
     const std::size_t before = points.all.size();
     const auto unmet = static_cast<std::ptrdiff_t>(open_.pairs.size());
-    for (const StepContact& point : points.all) known_.push_back(point.contact.key >> feature_bits);
+    for (const StepContact& point : points.all) known_.push_back(pair_of(point.contact));
     std::sort(known_.begin(), known_.end());
     for (std::size_t k = 0; k < near.size(); ++k) {
         const IndexPair& pair = near[k];
@@ -106,7 +110,7 @@ void CandidateSearch::look_at(const std::vector<IndexPair>& near, StepMotion& mo
         const OpenPair open = opened(pair, separation(first.shape, detection.pose(pair.first), second.shape,
                                                       detection.pose(pair.second), reach));
         if (open.apart.gap > reach && first.shape.faceted() && second.shape.faceted()) continue;
-        const double size = std::max(model_->bodies.radius[first.body], model_->bodies.radius[second.body]);
+        const double size = std::max(bodies.radius[first.body], bodies.radius[second.body]);
         if (round_or_plane(first.shape) && round_or_plane(second.shape) && open.apart.gap > 1e-6 * size) {
             if (open.apart.gap <= reach)
                 open_.pairs.push_back(open);  // clearly apart: no need for its points
@@ -115,7 +119,7 @@ void CandidateSearch::look_at(const std::vector<IndexPair>& near, StepMotion& mo
         scratch_.clear();
         detection.collide_pair(pair, reach, scratch_);
         const bool touching = std::any_of(scratch_.begin(), scratch_.end(),
-                                          [this](const Contact& c) { return model_->bodies.is_closed(c); });
+                                          [&](const Contact& c) { return bodies.is_closed(c); });
         // Any two shapes apart give a point, if they are near enough to meet; but not solids corner to corner, nor
         // where a triangle's neighbour comes first.
         const bool solids = (first.shape.faceted() && second.shape.faceted()) ||
@@ -132,10 +136,10 @@ void CandidateSearch::look_at(const std::vector<IndexPair>& near, StepMotion& mo
             const Pose &one = motion.poses[contact.first], &two = motion.poses[contact.second];
             if (reachable(motion, contact) &&
                 !is_turned_through(detection, contact, one, two, motion.velocity, motion.dv_ext, h))
-                add_point(points, contact, one, two, -1.0);
+                add_point(motion.model(), points, contact, one, two, -1.0);
         }
     }
-    edges.note_depths(step(motion), points, before);
+    edges.note_depths(step(motion, points), before);
     if (skip_grazing(before, motion, points, when))
         std::sort(open_.pairs.begin() + unmet, open_.pairs.end(), OpenPairs::in_order);
     for (std::size_t k = before; k < points.all.size(); ++k) {
@@ -144,7 +148,7 @@ void CandidateSearch::look_at(const std::vector<IndexPair>& near, StepMotion& mo
             for (const int body : {later.first, later.second})
                 prefetch(motion.velocity[body]), prefetch(motion.dv_ext[body]);
         }
-        motion.supported.note(points.all[k], model_->bodies, motion.velocity, motion.dv_ext);
+        motion.supported.note(points.all[k], bodies, motion.velocity, motion.dv_ext);
     }
 }
 
@@ -156,11 +160,12 @@ OpenPair CandidateSearch::opened(const IndexPair& pair, const Separation& apart)
     return {pair, first.body, second.body, apart, arm(pair.first, first), arm(pair.second, second)};
 }
 
-StepContact& CandidateSearch::add_point(ContactPoints& points, const Contact& contact, const Pose& first,
-                                        const Pose& second, double toi) {
+StepContact& CandidateSearch::add_point(const ContactModel& model, ContactPoints& points,
+                                        const Contact& contact, const Pose& first, const Pose& second,
+                                        double toi) {
     for (const int body : {contact.first, contact.second})
         if (detection.is_asleep(body)) woken.push_back(body);
-    return points.add(*model_, contact, first, second, toi);
+    return points.add(model, contact, first, second, toi);
 }
 
 /// Takes out the points from `from` on of pairs that only graze: they touch with a side or an edge, and as they move no
@@ -168,15 +173,15 @@ StepContact& CandidateSearch::add_point(ContactPoints& points, const Contact& co
 /// obstacle. Whether there are such pairs: they are open then.
 bool CandidateSearch::skip_grazing(std::size_t from, const StepMotion& motion, ContactPoints& points,
                                    Cast::When when) {
-    if (!model_->bodies.swings || from == points.all.size()) return false;
-    const double h = model_->options.time_step;
+    if (!motion.model().bodies.swings || from == points.all.size()) return false;
+    const double h = motion.model().options.time_step;
     grazing_.clear();
-    edges.index(step(motion), points);
+    edges.index(step(motion, points));
     for (std::size_t k = from, end = from; k < points.all.size(); k = end) {
-        const std::uint64_t key = points.all[k].contact.key >> feature_bits;
+        const std::uint64_t key = pair_of(points.all[k].contact);
         std::size_t deepest = k;
         double most = 0.0;
-        for (; end < points.all.size() && points.all[end].contact.key >> feature_bits == key; ++end) {
+        for (; end < points.all.size() && pair_of(points.all[end].contact) == key; ++end) {
             const Contact& contact = points.all[end].contact;
             const double closing = -relative_velocity(points.all[end], contact.point.normal, motion.velocity);
             const double overlap = h * closing - std::max(0.0, contact.point.gap);
@@ -186,24 +191,24 @@ bool CandidateSearch::skip_grazing(std::size_t from, const StepMotion& motion, C
         const Contact& contact = points.all[deepest].contact;
         const IndexPair pair = colliders_of(contact);
         const OpenPair open = opened(pair, {contact.point.gap, contact.point.normal});
-        if (edges.is_grazing(step(motion), points, points.all[deepest], open, most, when))
+        if (edges.is_grazing(step(motion, points), points.all[deepest], open, most, when))
             grazing_.push_back(pair);
     }
     for (const IndexPair& pair : grazing_) {
         const Collider::View one = detection.collider(pair.first), two = detection.collider(pair.second);
         open_.pairs.push_back(opened(
             pair, separation(one.shape, detection.pose(pair.first), two.shape, detection.pose(pair.second))));
-        std::erase_if(points.all, [&](const StepContact& point) {
-            return point.contact.key >> feature_bits == pair_of(pair);
-        });
+        std::erase_if(points.all,
+                      [&](const StepContact& point) { return pair_of(point.contact) == pair_of(pair); });
     }
     return !grazing_.empty();
 }
 
 /// Whether a pair surely does not meet: the direction that separates it keeps it apart for the whole step. The first
 /// round of time_of_impact(), without what that needs before.
-bool CandidateSearch::passes(const OpenPair& open, const StepMotion& motion,
+bool CandidateSearch::passes(const OpenPair& open, const StepMotion& motion, const ContactPoints& points,
                              const std::vector<Vec6>& velocity) const {
+    const ContactOptions& options = motion.model().options;
     const int a = open.first, b = open.second;
     if (motion.event_time[a] >= 0.0 || motion.event_time[b] >= 0.0) return false;
     const double closing = dot(open.apart.normal, linear(velocity[b]) - linear(velocity[a]));
@@ -215,9 +220,9 @@ bool CandidateSearch::passes(const OpenPair& open, const StepMotion& motion,
         turning = first * open.first_arm + second * open.second_arm;
     }
     const double speed = std::max(0.0, closing) + turning;
-    if (!(speed * model_->options.time_step > open.apart.gap)) return open.apart.gap > 0.0;
-    const double slop = edges.slop(step(motion), open);
-    return open.apart.gap > -0.5 * slop && !(speed * model_->options.time_step > open.apart.gap + slop);
+    if (!(speed * options.time_step > open.apart.gap)) return open.apart.gap > 0.0;
+    const double slop = edges.slop(step(motion, points), open);
+    return open.apart.gap > -0.5 * slop && !(speed * options.time_step > open.apart.gap + slop);
 }
 
 }  // namespace spook

@@ -1,7 +1,6 @@
 // The search for contacts: which points are closed where a step begins, and which pairs meet within it, when and where.
 #pragma once
 
-#include <memory>
 #include <vector>
 
 #include "collision/detection.hpp"
@@ -15,8 +14,7 @@ namespace spook {
 
 class CandidateSearch {
 public:
-    CandidateSearch(Detection shapes, std::shared_ptr<const ContactModel> model)
-        : detection(std::move(shapes)), model_(std::move(model)) {}
+    explicit CandidateSearch(Detection shapes) : detection(std::move(shapes)) {}
 
     /// Finds the points that are closed where the step begins, and the pairs near enough to meet.
     void begin(StepMotion& motion, const std::vector<Vec6>& free_velocity, ContactPoints& points);
@@ -42,7 +40,9 @@ public:
     /// Looks where `velocity` leads the pairs that have points; true if some feature swings in and got a row.
     bool find_turned(const std::vector<Vec6>& velocity, const StepMotion& motion, ContactPoints& points);
 
-    SearchedStep step(const StepMotion& motion) const noexcept { return {*model_, detection, motion}; }
+    SearchedStep step(const StepMotion& motion, const ContactPoints& points) const noexcept {
+        return {detection, motion, points};
+    }
     const OpenPairs& open() const noexcept { return open_; }
     const SearchMargins& margins() const noexcept { return margins_; }
 
@@ -54,11 +54,12 @@ private:
     void look_at(const std::vector<IndexPair>& near, StepMotion& motion, ContactPoints& points,
                  Cast::When when);
     bool reachable(const StepMotion& motion, const Contact& contact) const;
-    StepContact& add_point(ContactPoints& points, const Contact& contact, const Pose& first,
-                           const Pose& second, double toi);
+    StepContact& add_point(const ContactModel& model, ContactPoints& points, const Contact& contact,
+                           const Pose& first, const Pose& second, double toi);
     OpenPair opened(const IndexPair& pair, const Separation& apart) const;
     bool skip_grazing(std::size_t from, const StepMotion& motion, ContactPoints& points, Cast::When when);
-    bool passes(const OpenPair& open, const StepMotion& motion, const std::vector<Vec6>& velocity) const;
+    bool passes(const OpenPair& open, const StepMotion& motion, const ContactPoints& points,
+                const std::vector<Vec6>& velocity) const;
     double meeting(const OpenPair& open, const Cast& cast, const StepMotion& motion,
                    const ContactPoints& points) const;
     bool add_toi_point_at_start(const OpenPair& open, double time, const std::vector<Vec6>& velocity,
@@ -69,7 +70,6 @@ private:
     bool is_known(const ContactPoints& points, const Contact& contact, std::size_t from, std::size_t end,
                   double size, bool& named) const;
 
-    std::shared_ptr<const ContactModel> model_;
     OpenPairs open_;
     SearchMargins margins_;
     // Of one look:

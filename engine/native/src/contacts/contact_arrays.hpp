@@ -2,15 +2,9 @@
 #pragma once
 
 #include <algorithm>
-#include <array>
 #include <cstdint>
 #include <utility>
 #include <vector>
-
-#include "collision/detection.hpp"
-#include "contacts/friction_point.hpp"
-#include "contacts/islands.hpp"
-#include "contacts/pivot_system.hpp"
 
 namespace spook {
 
@@ -63,28 +57,6 @@ struct DepthOfPair {
 
     static bool before(const Item& item, std::uint64_t pair) noexcept { return item.first < pair; }
     std::vector<Item> items;  // in order of pairs
-};
-
-/// Of a closed point: which body the forces press on the other.
-struct SupportPair {
-    int first, second;
-    bool first_presses, second_presses, both;  // on each other, supported or not
-};
-
-struct EnergySums {
-    double square = 0.0, linear = 0.0, fall = 0.0;  // E₊ − E = square s² + linear s − fall
-    bool driven = false;
-};
-
-struct ContactArrays {
-    // Of a solve:
-    std::vector<FrictionPoint> friction;
-    std::vector<char> answered;       // per row: the round before found it an answer
-    std::vector<char> pushes;         // see shorten_unsettled()
-    std::vector<double> share;        // per moving body
-    std::vector<EnergySums> sums;     // by island
-    std::vector<Vec6> free_velocity;  // per moving body
-    IslandFinder shortened;
 };
 
 }  // namespace spook

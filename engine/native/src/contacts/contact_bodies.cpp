@@ -5,11 +5,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::contact_bodies;
-
-}  // namespace
 
 ContactBodies::ContactBodies(const Detection& detection, std::vector<int> solver_indices,
                              std::vector<IndexPair> joint_pairs)

@@ -34,8 +34,8 @@ const CachedContact* ContactCache::find(std::uint64_t key) const noexcept {
 bool ContactCache::has_pair(std::uint64_t pair) const noexcept {
     const auto at = std::lower_bound(
         points.begin(), points.end(), pair,
-        [](const CachedContact& cached, std::uint64_t k) { return cached.contact.key >> feature_bits < k; });
-    return at != points.end() && at->contact.key >> feature_bits == pair;
+        [](const CachedContact& cached, std::uint64_t k) { return pair_of(cached.contact) < k; });
+    return at != points.end() && pair_of(at->contact) == pair;
 }
 
 void ContactCache::put_to_sleep(const std::vector<int>& sleepers, std::size_t bodies) {

@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "contacts/contact_geometry.hpp"
-#include "contacts/contact_stage.hpp"
 #include "contacts/solve_quality.hpp"
 #include "contacts/tolerances.hpp"
 #include "linear/elementary.hpp"
@@ -117,109 +116,51 @@ RowsResidual rows_residual(const MixedSystem& system, const std::vector<Friction
 
 SolveQuality judge(const JudgedStep& step, const MixedSystem& system,
                    const std::vector<FrictionPoint>& points, const FrictionReport& report) {
+    const ContactOptions& options = step.motion.model().options;
     SolveQuality quality;
     if (!report.finite || report.rounds + report.pgs_iterations == 0) return quality;
-    const RowsResidual worst = rows_residual(system, points, step.model.options.friction);
+    const RowsResidual worst = rows_residual(system, points, options.friction);
     quality.residual = worst.residual;
-    if (report.converged && step.model.options.solver == SolverKind::direct) return quality;
+    if (report.converged && options.solver == SolverKind::direct) return quality;
     const RowBlock& block = system.rows[worst.row];
-    blame(quality, step.model, step.motion, worst.residual, std::max(block.first, block.second));
+    blame(quality, step.motion, worst.residual, std::max(block.first, block.second));
     if (quality.body < 0 && !report.converged) blame_sunk(quality, step);
     return quality;
 }
 
-void judge_impact(SolveQuality& quality, const ContactModel& model, const StepMotion& motion,
-                  const MixedSystem& hit, const std::vector<FrictionPoint>& points, FrictionModel friction) {
+void judge_impact(SolveQuality& quality, const StepMotion& motion, const MixedSystem& hit,
+                  const std::vector<FrictionPoint>& points, FrictionModel friction) {
     const RowsResidual worst = rows_residual(hit, points, friction);
     if (!(worst.residual > quality.residual)) return;
     quality.residual = worst.residual;
     const RowBlock& block = hit.rows[worst.row];
-    blame(quality, model, motion, worst.residual, std::max(block.first, block.second));
+    blame(quality, motion, worst.residual, std::max(block.first, block.second));
 }
 
 void blame_sunk(SolveQuality& quality, const JudgedStep& step) {
+    const ContactBodies& bodies = step.motion.model().bodies;
     double worst = sunk;
     for (const StepContact& point : step.points.all) {
         if (point.toi >= 0.0 || point.before < 0.0) continue;
-        const auto given = step.initial_penetration.find(point.contact.key >> feature_bits);
-        const double known = elastic_depth(step.model.bodies, point) +
-                             (given == step.initial_penetration.end() ? 0.0 : given->second);
-        const double share =
-            (-point.contact.point.gap - known) / step.model.bodies.moving_size(point.contact);
+        const auto given = step.initial_penetration.find(pair_of(point.contact));
+        const double known =
+            elastic_depth(bodies, point) + (given == step.initial_penetration.end() ? 0.0 : given->second);
+        const double share = (-point.contact.point.gap - known) / bodies.moving_size(point.contact);
         if (!(share > worst)) continue;
         worst = share;
         quality.by = quality.residual;
         quality.sunk = true;
-        quality.body =
-            step.model.bodies.moves(point.contact.first) ? point.contact.first : point.contact.second;
+        quality.body = bodies.moves(point.contact.first) ? point.contact.first : point.contact.second;
     }
 }
 
-void blame(SolveQuality& quality, const ContactModel& model, const StepMotion& motion, double residual,
-           int solver_index) {
+void blame(SolveQuality& quality, const StepMotion& motion, double residual, int solver_index) {
     double speed = 0.0;
     for (const Vec6& v : motion.velocity) speed = std::max(speed, norm(linear(v)));
     // A billionth of the fastest body's speed, or so, is rounding wherever it stands.
-    if (!(residual > model.options.unsettled_residual + 1e-6 * speed)) return;
+    if (!(residual > motion.model().options.unsettled_residual + 1e-6 * speed)) return;
     quality.by = residual;
-    quality.body = model.bodies.body_of[solver_index];
-}
-
-/// `share`, per moving body: what is left of the impulses of its island, where a solve that did not settle would raise
-/// the energy; all of it in islands that joints hold or something drives. Shortens the velocities alike. Islands are of the
-/// points in `pushes`, as the projection's are: what merely lies near pays for no gain.
-void ContactStage::shorten_unsettled(MixedSystem& system, std::size_t joints, const std::vector<char>& pushes,
-                                     std::vector<double>& share) const {
-    const std::size_t bodies = system.mass.size();
-    share.assign(bodies, 1.0);
-    arrays_.shortened.begin(static_cast<int>(bodies));
-    for (std::size_t k = 0; k < joints; ++k) arrays_.shortened.tie(system.rows[k]);
-    for (std::size_t k = 0; k < points_.all.size(); ++k)
-        if (pushes[k])
-            arrays_.shortened.tie(model_->bodies.solver_index[points_.all[k].contact.first],
-                                  model_->bodies.solver_index[points_.all[k].contact.second]);
-    const Islands& islands = arrays_.shortened.find();
-    std::vector<EnergySums>& sums = arrays_.sums;
-    sums.assign(islands.count, {});
-    const auto driven = [&](int first, int second) {
-        sums[islands.of_body[std::max(first, second)]].driven = true;
-    };
-    for (std::size_t k = 0; k < joints; ++k) driven(system.rows[k].first, system.rows[k].second);
-    for (std::size_t k = 0; k < points_.all.size(); ++k) {
-        const Point& point = points_.all[k];
-        if (pushes[k] && (motion_.drive.acts_at(point.contact, model_->surfaces) ||
-                          model_->surfaces.pair(point.contact).compliance > 0.0))
-            driven(model_->bodies.solver_index[point.contact.first],
-                   model_->bodies.solver_index[point.contact.second]);
-    }
-    std::vector<Vec6>& free = arrays_.free_velocity;
-    free = system.momentum;
-    for (std::size_t u = 0; u < bodies; ++u)
-        if (islands.of_body[u] >= 0) solve_six(factor_six(system.mass[u]), free[u]);
-    for (std::size_t b = 0; b < model_->bodies.count(); ++b) {
-        const int u = model_->bodies.solver_index[b];
-        if (u < 0 || islands.of_body[u] < 0) continue;
-        const Vec6 by_contacts = sum(system.velocity[u], free[u], -1.0),
-                   kick = sum(free[u], motion_.velocity[b], -1.0);
-        EnergySums& own = sums[islands.of_body[u]];
-        for (int i = 0; i < 6; ++i)
-            for (int j = 0; j < 6; ++j) {
-                const double m = system.mass[u][6 * i + j];
-                if (m == 0.0) continue;
-                own.square += 0.5 * m * by_contacts[i] * by_contacts[j];
-                own.linear += m * by_contacts[i] * motion_.velocity[b][j];
-                own.fall += 0.5 * m * kick[i] * kick[j];
-            }
-    }
-    for (std::size_t u = 0; u < bodies; ++u) {
-        if (islands.of_body[u] < 0) continue;
-        const auto& [square, linear, fall, is_driven] = sums[islands.of_body[u]];
-        if (is_driven || !(square + linear > fall)) continue;
-        const double root = std::sqrt(linear * linear + 4.0 * square * fall);
-        share[u] = linear > 0.0 ? 2.0 * fall / (linear + root) : (root - linear) / (2.0 * square);
-        for (int i = 0; i < 6; ++i)
-            system.velocity[u][i] = free[u][i] + share[u] * (system.velocity[u][i] - free[u][i]);
-    }
+    quality.body = motion.model().bodies.body_of[solver_index];
 }
 
 }  // namespace spook

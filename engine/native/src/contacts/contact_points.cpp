@@ -9,11 +9,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::contact_points;
-
-}  // namespace
 
 StepContact& ContactPoints::add(const ContactModel& model, const Contact& contact, const Pose& first,
                                 const Pose& second, double toi) {

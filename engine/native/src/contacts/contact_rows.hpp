@@ -11,7 +11,6 @@ namespace spook {
 
 /// What rows are made of.
 struct ContactRows {
-    const ContactModel& model;
     const StepMotion& motion;
     const ContactPoints& points;
 
@@ -30,7 +29,7 @@ private:
 };
 
 /// What a solve found for a point, along world tangents: it may have turned its own. Gives the impulse along the surface.
-Vec3 store_solution(const ContactModel& model, const RowBlock& block, ContactPoints& points,
+Vec3 store_solution(const ContactBodies& bodies, const RowBlock& block, ContactPoints& points,
                     StepContact& point);
 /// Takes down what a point did behind what the others did: its normal impulse, and that along the surface.
 CachedContact& cache_contact(const ContactRows& rows, const MixedSystem& system, const StepContact& point,

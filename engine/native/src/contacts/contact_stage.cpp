@@ -13,6 +13,18 @@ namespace {
 
 using namespace tolerances::contact_stage;
 
+/// Takes down how deep pairs overlap where the run begins: nothing but the scene has brought them there.
+void note_initial_penetrations(const ContactModel& model, const ContactPoints& points,
+                               ContactStage::State& state) {
+    state.initial_penetration_known = true;
+    for (const StepContact& point : points.all) {
+        const double excess = -point.contact.point.gap - elastic_depth(model.bodies, point);
+        if (!(excess > 0.0)) continue;
+        double& given = state.initial_penetration[pair_of(point.contact)];
+        given = std::max(given, excess);
+    }
+}
+
 }  // namespace
 
 ContactStage::ContactStage(Detection detection, const std::vector<SurfaceMaterial>& materials,
@@ -21,30 +33,22 @@ ContactStage::ContactStage(Detection detection, const std::vector<SurfaceMateria
     : model_(std::make_shared<ContactModel>(ContactBodies{detection, std::move(unknown), std::move(joints)},
                                             ContactSurfaces{materials}, options)),
       motion_(model_),
-      search_(std::move(detection), model_),
-      events_(model_),
-      impacts_(model_),
-      projector_(model_, std::move(yielding)) {
-    resting_solver_.floor = options.floor;
-    resting_solver_.refinements = options.refinements;
-}
+      search_(std::move(detection)),
+      projector_(model_, std::move(yielding)) {}
 
 bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6>& velocity,
                           const std::vector<Vec6>& free_velocity) {
-    const std::size_t bodies = model_->bodies.count();
     motion_.begin(poses, velocity, free_velocity);
     projector_.begin_step();
-    // By island, of which there may be as many as bodies, however late; a copy of the stage has no room for them.
-    arrays_.sums.reserve(bodies);
-    correction_.clear();
+    energy_.reserve(model_->bodies.count());
     points_.clear();
-    impacts_.begin_step();
+    impacts_.begin_step(*model_);
     ran_away_ = false;  // of a step that was taken back, or is over
 
     search_.begin(motion_, free_velocity, points_);
     motion_.predict(free_velocity);
     const std::size_t closed_points = points_.all.size();
-    if (!state_.initial_penetration_known) note_initial_penetrations();
+    if (!state_.initial_penetration_known) note_initial_penetrations(*model_, points_, state_);
     if (search_.find_impacts({motion_.predicted}, changed_, false, motion_, points_).pairs > 0) {
         events_.find(search_, motion_, points_);
         search_.move_impacts_to_start(closed_points, motion_.predicted, motion_, points_);
@@ -58,17 +62,6 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     order_points();
     measure_points();
     return true;
-}
-
-/// Takes down how deep pairs overlap where the run begins: nothing but the scene has brought them there.
-void ContactStage::note_initial_penetrations() {
-    state_.initial_penetration_known = true;
-    for (const Point& point : points_.all) {
-        const double excess = -point.contact.point.gap - elastic_depth(model_->bodies, point);
-        if (!(excess > 0.0)) continue;
-        double& given = state_.initial_penetration[point.contact.key >> feature_bits];
-        given = std::max(given, excess);
-    }
 }
 
 bool ContactStage::meets(const std::vector<Vec6>& next, bool stop_hit, bool rebounds) {
@@ -115,149 +108,91 @@ void ContactStage::after_impact(const MixedSystem& system) {
             motion_.release_support(static_cast<int>(b), system.velocity[u]);
             motion_.velocity[b] = system.velocity[u];
         }
-    std::vector<Vec6>& next = next_ = motion_.velocity;
-    for (std::size_t b = 0; b < next.size(); ++b)
+    next_ = motion_.velocity;
+    for (std::size_t b = 0; b < next_.size(); ++b)
         if (model_->bodies.moves(b) && motion_.is_free(b))
-            next[b] = sum(motion_.velocity[b], motion_.dv_ext[b]);
-    changed_.assign(next.size(), 1);
-    const Cast cast{next};
+            next_[b] = sum(motion_.velocity[b], motion_.dv_ext[b]);
+    changed_.assign(next_.size(), 1);
+    const Cast cast{next_};
     search_.widen(cast, changed_, motion_, points_);
     const std::size_t known = points_.all.size();
     if (search_.find_impacts(cast, changed_, false, motion_, points_).pairs > 0) {
         for (std::size_t k = known; k < points_.all.size(); ++k)
-            if (impacts_.order().come_in_order(points_.all[k]))
+            if (impacts_.order().come_in_order(*model_, points_.all[k]))
                 impacts_.order().move_to_last_impact(motion_, points_.all[k]);
-        search_.move_impacts_to_start(known, next, motion_, points_);
+        search_.move_impacts_to_start(known, next_, motion_, points_);
         state_.counters.contacts += points_.all.size() - known;
         order_points();
     }
     measure_points();
-    if (!impacts_.look_again(points_)) motion_.lay_down(points_.all);
+    if (!impacts_.look_again(*model_, points_)) motion_.lay_down(points_.all);
 }
 
 /// After a solve: whether an impact is to come first. Where impacts that rebound were left out, bodies that a plastic impact
 /// sets in motion may meet others with restitution in this very step. The resting rows that answer such impacts know of no
 /// bounce: plastic ones, too, are then met before, so that these are found in time. If there are none, what has been left out is
-/// met as if it did not rebound. So come impacts of bodies that a stop sends back with `next` with others that no row knew
+/// met as if it did not rebound. So come impacts of bodies that a stop sends back with others that no row knew
 /// of: `known` is how many points there were.
-bool ContactStage::needs_impact_first(const MixedSystem& system, std::size_t known,
-                                      const std::vector<Vec6>& next, bool left_out) {
+bool ContactStage::needs_impact_first(const MixedSystem& system, std::size_t known, bool left_out) {
     if (left_out) {
         impacts_.meet_plastic_too();
         if (measure_points()) {
             order_points();
             return true;
         }
-        find_impacts({next, Cast::When::solved}, true);
+        find_impacts({next_, Cast::When::solved}, true);
     }
-    if (points_.all.size() == known || !impacts_.stop_is_hit(system, points_)) return false;
+    if (points_.all.size() == known || !impacts_.stop_is_hit(system, model_->bodies, points_)) return false;
     order_points();
     measure_points();
     return true;
 }
 
-/// What is connected by the step's points.
-const Islands& ContactStage::connected(std::size_t bodies) {
-    connected_.begin(static_cast<int>(bodies));
-    points_.tie(model_->bodies, connected_);
-    return connected_.find();
+bool ContactStage::by_rows(std::size_t joints) const noexcept {
+    return state_.by_rows && joints + points_.all.size() <= few_jointed;
 }
 
 ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity) {
     const std::size_t joints = system.rows.size();
     motion_.velocity = velocity;
     ran_away_ = false;
-    bool warm_started = false;
-    const auto by_rows = [&] { return state_.by_rows && joints + points_.all.size() <= few_jointed; };
     if (model_->options.solver == SolverKind::iterative && !model_->surfaces.resists_turning) {
-        if (by_rows()) pgs_.start(system, model_->options.friction);  // overlaps are parted with its masses
+        if (by_rows(joints))
+            pgs_.start(system, model_->options.friction);  // overlaps are parted with its masses
         else if (const PgsSolveEnd end = solve_by_pgs(system); !end.unfinished) return end;
     }
-    std::vector<FrictionPoint>& friction = arrays_.friction;
-    std::vector<Vec6>& next = next_;
-    FrictionReport report;
-    std::vector<char>& answered = arrays_.answered;
+    bool finite = true;
+    IslandRules rules{.friction = model_->options.friction};
     for (int round = 0;; ++round) {
-        system.rows.resize(joints);
-        friction.clear();
-        answered.assign(joints, 1);
-        for (Point& point : points_.all) {
-            system.rows.push_back(rows().resting(point));
-            answered.push_back(point.answered);
-            if (system.rows.back().size > 1)
-                rows().add_friction(point, static_cast<int>(system.rows.size()) - 1, friction);
-        }
-        if (round == 0) {  // at rest, the velocities before are those after
-            system.velocity.resize(system.mass.size());
-            for (std::size_t b = 0; b < model_->bodies.count(); ++b)
-                if (model_->bodies.moves(b))
-                    system.velocity[model_->bodies.solver_index[b]] = motion_.velocity[b];
-        }
-        const FrictionReport before = report;
-        const bool late = round > 0 && model_->options.solver == SolverKind::direct;
         // What a resting solve leaves, the next step sees; what an impact leaves stays.
-        IslandRules rules{.friction = model_->options.friction,
-                          .enough = state_.by_rows ? model_->options.residual_tolerance
-                                                   : model_->options.unsettled_residual,
-                          .few_enough = ran_away_ ? not_too_large : 0};
-        rules.warm_started = warm_started;
-        if (by_rows()) rules.few_enough = few_jointed;
-        report = solve_islands(system, friction, resting_solver_, model_->options, rules, state_.counters,
-                               late ? &answered : nullptr);
-        report.rounds += before.rounds, report.pgs_iterations += before.pgs_iterations;
-        report.converged = report.converged && before.converged;  // islands may have been left as they were
-        if (model_->options.friction == FrictionModel::box)
-            for (const FrictionPoint& point : friction)
-                points_.own_extras(points_.all[point.block - joints]).guessed = point.normal;
-        if (!report.finite || round == late_rounds) break;
-        move_on(system, next);
+        rules.enough =
+            state_.by_rows ? model_->options.residual_tolerance : model_->options.unsettled_residual;
+        rules.few_enough = by_rows(joints) ? few_jointed : ran_away_ ? not_too_large : 0;
+        finite = resting_.solve(system, joints, rules, round > 0, motion_, points_, state_.counters).finite;
+        if (!finite || round == late_rounds) break;
+        move_on(system);
         const std::size_t known = points_.all.size();
-        changed_.assign(next.size(), 1);
-        const Cast cast{next, Cast::When::solved};
+        changed_.assign(next_.size(), 1);
+        const Cast cast{next_, Cast::When::solved};
         search_.widen(cast, changed_, motion_, points_);
-        search_.find_turned(next, motion_, points_);
-        if (needs_impact_first(system, known, next, find_impacts(cast, impacts_.plastic_too()).left_out))
-            return {};
+        search_.find_turned(next_, motion_, points_);
+        if (needs_impact_first(system, known, find_impacts(cast, impacts_.plastic_too()).left_out)) return {};
         if (points_.all.size() == known) {
             if (passes_other_ends(system, joints, model_->options.time_step)) return {.ends_passed = true};
             break;
         }
         state_.counters.contacts += points_.all.size() - known;
-        for (std::size_t k = 0; k < system.rows.size() - joints; ++k)
-            store_solution(*model_, system.rows[joints + k], points_, points_.all[k]);
+        resting_.store(system, joints, model_->bodies, points_);
         if (joints == 0 && model_->options.solver == SolverKind::direct)
-            warm_started = warm_start_by_pgs(system, known, round) || warm_started;
+            rules.warm_started = warm_start_by_pgs(system, known, round) || rules.warm_started;
         order_points();
     }
     mark_rows(system.mass.size(),
               system.rows);  // the last round may have brought rows to bodies that had none
-    quality_ = judge(judged(), system, friction, report);
-    if (!report.converged) {
-        std::vector<double>& share = arrays_.share;
-        std::vector<char>& pushes = arrays_.pushes;
-        pushes.clear();
-        for (std::size_t k = joints; k < system.rows.size(); ++k) {
-            const auto& z = system.rows[k].multiplier;
-            pushes.push_back(std::any_of(z.begin(), z.begin() + system.rows[k].size,
-                                         [](double each) { return each != 0.0; }));
-        }
-        shorten_unsettled(system, joints, pushes, share);
-        for (std::size_t k = joints; k < system.rows.size(); ++k)
-            for (double& z : system.rows[k].multiplier)
-                z *= share[std::max(system.rows[k].first, system.rows[k].second)];
-    }
-
-    state_.cache.points.clear();
-    for (std::size_t k = 0; k < points_.all.size(); ++k) {
-        Point& point = points_.all[k];
-        const Vec3 along = store_solution(*model_, system.rows[joints + k], points_, point);
-        CachedContact& cached =
-            cache_contact(rows(), system, point, point.normal, along, state_.cache.points);
-        state_.counters.stopped += motion_.is_stopped(point, point.normal);
-        std::copy_n(points_.extras(point).turning, 3, cached.turning);
-    }
-    if (report.finite) correct_events(system);
-    return {.finite = report.finite};
+    quality_ =
+        resting_.deliver(system, joints, judged(), points_, energy_, state_.cache.points, state_.counters);
+    if (finite) correct_events(system);
+    return {.finite = finite};
 }
 
 void ContactStage::mark_rows(std::size_t bodies, const std::vector<RowBlock>& rows) {
@@ -270,38 +205,29 @@ void ContactStage::mark_rows(std::size_t bodies, const std::vector<RowBlock>& ro
 }
 
 /// Velocities of all bodies after a solve; those without rows fly freely.
-void ContactStage::move_on(const MixedSystem& system, std::vector<Vec6>& next) {
+void ContactStage::move_on(const MixedSystem& system) {
     mark_rows(system.mass.size(), system.rows);
-    next.resize(model_->bodies.count());
+    next_.resize(model_->bodies.count());
     for (std::size_t b = 0; b < model_->bodies.count(); ++b) {
         const int u = model_->bodies.solver_index[b];
-        next[b] = u >= 0 && has_rows_[u] ? system.velocity[u] : sum(motion_.velocity[b], motion_.dv_ext[b]);
+        next_[b] = u >= 0 && has_rows_[u] ? system.velocity[u] : sum(motion_.velocity[b], motion_.dv_ext[b]);
     }
 }
 
-/// An event's bodies went with v₋ until its time: with v₊ for the whole step they would end elsewhere.
 void ContactStage::correct_events(const MixedSystem& system) {
-    for (std::size_t b = 0; b < model_->bodies.count(); ++b) {
-        const int u = model_->bodies.solver_index[b];
-        if (u < 0 || motion_.event_time[b] < 0.0 || !has_rows_[u]) continue;
-        if (correction_.empty()) correction_.assign(system.mass.size(), Vec6{});
-        // What a joint holds turns as it goes, or the joint would answer the difference with a speed.
-        for (int i = 0; i < (model_->bodies.jointed[b] ? 6 : 3); ++i)
-            correction_[u][i] += motion_.event_time[b] / model_->options.time_step *
-                                 (motion_.predicted[b][i] - system.velocity[u][i]);
-        const Vec3 more = motion_.free_fall_correction(static_cast<int>(b), linear(system.velocity[u]));
-        for (int i = 0; i < 3; ++i) correction_[u][i] += more[i];
-    }
-    if (motion_.supported.has_released())
-        motion_.supported.book(system, connected(system.mass.size()), model_->bodies, state_.cache.points);
+    motion_.correct_events(system, has_rows_);
+    if (!motion_.supported.has_released()) return;
+    connected_.begin(system, 0);
+    points_.tie(model_->bodies, connected_);
+    motion_.supported.book(system, connected_.find(), model_->bodies, state_.cache.points);
 }
 
 const PositionProjection* ContactStage::project_positions(const MixedSystem& system, std::size_t joints,
                                                           const std::vector<Pose>& poses, bool again) {
     const StepEnd end{search_.detection,          motion_.poses, poses,
                       search_.margins().search(), state_.cache,  state_.initial_penetration};
-    return projector_.project({system, joints, pgs_}, end, motion_.drive, again, state_.initial_penetration,
-                              state_.counters, search_.woken);
+    return projector_.project({system, joints, pgs_.solver()}, end, motion_.drive, again,
+                              state_.initial_penetration, state_.counters, search_.woken);
 }
 
 void ContactStage::apply_balancing_impulse(const Islands& islands, int island, Vec3 momentum) noexcept {
@@ -316,7 +242,7 @@ void ContactStage::apply_balancing_impulse(const Islands& islands, int island, V
 }
 
 BlockLdlt::Counters ContactStage::factor_counters() const noexcept {
-    BlockLdlt::Counters sum = resting_solver_.counters();
+    BlockLdlt::Counters sum = resting_.islands().counters();
     for (const IslandSolver* solver : {&impacts_.solver(), &projector_.solver()}) {
         const BlockLdlt::Counters more = solver->counters();
         sum.factorisations += more.factorisations;
@@ -325,6 +251,36 @@ BlockLdlt::Counters ContactStage::factor_counters() const noexcept {
         sum.solves += more.solves;
     }
     return sum;
+}
+
+void ContactStage::put_to_sleep(const std::vector<int>& bodies) {
+    for (const int body : bodies) search_.detection.set_asleep(body, true);
+    state_.cache.put_to_sleep(bodies, model_->bodies.count());
+}
+
+void ContactStage::wake(const std::vector<int>& bodies) {
+    for (const int body : bodies) search_.detection.set_asleep(body, false);
+    state_.cache.wake(bodies);
+}
+
+void ContactStage::sleep_through() {
+    search_.woken.clear();
+    points_.all.clear();
+    motion_.correction.clear();
+}
+
+void ContactStage::go_back(const Snapshot& kept) {
+    state_ = kept.state;
+    search_.woken.clear();
+    for (std::size_t b = 0; b < model_->bodies.count();
+         ++b) {  // what sleeps is what slept then, for the search as well
+        const int body = static_cast<int>(b);
+        if (const bool slept = state_.cache.sleeps(body); slept != search_.detection.is_asleep(body))
+            search_.detection.set_asleep(body, slept);
+    }
+    resting_.islands().set_backoff(kept.resting);
+    impacts_.solver().set_backoff(kept.impact);
+    projector_.solver().set_backoff(kept.projection);
 }
 
 }  // namespace spook

@@ -49,20 +49,12 @@
 
 #include "collision/detection.hpp"
 #include "contacts/candidate_search.hpp"
-#include "contacts/contact_arrays.hpp"
-#include "contacts/contact_bodies.hpp"
 #include "contacts/contact_cache.hpp"
-#include "contacts/contact_islands.hpp"
-#include "contacts/contact_points.hpp"
-#include "contacts/contact_rows.hpp"
+#include "contacts/contact_pgs.hpp"
 #include "contacts/impact_events.hpp"
 #include "contacts/impact_solver.hpp"
-#include "contacts/pgs_solver.hpp"
 #include "contacts/position_projection.hpp"
-#include "contacts/solve_islands.hpp"
-#include "contacts/solve_quality.hpp"
-#include "contacts/step_motion.hpp"
-#include "linear/large_array.hpp"
+#include "contacts/resting_solver.hpp"
 
 namespace spook {
 
@@ -94,7 +86,7 @@ public:
 
     /// Whether a contact with restitution is approached faster than rounding, or a stop among the rows of joints in
     /// `system` is hit that is connected to bodies in contact; asked anew after each impact.
-    bool impact_needed(const MixedSystem& system) { return impacts_.needed(system, points_); }
+    bool impact_needed(const MixedSystem& system) { return impacts_.needed(system, model_->bodies, points_); }
 
     /// The part of the step's forces that acts on `body` before the impact, or before the last one that hit it.
     double toi_fraction(int body) const noexcept { return motion_.toi_fraction[body]; }
@@ -119,7 +111,7 @@ public:
 
     /// Velocity to add to v₊ when positions advance, per moving body; empty when there is none. It leads an event's
     /// bodies to where they are at the step's end.
-    const std::vector<Vec6>& correction() const noexcept { return correction_; }
+    const std::vector<Vec6>& correction() const noexcept { return motion_.correction; }
 
     /// The displacements by which overlapping bodies part, which are at `poses`, where the step ends; null if there are none.
     /// `system` is that of solve(), with `joints` rows of joints. To be asked `again` when bodies are displaced.
@@ -137,7 +129,7 @@ public:
     /// What this step's contacts did.
     const ContactCache& cache() const noexcept { return state_.cache; }
 
-    // contact_sleep.cpp: bodies that sleep have no pairs with each other, nor with what stands still.
+    // Bodies that sleep have no pairs with each other, nor with what stands still.
     /// These fall asleep where they are, and every body that touches them: what their touches did stays, to be read.
     void put_to_sleep(const std::vector<int>& bodies);
     /// These are awake again, with their touches as they were left.
@@ -148,8 +140,7 @@ public:
     const std::vector<int>& woken() const noexcept { return search_.woken; }
     /// A step that all bodies sleep through.
     void sleep_through();
-    const ContactBodies& bodies() const noexcept { return model_->bodies; }
-    const ContactSurfaces& surfaces() const noexcept { return model_->surfaces; }
+    const ContactModel& model() const noexcept { return *model_; }
 
     /// What a later step depends on: copying it back goes back.
     struct State {
@@ -166,17 +157,11 @@ public:
     };
     void keep(Snapshot& kept) const {
         kept.state = state_;
-        resting_solver_.backoff(kept.resting);
+        resting_.islands().backoff(kept.resting);
         impacts_.solver().backoff(kept.impact);
         projector_.solver().backoff(kept.projection);
     }
-    void go_back(const Snapshot& kept) {
-        lie_as(kept.state);
-        state_ = kept.state;
-        resting_solver_.set_backoff(kept.resting);
-        impacts_.solver().set_backoff(kept.impact);
-        projector_.solver().set_backoff(kept.projection);
-    }
+    void go_back(const Snapshot& kept);
 
     ContactCounters counters() const noexcept { return state_.counters; }
     BlockLdlt::Counters factor_counters() const noexcept;
@@ -184,19 +169,18 @@ public:
     const SolveQuality& quality() const noexcept { return quality_; }
 
 private:
-    using Point = StepContact;
-    void lie_as(const State& state);
-    bool needs_impact_first(const MixedSystem& system, std::size_t known, const std::vector<Vec6>& next,
-                            bool left_out);
+    bool needs_impact_first(const MixedSystem& system, std::size_t known, bool left_out);
     CandidateSearch::Found find_impacts(const Cast& cast, bool keeps_rebounds);
     void order_points() { points_.order(state_.cache, model_->surfaces.resists_turning); }
     bool measure_points() { return impacts_.measure(motion_, search_.margins().reach(), points_); }
-    ContactRows rows() const noexcept { return {*model_, motion_, points_}; }
-    const Islands& connected(std::size_t bodies);
     void after_impact(const MixedSystem& system);
     void mark_rows(std::size_t bodies, const std::vector<RowBlock>& rows);
-    void move_on(const MixedSystem& system, std::vector<Vec6>& next);
-    // contact_pgs.cpp: the same by PGS over compact contacts
+    void move_on(const MixedSystem& system);
+    void correct_events(const MixedSystem& system);
+    /// Whether few rows are solved directly though iterations are asked for.
+    bool by_rows(std::size_t joints) const noexcept;
+    JudgedStep judged() const noexcept { return {motion_, points_, state_.initial_penetration}; }
+    // solve_by_pgs.cpp: the same by PGS over compact contacts
     struct PgsSolveEnd : SolveEnd {
         bool unfinished =
             false;  // few joints and contacts are better solved by rows, or the iterations run away
@@ -207,27 +191,7 @@ private:
         bool iterating = false;  // PGS goes on: what bodies do so far is not final
         bool left_out = false;   // some impact that rebounds was
     };
-    struct Unanswered {
-        std::vector<int> island;          // of each point
-        std::vector<char> open;           // islands to be solved
-        std::vector<std::size_t> points;  // of each
-        std::size_t largest = 0;          // points of one of those
-    };
-    const Unanswered& find_unanswered(std::size_t bodies, std::size_t known);
     bool find_more(bool over, PgsLook& look);
-    void take_in(std::size_t known);
-    struct PgsEnd {
-        bool settled = false,
-             joint_is_worst = false;  // as near to their law as the method asks for; else a joint is furthest
-    };
-    PgsEnd judge_pgs(MixedSystem& system);
-    JudgedStep judged() const noexcept { return {*model_, motion_, points_, state_.initial_penetration}; }
-    bool runs_away(const MixedSystem& system) const;
-    void hand_over();
-    void shorten_unsettled(MixedSystem& system, std::size_t joints, const std::vector<char>& pushes,
-                           std::vector<double>& share) const;
-    void correct_events(const MixedSystem& system);
-    void note_initial_penetrations();
 
     State state_;
     std::shared_ptr<ContactModel> model_;
@@ -236,21 +200,15 @@ private:
     ContactPoints points_;
     ImpactEvents events_;
     ImpactSolver impacts_;
-    IslandSolver resting_solver_;
-    PgsSolver pgs_;
+    RestingSolver resting_;
+    ContactPgs pgs_;
+    EnergyLimit energy_;
     PositionProjector projector_;
-    bool ran_away_ = false;        // in this solve: islands that are not too large are solved directly
-    std::vector<Vec6> next_;       // velocities between iterations, per body of the scene
-    std::vector<char> changed_;    // bodies with another than at the look before: the rest was judged then
-    std::size_t handed_over_ = 0;  // points the PGS solver has
-    Unanswered unanswered_;
-    std::vector<CachedContact> unordered_;
-    mutable ContactArrays arrays_;  // what is in them is of one call
-
+    bool ran_away_ = false;      // in this solve: islands that are not too large are solved directly
+    std::vector<Vec6> next_;     // velocities between iterations, per body of the scene
+    std::vector<char> changed_;  // bodies with another than at the look before: the rest was judged then
     IslandFinder connected_;
-    std::vector<std::pair<std::uint64_t, std::size_t>> places_;  // of points, by key
-    std::vector<char> has_rows_;                                 // moving bodies with rows, by unknown
-    std::vector<Vec6> correction_;
+    std::vector<char> has_rows_;  // moving bodies with rows, by unknown
     SolveQuality quality_;
 };
 

@@ -33,7 +33,7 @@ bool CandidateSearch::is_known(const ContactPoints& points, const Contact& conta
     const auto same = [&](const StepContact& point) {
         const Contact& old = point.contact;
         named = named || old.key == contact.key;
-        return old.key >> feature_bits == contact.key >> feature_bits &&
+        return pair_of(old) == pair_of(contact) &&
                dot(old.point.normal, contact.point.normal) > same_direction_cosine &&
                norm(old.point.position - contact.point.position) < same_place * size;
     };
@@ -44,25 +44,26 @@ bool CandidateSearch::is_known(const ContactPoints& points, const Contact& conta
 /// Looks where `velocity` leads the pairs that have points; true if some feature swings in and got a row.
 bool CandidateSearch::find_turned(const std::vector<Vec6>& velocity, const StepMotion& motion,
                                   ContactPoints& points) {
-    if (!model_->bodies.swings) return false;
-    const double h = model_->options.time_step;
+    const ContactBodies& bodies = motion.model().bodies;
+    if (!bodies.swings) return false;
+    const double h = motion.model().options.time_step;
     const std::size_t known = points.all.size();
     for (std::size_t from = 0, end = 0; from < points.ordered; from = end) {
-        const std::uint64_t key = points.all[from].contact.key >> feature_bits;
+        const std::uint64_t key = pair_of(points.all[from].contact);
         double depth = 0.0;
-        for (; end < points.ordered && points.all[end].contact.key >> feature_bits == key; ++end)
+        for (; end < points.ordered && pair_of(points.all[end].contact) == key; ++end)
             depth = std::max(depth, -points.all[end].contact.point.gap);
         const IndexPair pair{static_cast<int>(key >> 24), static_cast<int>(key & 0xffffff)};
         const Collider::View one = detection.collider(pair.first), two = detection.collider(pair.second);
         if (points.all[from].event || (is_single(one.shape) && is_single(two.shape))) continue;
         const int a = one.body, b = two.body;
-        const double size = std::max(model_->bodies.radius[a], model_->bodies.radius[b]);
-        const double turning = norm(angular(velocity[a])) * model_->bodies.radius[a] +
-                               norm(angular(velocity[b])) * model_->bodies.radius[b];
+        const double size = std::max(bodies.radius[a], bodies.radius[b]);
+        const double turning =
+            norm(angular(velocity[a])) * bodies.radius[a] + norm(angular(velocity[b])) * bodies.radius[b];
         const double sliding = norm(linear(velocity[a]) - linear(velocity[b]));
         if (h * (sliding + turning) < deep * size) continue;
-        const Mover first = step(motion).mover(pair.first, motion.poses[a], velocity),
-                    second = step(motion).mover(pair.second, motion.poses[b], velocity);
+        const Mover first = step(motion, points).mover(pair.first, motion.poses[a], velocity),
+                    second = step(motion, points).mover(pair.second, motion.poses[b], velocity);
         const Pose first_end = first.body_at(h), second_end = second.body_at(h);
         scratch_.clear();
         detection.collide_pair(pair, first_end, second_end, 0.0, scratch_);
@@ -77,7 +78,8 @@ bool CandidateSearch::find_turned(const std::vector<Vec6>& velocity, const StepM
             bool named = false;
             if (is_known(points, contact, from, end, size, named)) continue;
             if (named) contact.key |= swung_in;
-            StepContact& point = add_point(points, contact, motion.poses[a], motion.poses[b], h);
+            StepContact& point =
+                add_point(motion.model(), points, contact, motion.poses[a], motion.poses[b], h);
             const double closing = -relative_velocity(point, contact.point.normal, velocity);
             point.contact.point.gap = std::max(0.0, contact.point.gap + h * closing);
         }

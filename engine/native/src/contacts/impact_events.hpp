@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "contacts/candidate_search.hpp"
@@ -12,7 +11,6 @@ namespace spook {
 
 class ImpactEvents {
 public:
-    explicit ImpactEvents(std::shared_ptr<const ContactModel> model) : model_(std::move(model)) {}
     /// Islands of balls whose only impact is one pair, and in which nothing else is approached, are moved to the impact's
     /// time. Balls, since other shapes would have to be turned to that time as well, and a turn without the momentum
     /// that goes with it changes the energy. A supported body that moves along the forces would gain energy by it, unless what
@@ -28,7 +26,6 @@ private:
         std::vector<double> when, speed;
         std::vector<std::size_t> moving_along, may_move_along;  // how many move along the forces, and may
     };
-    std::shared_ptr<const ContactModel> model_;
     DisjointSets connected_;  // bodies, by contacts and joints
     Arrays arrays_;
 };

@@ -29,14 +29,14 @@ void put_on_mover(StepContact& point, bool first_moves, bool second_moves) noexc
 /// When an open pair that does not surely pass meets, s; negative if it does not in this step.
 double CandidateSearch::meeting(const OpenPair& open, const Cast& cast, const StepMotion& motion,
                                 const ContactPoints& points) const {
-    const SearchedStep at = step(motion);
+    const SearchedStep at = step(motion, points);
     const Pose at_first = motion.moved(open.first, cast.velocity),
                at_second = motion.moved(open.second, cast.velocity);
     const Mover first = at.mover(open.pair.first, at_first, cast.velocity),
                 second = at.mover(open.pair.second, at_second, cast.velocity);
-    const double time = time_of_impact(first, second, model_->options.time_step, edges.slop(at, open));
-    if (time < 0.0 || edges.is_internal_edge(at, points, first, open.first, second, open, cast, time) ||
-        edges.is_internal_edge(at, points, second, open.second, first, open, cast, time))
+    const double time = time_of_impact(first, second, motion.model().options.time_step, edges.slop(at, open));
+    if (time < 0.0 || edges.is_internal_edge(at, first, open.first, second, open, cast, time) ||
+        edges.is_internal_edge(at, second, open.second, first, open, cast, time))
         return -1.0;
     return time;
 }
@@ -47,7 +47,7 @@ CandidateSearch::Found CandidateSearch::find_impacts(const Cast& cast, const std
     const std::vector<Vec6>& velocity = cast.velocity;
     const bool late = cast.when != Cast::When::ahead;
     meetings_.clear();
-    if (model_->bodies.swings && !open_.pairs.empty()) edges.index(step(motion), points);
+    if (motion.model().bodies.swings && !open_.pairs.empty()) edges.index(step(motion, points));
     open_.drop_met(most_met);
     asked_.resize(open_.pairs.size() + 1);
     std::size_t count = 0;
@@ -59,7 +59,7 @@ CandidateSearch::Found CandidateSearch::find_impacts(const Cast& cast, const std
     for (std::size_t at = 0; at < all; ++at) {  // nearly all pass: the others are gathered first
         asked_[count] = asked_[at];
         const OpenPair& open = open_.pairs[asked_[at]];
-        count += !open.has_met() && !passes(open, motion, velocity);
+        count += !open.has_met() && !passes(open, motion, points, velocity);
     }
     for (std::size_t at = 0; at < count; ++at) {
         if (at + ahead < count) {
@@ -71,7 +71,7 @@ CandidateSearch::Found CandidateSearch::find_impacts(const Cast& cast, const std
         if (const double time = meeting(open_.pairs[asked_[at]], cast, motion, points); !(time < 0.0))
             meetings_.push_back({asked_[at], time});
     }
-    edges.remove_occluded(step(motion), open_.pairs, velocity, meetings_);
+    edges.remove_occluded(step(motion, points), open_.pairs, velocity, meetings_);
     Found found;
     for (std::size_t at = 0; at < meetings_.size(); ++at) {
         if (at + ahead < meetings_.size()) {
@@ -97,12 +97,13 @@ CandidateSearch::Found CandidateSearch::find_impacts(const Cast& cast, const std
 bool CandidateSearch::add_toi_point_at_start(const OpenPair& open, double time,
                                              const std::vector<Vec6>& velocity, bool keeps_rebounds,
                                              const StepMotion& motion, ContactPoints& points) {
-    bool elsewhere = !(model_->bodies.moves(open.first) && model_->bodies.moves(open.second));
+    const ContactBodies& bodies = motion.model().bodies;
+    bool elsewhere = !(bodies.moves(open.first) && bodies.moves(open.second));
     for (const int collider : {open.pair.first, open.pair.second}) {
         const Collider::View own = detection.collider(collider);
         const bool flat = own.shape.kind == ShapeKind::plane;
         if (!flat && own.shape.kind != ShapeKind::sphere) return false;
-        if (!keeps_rebounds && model_->surfaces[own.body].restitution > 0.0) return false;
+        if (!keeps_rebounds && motion.model().surfaces[own.body].restitution > 0.0) return false;
         if (flat && angular(velocity[own.body]) == Vec3{}) elsewhere = false;
     }
     if (elsewhere) return false;
@@ -111,9 +112,9 @@ bool CandidateSearch::add_toi_point_at_start(const OpenPair& open, double time,
     detection.collide_pair(open.pair, margins_.search()[a] + margins_.search()[b], scratch_);
     if (scratch_.empty()) return false;
     const Contact& contact = scratch_.front();
-    add_point(points, contact, motion.poses[a], motion.poses[b], time);
+    add_point(motion.model(), points, contact, motion.poses[a], motion.poses[b], time);
     const double closing = relative_velocity(points.all.back(), contact.point.normal, velocity);
-    const bool stops = contact.point.gap + model_->options.time_step * closing < 0.0;
+    const bool stops = contact.point.gap + motion.model().options.time_step * closing < 0.0;
     if (stops) points.all.back().at_start = true;
     else points.all.pop_back();
     return stops;
@@ -123,14 +124,15 @@ bool CandidateSearch::add_toi_point_at_start(const OpenPair& open, double time,
 bool CandidateSearch::add_toi_points(const OpenPair& open, double time, const std::vector<Vec6>& velocity,
                                      bool leaves_rebounds, const StepMotion& motion, ContactPoints& points,
                                      bool& left_out) {
-    const SearchedStep at = step(motion);
+    const ContactBodies& bodies = motion.model().bodies;
+    const SearchedStep at = step(motion, points);
     const int a = open.first, b = open.second;
     const Pose begun_first = motion.moved(a, velocity), begun_second = motion.moved(b, velocity),
                first = at.mover(open.pair.first, begun_first, velocity).body_at(time),
                second = at.mover(open.pair.second, begun_second, velocity).body_at(time);
     const Vec3 led = (begun_first.position - motion.poses[a].position) -
                      (begun_second.position - motion.poses[b].position);
-    const double radius = std::max(model_->bodies.radius[a], model_->bodies.radius[b]);
+    const double radius = std::max(bodies.radius[a], bodies.radius[b]);
     scratch_.clear();
     detection.collide_pair(open.pair, first, second,
                            std::max(margins_.reach()[a] + margins_.reach()[b], 2.0 * closed * radius),
@@ -138,16 +140,17 @@ bool CandidateSearch::add_toi_points(const OpenPair& open, double time, const st
     bool met = false;
     for (const Contact& contact : scratch_) {
         if (is_turned_through(detection, contact, first, second, velocity, motion.dv_ext,
-                              model_->options.time_step))
+                              motion.model().options.time_step))
             continue;
-        StepContact& point = add_point(points, contact, first, second, time);
+        StepContact& point = add_point(motion.model(), points, contact, first, second, time);
         const double closing = -relative_velocity(point, contact.point.normal, velocity);
         // What forces give to one of them in this step is no impact, though both got it before one was held.
         const double push =
             std::max({std::abs(relative_velocity(point, contact.point.normal, motion.dv_ext)),
                       std::abs(dot(contact.point.normal, linear(motion.dv_ext[contact.first]))),
                       std::abs(dot(contact.point.normal, linear(motion.dv_ext[contact.second])))});
-        if (leaves_rebounds && model_->surfaces.pair(contact).restitution > 0.0 && closing > 4.0 * push) {
+        if (leaves_rebounds && motion.model().surfaces.pair(contact).restitution > 0.0 &&
+            closing > 4.0 * push) {
             left_out = true;
             points.all.pop_back();
             continue;
@@ -163,7 +166,8 @@ bool CandidateSearch::add_toi_points(const OpenPair& open, double time, const st
 
 void CandidateSearch::move_impacts_to_start(std::size_t from, const std::vector<Vec6>& velocity,
                                             const StepMotion& motion, ContactPoints& points) {
-    const double h = model_->options.time_step;
+    const ContactBodies& bodies = motion.model().bodies;
+    const double h = motion.model().options.time_step;
     const auto is_there = [](const StepContact& point) { return point.at_start || point.toi < 0.0; };
     if (std::all_of(points.all.begin() + static_cast<std::ptrdiff_t>(from), points.all.end(), is_there))
         return;
@@ -177,9 +181,7 @@ void CandidateSearch::move_impacts_to_start(std::size_t from, const std::vector<
         const Contact meeting = found[k].contact;
         const double toi = found[k].toi;
         std::size_t end = k;
-        while (end < found.size() &&
-               (found[end].contact.key >> feature_bits) == (meeting.key >> feature_bits))
-            ++end;
+        while (end < found.size() && pair_of(found[end].contact) == (pair_of(meeting))) ++end;
         if (toi < 0.0 || found[k].event || found[k].at_start) {
             for (; k < end; ++k) points.all.push_back(found[k]);
             continue;
@@ -191,8 +193,8 @@ void CandidateSearch::move_impacts_to_start(std::size_t from, const std::vector<
         const std::size_t old = points.all.size();
         bool stops = false;
         // Past an edge, another side is met than the one that is faced at the start; of two that move, surely another.
-        const bool fixed = std::min(model_->bodies.solver_index[meeting.first],
-                                    model_->bodies.solver_index[meeting.second]) < 0;
+        const bool fixed =
+            std::min(bodies.solver_index[meeting.first], bodies.solver_index[meeting.second]) < 0;
         const double same =
             fixed ? same_side
             : have_sides(detection.collider(pair.first).shape, detection.collider(pair.second).shape)
@@ -205,10 +207,9 @@ void CandidateSearch::move_impacts_to_start(std::size_t from, const std::vector<
         for (const Contact& contact : scratch_) {
             const Pose &one = motion.poses[contact.first], &two = motion.poses[contact.second];
             if (is_turned_through(detection, contact, one, two, velocity, motion.dv_ext, h)) continue;
-            add_point(points, contact, one, two, toi);
-            if (model_->surfaces.pair(contact).restitution > 0.0)
-                put_on_mover(points.all.back(), model_->bodies.moves(contact.first),
-                             model_->bodies.moves(contact.second));
+            add_point(motion.model(), points, contact, one, two, toi);
+            if (motion.model().surfaces.pair(contact).restitution > 0.0)
+                put_on_mover(points.all.back(), bodies.moves(contact.first), bodies.moves(contact.second));
             stops = stops || contact.point.gap + h * relative_velocity(points.all.back(),
                                                                        contact.point.normal, velocity) <
                                  0.0;
@@ -221,9 +222,8 @@ void CandidateSearch::move_impacts_to_start(std::size_t from, const std::vector<
         for (; k < end; ++k) {
             StepContact& p = points.all.emplace_back(found[k]);
             const int a = p.contact.first, b = p.contact.second;
-            const bool alone =
-                !(model_->bodies.moves(a) && model_->bodies.moves(b));  // then its arm is that of the meeting
-            const Vec3 own = linear(velocity[!model_->bodies.moves(a) ? b : a]);
+            const bool alone = !(bodies.moves(a) && bodies.moves(b));  // then its arm is that of the meeting
+            const Vec3 own = linear(velocity[!bodies.moves(a) ? b : a]);
             p.contact.point.position -= p.toi * (alone ? own : 0.5 * (own + linear(velocity[b])));
             if (alone) continue;
             p.first_arm = p.contact.point.position - motion.poses[a].position;

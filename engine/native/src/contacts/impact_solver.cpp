@@ -89,16 +89,12 @@ Vec3 impulse_of(const RowBlock& block) {
 
 }  // namespace
 
-ImpactSolver::ImpactSolver(std::shared_ptr<const ContactModel> model)
-    : model_(std::move(model)), order_(model_) {
-    solver_.floor = model_->options.floor;
-    solver_.refinements = model_->options.refinements;
-}
-
-void ImpactSolver::begin_step() {
+void ImpactSolver::begin_step(const ContactModel& model) {
+    solver_.floor = model.options.floor;
+    solver_.refinements = model.options.refinements;
     needed_ = plastic_too_ = false;
     rounds_ = 0;
-    order_.begin();
+    order_.begin(model);
 }
 
 /// A pair that meets at more points than its motion can tell apart may share an impact among them in many ways, and
@@ -127,8 +123,9 @@ void ImpactSolver::share_impact(MixedSystem& hit, std::size_t joints, const Cont
 void ImpactSolver::solve_rows(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
                               const IslandRules& rules, const StepMotion& motion, ContactCounters& counters,
                               SolveQuality& quality) {
+    const ContactOptions& options = motion.model().options;
     const std::vector<FrictionPoint>& fresh = work_.first_friction = friction;
-    FrictionReport report = solve_islands(hit, friction, solver_, model_->options, rules, counters);
+    FrictionReport report = solve_islands(hit, friction, solver_, options, rules, counters);
     if (report.converged && is_broken(hit, joints)) {
         for (std::size_t k = joints; k < hit.rows.size(); ++k) {
             RowBlock& block = hit.rows[k];
@@ -137,7 +134,7 @@ void ImpactSolver::solve_rows(MixedSystem& hit, std::size_t joints, std::vector<
             block.softness[0] = impact_compliance * own_inertia(hit, block, 0);
         }
         friction = fresh;
-        report = solve_islands(hit, friction, solver_, model_->options, rules, counters);
+        report = solve_islands(hit, friction, solver_, options, rules, counters);
     }
     bool settled = report.converged;
     std::vector<double>& asked = filled(work_.asked, 0);
@@ -161,13 +158,12 @@ void ImpactSolver::solve_rows(MixedSystem& hit, std::size_t joints, std::vector<
             block.right[0] = right;
         }
         if (change <= left * fastest || again == most_again) break;
-        report = solve_islands(hit, friction, solver_, model_->options, rules, counters, &answered);
+        report = solve_islands(hit, friction, solver_, options, rules, counters, &answered);
         settled = settled && report.converged;
     }
-    const double enough =
-        model_->options.solver == SolverKind::direct ? 0.0 : model_->options.residual_tolerance;
+    const double enough = options.solver == SolverKind::direct ? 0.0 : options.residual_tolerance;
     if (report.finite && change > std::max(enough, tolerated * fastest)) ++counters.unsettled;
-    if (report.finite && !settled) judge_impact(quality, *model_, motion, hit, friction, rules.friction);
+    if (report.finite && !settled) judge_impact(quality, motion, hit, friction, rules.friction);
 }
 
 /// Whether a joint's stop takes part in impacts: it sends back what hits it, or plastic impacts are met as well.
@@ -176,20 +172,22 @@ bool ImpactSolver::is_hit(const RowBlock& block) const noexcept {
 }
 
 /// What is connected by rows of joints and by the step's points.
-const Islands& ImpactSolver::connected(const MixedSystem& system, const ContactPoints& points) {
+const Islands& ImpactSolver::connected(const MixedSystem& system, const ContactBodies& bodies,
+                                       const ContactPoints& points) {
     connected_.begin(system, system.rows.size());
-    points.tie(model_->bodies, connected_);
+    points.tie(bodies, connected_);
     return connected_.find();
 }
 
-bool ImpactSolver::stop_is_hit(const MixedSystem& system, const ContactPoints& points) {
+bool ImpactSolver::stop_is_hit(const MixedSystem& system, const ContactBodies& bodies,
+                               const ContactPoints& points) {
     if (points.all.empty()) return false;
     const auto hit = [this](const RowBlock& block) { return is_hit(block); };
     if (std::none_of(system.rows.begin(), system.rows.end(), hit)) return false;
     if (rounds_ > most_rounds(points.all.size())) return false;
-    const Islands& islands = connected(system, points);
+    const Islands& islands = connected(system, bodies, points);
     const auto own = [&](const StepContact& point) {
-        return islands.of_body[model_->bodies.solver_body(point.contact)];
+        return islands.of_body[bodies.solver_body(point.contact)];
     };
     std::vector<char>& touched = filled(work_.touched, islands.count);
     for (const StepContact& point : points.all) touched[own(point)] = 1;
@@ -201,10 +199,10 @@ bool ImpactSolver::stop_is_hit(const MixedSystem& system, const ContactPoints& p
 /// Leaves out points that close where nothing is approached and no stop is hit: what goes on elsewhere is nothing to their
 /// bodies. Then the rows of joints as an impact sees them, of those that are connected to a point that is left, or that
 /// have a stop which is hit beside a point.
-void ImpactSolver::take_part(MixedSystem& system, const ContactPoints& points) {
-    const Islands& islands = connected(system, points);
+void ImpactSolver::take_part(MixedSystem& system, const ContactModel& model, const ContactPoints& points) {
+    const Islands& islands = connected(system, model.bodies, points);
     const auto own = [&](const StepContact& point) {
-        return islands.of_body[model_->bodies.solver_body(point.contact)];
+        return islands.of_body[model.bodies.solver_body(point.contact)];
     };
     const auto island = [&](const RowBlock& block) {
         return islands.of_body[std::max(block.first, block.second)];
@@ -212,7 +210,7 @@ void ImpactSolver::take_part(MixedSystem& system, const ContactPoints& points) {
     std::vector<std::size_t>& hit_points = work_.hit_points;
     const auto is_met =
         [&](const StepContact& point) {  // where impacts come in order, plastic ones have their turn
-            return order_.come_in_order(point) ? point.approach < -point.rounding : is_impact(point);
+            return order_.come_in_order(model, point) ? point.approach < -point.rounding : is_impact(point);
         };
     std::vector<char>&touched = filled(work_.touched, islands.count),
     &taking_part = filled(work_.taking_part, islands.count);
@@ -254,6 +252,8 @@ bool ImpactSolver::is_impact(const StepContact& point) const noexcept {
 SolveQuality ImpactSolver::solve(MixedSystem& system, const OpenPairs& open, std::size_t few_enough,
                                  StepMotion& motion, ContactPoints& points, std::vector<Vec6>& impulses,
                                  ContactCounters& counters) {
+    const ContactOptions& options = motion.model().options;
+    const ContactSurfaces& surfaces = motion.model().surfaces;
     ++counters.impacts;
     ++rounds_;
     SolveQuality quality;
@@ -267,9 +267,9 @@ SolveQuality ImpactSolver::solve(MixedSystem& system, const OpenPairs& open, std
     hit.mass = system.mass;
     hit.momentum = system.momentum;
     hit.rows.clear(), hit.velocity.clear();
-    take_part(system, points);
+    take_part(system, motion.model(), points);
     const std::size_t joints = hit.rows.size();
-    const ContactRows rows{*model_, motion, points};
+    const ContactRows rows{motion, points};
     std::vector<FrictionPoint>& friction = filled(work.friction, 0);
     std::vector<std::size_t>& pushed = filled(work.pushed, 0);
     std::vector<Vec6>& before = work.before = hit.momentum;
@@ -288,8 +288,8 @@ SolveQuality ImpactSolver::solve(MixedSystem& system, const OpenPairs& open, std
             friction.push_back({static_cast<int>(hit.rows.size()), point.friction, 0.0, -1.0});
             friction.back().anisotropic = points.extras(point).is_anisotropic();
             const double slip = point.bounce > 0.0 && is_impact(point)
-                                    ? std::max(model_->surfaces[point.contact.first].tangential_restitution,
-                                               model_->surfaces[point.contact.second].tangential_restitution)
+                                    ? std::max(surfaces[point.contact.first].tangential_restitution,
+                                               surfaces[point.contact.second].tangential_restitution)
                                     : 0.0;
             for (int i = 1; i < 3 && slip > 0.0; ++i)
                 block.right[i] -= returned[j][i - 1] =
@@ -298,9 +298,9 @@ SolveQuality ImpactSolver::solve(MixedSystem& system, const OpenPairs& open, std
         hit.rows.push_back(block);
     }
     // No step before has anything to say about an impact: the box takes this one's own normal impulses.
-    const bool box = model_->options.friction == FrictionModel::box;
-    const IslandRules rules{.friction = box ? FrictionModel::scaled_box : model_->options.friction,
-                            .enough = model_->options.residual_tolerance,
+    const bool box = options.friction == FrictionModel::box;
+    const IslandRules rules{.friction = box ? FrictionModel::scaled_box : options.friction,
+                            .enough = options.residual_tolerance,
                             .few_enough = few_enough};
     share_impact(hit, joints, points);
     work.start = hit, work.fresh = friction;
@@ -357,15 +357,15 @@ SolveQuality ImpactSolver::solve(MixedSystem& system, const OpenPairs& open, std
 
 bool ImpactSolver::measure(const StepMotion& motion, const std::vector<double>& reach,
                            ContactPoints& points) {
-    const double h = model_->options.time_step;
+    const double h = motion.model().options.time_step;
     needed_ = false;
     for (StepContact& point : points.all) {
         const Contact& contact = point.contact;
         const double gap = contact.point.gap;
         motion.measure(point);
-        const double psi = model_->surfaces.pair(contact).restitution, speed = -point.approach;
+        const double psi = motion.model().surfaces.pair(contact).restitution, speed = -point.approach;
         point.bounce = -1.0;
-        if (model_->bodies.is_closed(contact)) {
+        if (motion.model().bodies.is_closed(contact)) {
             point.bounce = speed > 0.0 ? psi : 0.0;
         } else if (plastic_too_ && point.impact > 0.0) {  // an impact of this step has brought them together
             point.bounce = 0.0;
@@ -384,11 +384,11 @@ bool ImpactSolver::measure(const StepMotion& motion, const std::vector<double>& 
     return needed_;
 }
 
-bool ImpactSolver::look_again(const ContactPoints& points) {
+bool ImpactSolver::look_again(const ContactModel& model, const ContactPoints& points) {
     needed_ = false;
     const bool again = rounds_ <= most_rounds(points.all.size());
     for (const StepContact& point : points.all) {
-        if (order_.come_in_order(point))
+        if (order_.come_in_order(model, point))
             needed_ |= again && point.bounce >= 0.0 && point.approach < -point.rounding;
         else if (rounds_ < simultaneous_rounds)  // what was hit already is not hit again
             needed_ |= point.impact == 0.0 && point.toi >= 0.0 && is_impact(point);

@@ -9,7 +9,6 @@
 #pragma once
 
 #include <array>
-#include <memory>
 #include <utility>
 #include <vector>
 
@@ -24,8 +23,7 @@ namespace spook {
 
 class ImpactSolver {
 public:
-    explicit ImpactSolver(std::shared_ptr<const ContactModel> model);
-    void begin_step();
+    void begin_step(const ContactModel& model);
     /// From now on in this step plastic impacts are met in the impact as well.
     void meet_plastic_too() noexcept { plastic_too_ = true; }
     bool plastic_too() const noexcept { return plastic_too_; }
@@ -34,13 +32,13 @@ public:
     /// Whether an impact is needed.
     bool measure(const StepMotion& motion, const std::vector<double>& reach, ContactPoints& points);
     /// The same after an impact, of points that are measured: what was hit already is not hit again.
-    bool look_again(const ContactPoints& points);
-    bool needed(const MixedSystem& system, const ContactPoints& points) {
-        return needed_ || stop_is_hit(system, points);
+    bool look_again(const ContactModel& model, const ContactPoints& points);
+    bool needed(const MixedSystem& system, const ContactBodies& bodies, const ContactPoints& points) {
+        return needed_ || stop_is_hit(system, bodies, points);
     }
     /// Whether some stop is hit where contacts are to hear of it: what it sets in motion may push them, and
     /// Newton's law for it and resting rows for them would raise the energy. A stop alone is left to the resting stage.
-    bool stop_is_hit(const MixedSystem& system, const ContactPoints& points);
+    bool stop_is_hit(const MixedSystem& system, const ContactBodies& bodies, const ContactPoints& points);
 
     /// See ContactStage::impact(). `few_enough`: see IslandRules. Of the pairs that are open some may be next. Gives how near to
     /// its law the worst solve was left.
@@ -56,14 +54,14 @@ public:
 private:
     bool is_hit(const RowBlock& block) const noexcept;
     bool is_impact(const StepContact& point) const noexcept;
-    const Islands& connected(const MixedSystem& system, const ContactPoints& points);
-    void take_part(MixedSystem& system, const ContactPoints& points);
+    const Islands& connected(const MixedSystem& system, const ContactBodies& bodies,
+                             const ContactPoints& points);
+    void take_part(MixedSystem& system, const ContactModel& model, const ContactPoints& points);
     void share_impact(MixedSystem& hit, std::size_t joints, const ContactPoints& points);
     void solve_rows(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
                     const IslandRules& rules, const StepMotion& motion, ContactCounters& counters,
                     SolveQuality& quality);
 
-    std::shared_ptr<const ContactModel> model_;
     IslandSolver solver_;
     SuccessiveImpacts order_;
     bool needed_ = false, plastic_too_ = false;

@@ -36,11 +36,11 @@ bool meets_side_face(const Mover& one, const Mover& other, double time, Vec3 n) 
 /// How deep a closed point is at the start of the step, and what the velocity then adds to it before that is answered, m.
 /// When a solve has answered it, as much as iterations that count as settled may have left, or as the depth.
 double depth_at_toi(const SearchedStep& step, const StepContact& point, bool late) {
-    const double h = step.model.options.time_step, depth = std::max(0.0, -point.contact.point.gap);
+    const ContactOptions& options = step.motion.model().options;
+    const double h = options.time_step, depth = std::max(0.0, -point.contact.point.gap);
     const double sinking =
         std::max(0.0, -h * relative_velocity(point, point.contact.point.normal, step.motion.velocity));
-    const double left =
-        step.model.options.solver == SolverKind::iterative ? h * step.model.options.unsettled_residual : 0.0;
+    const double left = options.solver == SolverKind::iterative ? h * options.unsettled_residual : 0.0;
     return depth + (late ? std::min(sinking, std::max(depth, left)) : sinking);
 }
 
@@ -60,55 +60,58 @@ void InternalEdges::forget_sinking() noexcept {
     std::fill(predicted_sinking_.begin(), predicted_sinking_.end(), 0.0);
 }
 
-void InternalEdges::note_depths(const SearchedStep& step, const ContactPoints& points, std::size_t from) {
-    for (std::size_t k = from; k < points.all.size(); ++k) {
+void InternalEdges::note_depths(const SearchedStep& step, std::size_t from) {
+    for (std::size_t k = from; k < step.points.all.size(); ++k) {
         // As deep as a body will be when it meets the next part of what holds it.
-        const double depth = depth_at_toi(step, points.all[k], false);
-        for (const int b : {points.all[k].contact.first, points.all[k].contact.second})
+        const double depth = depth_at_toi(step, step.points.all[k], false);
+        for (const int b : {step.points.all[k].contact.first, step.points.all[k].contact.second})
             depth_[b] = std::max(depth_[b], depth);
     }
 }
 
-void InternalEdges::predict_sinking(const SearchedStep& step, const ContactPoints& points,
-                                    const std::vector<Vec6>& velocity) {
+void InternalEdges::predict_sinking(const SearchedStep& step, const std::vector<Vec6>& velocity) {
     forget_sinking();
-    for (const StepContact& point : points.all) {
+    for (const StepContact& point : step.points.all) {
         if (point.toi >= 0.0) continue;
         const Contact& contact = point.contact;
         const double closing = -relative_velocity(point, contact.point.normal, velocity);
-        const double sinking = step.model.options.time_step * closing - std::max(0.0, contact.point.gap);
+        const double sinking =
+            step.motion.model().options.time_step * closing - std::max(0.0, contact.point.gap);
         for (const int b : {contact.first, contact.second})
             predicted_sinking_[b] = std::max(predicted_sinking_[b], sinking);
     }
 }
 
-void InternalEdges::index(const SearchedStep& step, const ContactPoints& points) {
-    points_of_.find(points.all, step.model.bodies);
+void InternalEdges::index(const SearchedStep& step) {
+    points_of_.find(step.points.all, step.motion.model().bodies);
 }
 
 double InternalEdges::slop(const SearchedStep& step, const OpenPair& open) const noexcept {
+    const ContactBodies& bodies = step.motion.model().bodies;
     const int a = open.first, b = open.second;
     const bool sides = have_sides(step.detection.collider(open.pair.first).shape,
                                   step.detection.collider(open.pair.second).shape);
-    return closed * std::max(step.model.bodies.radius[a], step.model.bodies.radius[b]) +
+    return closed * std::max(bodies.radius[a], bodies.radius[b]) +
            (sides ? 2.0 * std::max(predicted_sinking_[a], predicted_sinking_[b]) : 0.0);
 }
 
-bool InternalEdges::is_internal_edge(const SearchedStep& step, const ContactPoints& points,
-                                     const Mover& moving, int body, const Mover& other, const OpenPair& open,
-                                     const Cast& cast, double time, Vec3 facing) const {
+bool InternalEdges::is_internal_edge(const SearchedStep& step, const Mover& moving, int body,
+                                     const Mover& other, const OpenPair& open, const Cast& cast, double time,
+                                     Vec3 facing) const {
+    const ContactOptions& options = step.motion.model().options;
     const bool iterating = cast.when == Cast::When::iterating, late = cast.when != Cast::When::ahead;
     if (!have_sides(moving.shape, other.shape)) return false;
-    const double h = step.model.options.time_step, slop = this->slop(step, open), least = share * slop;
-    const bool by_pgs = step.model.options.solver == SolverKind::iterative;
-    if (!step.model.bodies.moves(body) || !(iterating || by_pgs || depth_[body] > least)) return false;
+    const double h = options.time_step, slop = this->slop(step, open), least = share * slop;
+    const bool by_pgs = options.solver == SolverKind::iterative;
+    if (!step.motion.model().bodies.moves(body) || !(iterating || by_pgs || depth_[body] > least))
+        return false;
     const std::span<const int> own = points_of_[body];
     for (std::size_t at = 0; at < own.size();) {
-        const std::uint64_t pair = points.all[own[at]].contact.key >> feature_bits;
+        const std::uint64_t pair = pair_of(step.points.all[own[at]].contact);
         Vec3 n, support_velocity;  // what holds it goes itself, m/s
         double depth = -unbounded, begun = 0.0, sinking = 0.0;
-        for (; at < own.size() && points.all[own[at]].contact.key >> feature_bits == pair; ++at) {
-            const StepContact& point = points.all[own[at]];
+        for (; at < own.size() && pair_of(step.points.all[own[at]].contact) == pair; ++at) {
+            const StepContact& point = step.points.all[own[at]];
             if (point.toi >= 0.0) continue;
             const double gap = point.contact.point.gap, side = point.contact.first == body ? 1.0 : -1.0;
             const double deep = depth_at_toi(step, point, late);
@@ -130,7 +133,7 @@ bool InternalEdges::is_internal_edge(const SearchedStep& step, const ContactPoin
                 const double rises = std::max(part * dot(n, support_velocity), top - height(other, part, -n));
                 falls = std::max(falls, now + rises - height(moving, part, n));
             }
-            const double left = h * step.model.options.unsettled_residual;
+            const double left = h * options.unsettled_residual;
             double most = residual_motion * slop;
             if (iterating)
                 most = std::max(
@@ -174,7 +177,7 @@ bool InternalEdges::occludes(const SearchedStep& step, const OpenPair& before, d
     const Vec3 n = (before.first == body ? 1.0 : -1.0) * normal(one, two, earlier);
     const Vec3 side = (after.first == body ? 1.0 : -1.0) * normal(three, four, later);
     if (dot(n, side) > same_direction_cosine) return false;
-    const double h = step.model.options.time_step, slop = this->slop(step, after),
+    const double h = step.motion.model().options.time_step, slop = this->slop(step, after),
                  level = height(held, earlier, n);
     if (!(level + height(other, earlier, -n) > -2.0 * (slop + this->slop(step, before)))) return false;
     const Mover& holder = before.first == body ? two : one;
@@ -189,11 +192,12 @@ bool InternalEdges::occludes(const SearchedStep& step, const OpenPair& before, d
 
 void InternalEdges::remove_occluded(const SearchedStep& step, const LargeArray<OpenPair>& pairs,
                                     const std::vector<Vec6>& velocity, std::vector<Meeting>& meetings) {
-    if (!step.model.bodies.swings || meetings.size() < 2) return;
+    const ContactBodies& bodies = step.motion.model().bodies;
+    if (!bodies.swings || meetings.size() < 2) return;
     meetings_of_.clear();
     for (std::size_t at = 0; at < meetings.size(); ++at)
         for (const int b : {pairs[meetings[at].open].first, pairs[meetings[at].open].second})
-            if (step.model.bodies.moves(b)) meetings_of_.push_back({b, meetings[at].time, at});
+            if (bodies.moves(b)) meetings_of_.push_back({b, meetings[at].time, at});
     std::sort(meetings_of_.begin(), meetings_of_.end(), [](const MeetingOf& a, const MeetingOf& b) {
         return a.body != b.body ? a.body < b.body : a.time != b.time ? a.time < b.time : a.at < b.at;
     });
@@ -207,7 +211,7 @@ void InternalEdges::remove_occluded(const SearchedStep& step, const LargeArray<O
                 const int body = meetings_of_[from].body;
                 const OpenPair &one = pairs[earlier.open], &other = pairs[later.open];
                 if (occludes(step, one, earlier.time, other, later.time, body, velocity)) later.time = -1.0;
-                else if (later.time - earlier.time < simultaneous * step.model.options.time_step &&
+                else if (later.time - earlier.time < simultaneous * step.motion.model().options.time_step &&
                          occludes(step, other, later.time, one, earlier.time, body, velocity))
                     earlier.time = -1.0;
             }
@@ -217,9 +221,8 @@ void InternalEdges::remove_occluded(const SearchedStep& step, const LargeArray<O
     std::erase_if(meetings, [](const Meeting& meeting) { return meeting.time < 0.0; });
 }
 
-bool InternalEdges::is_grazing(const SearchedStep& step, const ContactPoints& points,
-                               const StepContact& point, const OpenPair& open, double overlap,
-                               Cast::When when) const {
+bool InternalEdges::is_grazing(const SearchedStep& step, const StepContact& point, const OpenPair& open,
+                               double overlap, Cast::When when) const {
     const Contact& contact = point.contact;
     if (!have_sides(step.detection.collider(open.pair.first).shape,
                     step.detection.collider(open.pair.second).shape))
@@ -229,9 +232,9 @@ bool InternalEdges::is_grazing(const SearchedStep& step, const ContactPoints& po
     const int a = contact.first, b = contact.second;
     const Mover first = step.mover(open.pair.first, step.motion.poses[a], step.motion.velocity),
                 second = step.mover(open.pair.second, step.motion.poses[b], step.motion.velocity);
-    return time_of_impact(first, second, step.model.options.time_step, slop(step, open)) < 0.0 ||
-           is_internal_edge(step, points, first, a, second, open, cast, 0.0, contact.point.normal) ||
-           is_internal_edge(step, points, second, b, first, open, cast, 0.0, contact.point.normal);
+    return time_of_impact(first, second, step.motion.model().options.time_step, slop(step, open)) < 0.0 ||
+           is_internal_edge(step, first, a, second, open, cast, 0.0, contact.point.normal) ||
+           is_internal_edge(step, second, b, first, open, cast, 0.0, contact.point.normal);
 }
 
 }  // namespace spook

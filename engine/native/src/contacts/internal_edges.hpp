@@ -11,11 +11,11 @@
 
 namespace spook {
 
-/// What a search reads: shapes, and bodies on their way through the step.
+/// What a search reads: shapes, bodies on their way through the step, and the points they have.
 struct SearchedStep {
-    const ContactModel& model;
     const Detection& detection;
     const StepMotion& motion;
+    const ContactPoints& points;
 
     /// A collider whose body goes on from `pose`, which must outlive it.
     Mover mover(int collider, const Pose& pose, const std::vector<Vec6>& velocity) const;
@@ -38,13 +38,12 @@ class InternalEdges {
 public:
     void begin(std::size_t bodies);
     /// How deep the closed points from `from` on hold their bodies.
-    void note_depths(const SearchedStep& step, const ContactPoints& points, std::size_t from);
+    void note_depths(const SearchedStep& step, std::size_t from);
     /// How much deeper into what supports them bodies would go with velocities between iterations; or that there are none.
-    void predict_sinking(const SearchedStep& step, const ContactPoints& points,
-                         const std::vector<Vec6>& velocity);
+    void predict_sinking(const SearchedStep& step, const std::vector<Vec6>& velocity);
     void forget_sinking() noexcept;
     /// To be told of the points before what follows is asked.
-    void index(const SearchedStep& step, const ContactPoints& points);
+    void index(const SearchedStep& step);
 
     /// The overlap at which a pair counts as met, m. Bodies that sink while iterations have not settled meet the sides of the
     /// next part of what holds them as deep as that; round shapes and planes have no sides.
@@ -52,12 +51,11 @@ public:
     /// Whether `body`, that would meet another at `time` [s], does not once it is lifted out of what holds it. `facing` is
     /// the normal they touch with already, if they do. Between iterations a body may also sink on the way, and to the side of
     /// another as far as settled iterations may have left it falling.
-    bool is_internal_edge(const SearchedStep& step, const ContactPoints& points, const Mover& moving,
-                          int body, const Mover& other, const OpenPair& open, const Cast& cast, double time,
-                          Vec3 facing = {}) const;
+    bool is_internal_edge(const SearchedStep& step, const Mover& moving, int body, const Mover& other,
+                          const OpenPair& open, const Cast& cast, double time, Vec3 facing = {}) const;
     /// Whether bodies that touch, and would overlap by `overlap` [m] along that normal, do not as they move.
-    bool is_grazing(const SearchedStep& step, const ContactPoints& points, const StepContact& point,
-                    const OpenPair& open, double overlap, Cast::When when) const;
+    bool is_grazing(const SearchedStep& step, const StepContact& point, const OpenPair& open, double overlap,
+                    Cast::When when) const;
     /// Of what one body meets in a step, leaves out what it would not meet if that which comes before stopped it. What it meets
     /// all the same is found again with the velocities of the solve.
     void remove_occluded(const SearchedStep& step, const LargeArray<OpenPair>& pairs,

@@ -9,11 +9,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::overlap_search;
-
-}  // namespace
 
 bool OverlapSearch::is_far(double way, double radius) const noexcept {
     return way > (by_pgs_ ? min_separation_to_propagate_pgs : min_separation_to_propagate) * radius;
@@ -82,12 +78,12 @@ double OverlapSearch::look(const StepEnd& at, double margin, const std::vector<c
     unsigned seen = 0;
     const std::vector<CachedContact>& cache = at.cache.points;
     for (std::size_t from = 0, end = 0; from < cache.size(); from = end) {
-        const std::uint64_t key = cache[from].contact.key >> feature_bits;
+        const std::uint64_t key = pair_of(cache[from].contact);
         const int a = cache[from].contact.first, b = cache[from].contact.second;
         const double rounding = model_->bodies.slack(cache[from].contact);
         double most_compression = 0.0;
         bool overlapped = false;
-        for (; end < cache.size() && cache[end].contact.key >> feature_bits == key; ++end) {
+        for (; end < cache.size() && pair_of(cache[end].contact) == key; ++end) {
             most_compression = std::max(most_compression, cache[end].compression);
             overlapped = overlapped || cache[end].contact.point.gap < -rounding;
         }

@@ -7,11 +7,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::pgs_schedule;
-
-}  // namespace
 
 /// Joins the islands of both bodies.
 void PgsSolver::link(int first, int second) {

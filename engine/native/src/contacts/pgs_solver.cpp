@@ -253,7 +253,8 @@ FrictionReport PgsSolver::run(int iterations, double tolerance, double focus,
     for (int round = 1, until = iterations;; ++round) {
         Watch::look();
         bool any = false;
-        if (round > iterations - plain_iterations) relax_no_more();
+        if (round > iterations - plain_iterations && std::exchange(relaxation_, 1.0) != 1.0)
+            for (PackedContact& c : contacts_) c.own_inverse = c.own > 0.0 ? 1.0 / c.own : 0.0;
         iterate(focus);
         for (const int island : roots_) {
             if (!active_[island]) continue;
@@ -285,11 +286,6 @@ FrictionReport PgsSolver::run(int iterations, double tolerance, double focus,
     report.converged = report.converged && report.residual <= tolerance;
     report.finite = !std::isnan(report.residual);
     return report;
-}
-
-void PgsSolver::relax_no_more() {
-    if (std::exchange(relaxation_, 1.0) == 1.0) return;
-    for (PackedContact& c : contacts_) c.own_inverse = c.own > 0.0 ? 1.0 / c.own : 0.0;
 }
 
 void PgsSolver::write(MixedSystem& system) const {

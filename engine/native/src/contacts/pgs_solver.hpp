@@ -50,6 +50,7 @@ public:
     void arrange();
     /// Adds a contact; its index counts from 0. What was not announced is kept in the order it was given.
     int add(const PgsContact& contact);
+    std::size_t count() const noexcept { return static_cast<std::size_t>(added_); }
 
     /// Iterates until no row changes by more than `tolerance` [m/s] in an iteration, or an island was updated `iterations`
     /// times: it has reached its limit then. `more` is called after the 2nd, 4th, 8th … iteration, and with true when all is done: it may
@@ -118,7 +119,6 @@ private:
     void solve_scheduled(std::size_t begin, std::size_t end, double focus) noexcept;
     void solve_picked(std::size_t picked, double focus) noexcept;
     void iterate(double focus) noexcept;
-    void relax_no_more();
     void find_residuals();
     double residual_of(std::size_t contact) const noexcept;
 

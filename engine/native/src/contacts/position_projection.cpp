@@ -8,11 +8,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::position_projection;
-
-}  // namespace
 
 PositionProjector::PositionProjector(std::shared_ptr<const ContactModel> model, std::vector<char> yielding)
     : model_(std::move(model)),
@@ -74,11 +70,11 @@ void PositionProjector::update_initial_penetrations(const ContactCache& cache,
     if (initial_penetration.empty()) return;
     left_.clear();
     for (const CachedContact& cached : cache.sleeping)
-        if (const auto given = initial_penetration.find(cached.contact.key >> feature_bits);
+        if (const auto given = initial_penetration.find(pair_of(cached.contact));
             given != initial_penetration.end())
             left_[given->first] = given->second;
     for (const PenetrationRecord& record : search_.records) {
-        const auto given = initial_penetration.find(record.contact.key >> feature_bits);
+        const auto given = initial_penetration.find(pair_of(record.contact));
         if (!(record.depth > 0.0) || given == initial_penetration.end()) continue;
         double& depth = left_[given->first];
         depth = std::max(depth, std::min(record.depth, given->second));
@@ -162,7 +158,7 @@ bool PositionProjector::keep_projected(const std::vector<Pose>& poses) {
 double PositionProjector::separation_speed(const PenetrationRecord& record, const DepthOfPair& initial,
                                            bool again) const {
     const double h = model_->options.time_step, excess = record.depth;
-    const auto given = initial.find(record.contact.key >> feature_bits);
+    const auto given = initial.find(pair_of(record.contact));
     if (again || !(excess > 0.0) || given == initial.end()) return excess / h;
     const double slow = std::min(excess, given->second);
     return regularise(0.0, record.damping, h).violation_gain * slow + (excess - slow) / h;
@@ -200,8 +196,7 @@ void PositionProjector::note_projected(const StepEnd& end, const ExternalDrive& 
     for (const PenetrationRecord& record : search_.records) {
         const int k = island(record.contact);
         if (!(record.depth > 0.0) || k < 0) continue;
-        if (end.initial_penetration.contains(record.contact.key >> feature_bits))
-            projection_.externally_driven[k] = 1;
+        if (end.initial_penetration.contains(pair_of(record.contact))) projection_.externally_driven[k] = 1;
         projection_.overlap[k] = std::max(projection_.overlap[k], record.depth);
     }
 }

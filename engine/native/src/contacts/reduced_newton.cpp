@@ -8,11 +8,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::reduced_newton;
-
-}  // namespace
 
 /// The laws to first order over the working set, solved for the steps of all rows. Of rows between bounds, those that are
 /// pinned, or at a bound that they push against, stay; friction that is pinned slides on the edge of its disc. `worst`: of the laws

@@ -18,7 +18,6 @@ struct SolveQuality {
 
 /// What a solve is judged by: bodies and v before it, points, and how deep pairs overlapped where the run began.
 struct JudgedStep {
-    const ContactModel& model;
     const StepMotion& motion;
     const ContactPoints& points;
     const DepthOfPair& initial_penetration;
@@ -30,8 +29,7 @@ inline double elastic_depth(const ContactBodies& bodies, const StepContact& poin
 }
 
 /// Takes down a row of the body of that solver index that is off by more than the method allows.
-void blame(SolveQuality& quality, const ContactModel& model, const StepMotion& motion, double residual,
-           int solver_index);
+void blame(SolveQuality& quality, const StepMotion& motion, double residual, int solver_index);
 /// Iterations that stop early let bodies sink by little each, in a tall stack step after step: no row is far off, and the
 /// load is not borne. What the projection could not lift again shows it.
 void blame_sunk(SolveQuality& quality, const JudgedStep& step);
@@ -39,7 +37,7 @@ void blame_sunk(SolveQuality& quality, const JudgedStep& step);
 SolveQuality judge(const JudgedStep& step, const MixedSystem& system,
                    const std::vector<FrictionPoint>& points, const FrictionReport& report);
 /// The same of an impact whose solve stopped at a limit; of several solves, as they follow each other in a step, the worst.
-void judge_impact(SolveQuality& quality, const ContactModel& model, const StepMotion& motion,
-                  const MixedSystem& hit, const std::vector<FrictionPoint>& points, FrictionModel friction);
+void judge_impact(SolveQuality& quality, const StepMotion& motion, const MixedSystem& hit,
+                  const std::vector<FrictionPoint>& points, FrictionModel friction);
 
 }  // namespace spook

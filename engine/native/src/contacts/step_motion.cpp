@@ -18,6 +18,7 @@ void StepMotion::begin(const std::vector<Pose>& at, const std::vector<Vec6>& v,
     drive.begin(model_->bodies, model_->surfaces, v);
     toi_fraction.assign(bodies, 0.0);
     event_time.assign(bodies, -1.0);
+    correction.clear();
     supported.begin(bodies);
 }
 
@@ -73,6 +74,20 @@ Vec3 StepMotion::free_fall_correction(int body, Vec3 after) const {
     const double passed = event_time[body] / model_->options.time_step,
                  won = passed * dot(k, after - linear(predicted[body])) - 0.5 * dot(change, change);
     return won > 0.0 ? (won / dot(k, k)) * k : Vec3{};
+}
+
+void StepMotion::correct_events(const MixedSystem& system, const std::vector<char>& has_rows) {
+    for (std::size_t b = 0; b < model_->bodies.count(); ++b) {
+        const int u = model_->bodies.solver_index[b];
+        if (u < 0 || event_time[b] < 0.0 || !has_rows[u]) continue;
+        if (correction.empty()) correction.assign(system.mass.size(), Vec6{});
+        // What a joint holds turns as it goes, or the joint would answer the difference with a speed.
+        for (int i = 0; i < (model_->bodies.jointed[b] ? 6 : 3); ++i)
+            correction[u][i] +=
+                event_time[b] / model_->options.time_step * (predicted[b][i] - system.velocity[u][i]);
+        const Vec3 more = free_fall_correction(static_cast<int>(b), linear(system.velocity[u]));
+        for (int i = 0; i < 3; ++i) correction[u][i] += more[i];
+    }
 }
 
 Pose StepMotion::moved(int b, const std::vector<Vec6>& along) const {

@@ -21,6 +21,7 @@ struct StepMotion {
     /// What bodies are cast along, once it is known which are supported.
     void predict(const std::vector<Vec6>& free_velocity);
 
+    const ContactModel& model() const noexcept { return *model_; }
     bool is_free(std::size_t b) const noexcept { return !supported[b] && !model_->bodies.jointed[b]; }
     /// Whether a body that is supported, or jointed, moves along the forces.
     bool moves_along_forces(int body) const;
@@ -36,6 +37,10 @@ struct StepMotion {
     /// What a supported body of an event that falls in the rest of the step is to go besides, m/s: it falls for all of it, or it
     /// would have the speed of a fall and not have lost the height.
     Vec3 free_fall_correction(int body, Vec3 after) const;
+
+    /// An event's bodies went with v₋ until its time: with v₊ for the whole step they would end elsewhere. `has_rows` is of
+    /// moving bodies.
+    void correct_events(const MixedSystem& system, const std::vector<char>& has_rows);
 
     /// Where a body begins its way of this step. An event's bodies have gone part of it with another velocity.
     Pose moved(int body, const std::vector<Vec6>& along) const;
@@ -54,6 +59,7 @@ struct StepMotion {
     std::vector<Vec6> predicted;         // what bodies are cast along
     std::vector<double> toi_fraction;    // the part of the forces that acts before the last impact
     std::vector<double> event_time;      // s; negative: the body is moved to no impact's time
+    std::vector<Vec6> correction;        // to add to v₊ when positions advance, per moving body; empty: none
     SupportedBodies supported;
     ExternalDrive drive;
 

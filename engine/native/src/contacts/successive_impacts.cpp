@@ -6,18 +6,19 @@
 
 namespace spook {
 
-void SuccessiveImpacts::begin() {
-    if (!model_->surfaces.rebounds && model_->options.impacts != ImpactOrder::successive) return;
-    const std::size_t bodies = model_->bodies.count();
+void SuccessiveImpacts::begin(const ContactModel& model) {
+    if (!model.surfaces.rebounds && model.options.impacts != ImpactOrder::successive) return;
+    const std::size_t bodies = model.bodies.count();
     clock_.assign(bodies, 0.0), path_.assign(bodies, Vec6{}), in_order_.assign(bodies, 0);
 }
 
 /// How far a body has come since the step began, at a time from when on nothing has hit it.
 Vec6 SuccessiveImpacts::path_until(const StepMotion& motion, std::size_t body, double time) const {
-    if (!model_->bodies.moves(body)) return sum(Vec6{}, motion.drive.prescribed()[body], time);
+    const ContactBodies& bodies = motion.model().bodies;
+    if (!bodies.moves(body)) return sum(Vec6{}, motion.drive.prescribed()[body], time);
     const double on = time - clock_[body];
     const Vec6 way = sum(path_[body], motion.velocity[body], on);
-    return motion.supported[body] || model_->bodies.jointed[body] ? way : sum(way, motion.dv_ext[body], on);
+    return motion.supported[body] || bodies.jointed[body] ? way : sum(way, motion.dv_ext[body], on);
 }
 
 /// The gap of a point at that time, with both bodies on their ways.
@@ -35,18 +36,19 @@ double SuccessiveImpacts::last_impact_time(const StepContact& point) const noexc
 
 /// When a point that is approached closes, s. Forces are part of the ways: what they slow closes later.
 double SuccessiveImpacts::closing_time(const StepMotion& motion, const StepContact& point) const {
+    const ContactOptions& options = motion.model().options;
     const double from = last_impact_time(point), gap = std::max(0.0, gap_at(motion, point, from));
     if (gap == 0.0) return from;
-    const double speed =
-        (gap - gap_at(motion, point, from + model_->options.time_step)) / model_->options.time_step;
+    const double speed = (gap - gap_at(motion, point, from + options.time_step)) / options.time_step;
     return from + gap / (speed > 0.0 ? speed : -point.approach);
 }
 
 void SuccessiveImpacts::move_to_last_impact(const StepMotion& motion, StepContact& point) const {
+    const ContactBodies& bodies = motion.model().bodies;
     for (const int body : {point.contact.first, point.contact.second})
-        if (model_->bodies.moves(body) && motion.event_time[body] < 0.0) return;
+        if (bodies.moves(body) && motion.event_time[body] < 0.0) return;
     const double time = last_impact_time(point), gap = gap_at(motion, point, time);
-    if (point.toi < 0.0 && model_->bodies.is_closed(point.contact, gap)) return;
+    if (point.toi < 0.0 && bodies.is_closed(point.contact, gap)) return;
     point.event = true;
     point.toi = time;
     point.contact.point.gap = std::max(0.0, gap);
@@ -56,20 +58,20 @@ void SuccessiveImpacts::move_to_last_impact(const StepMotion& motion, StepContac
 /// until then is lost on the way back.
 void SuccessiveImpacts::apply_forces_before(std::size_t b, double part, StepMotion& motion,
                                             MixedSystem& system) {
+    const ContactBodies& bodies = motion.model().bodies;
     if (motion.supported[b] || !(part > motion.toi_fraction[b])) return;
     const Vec6 more = sum(Vec6{}, motion.whole_dv_ext[b], part - motion.toi_fraction[b]);
     motion.apply_forces_until(b, part);
-    const Mat6& mass = system.mass[model_->bodies.solver_index[b]];
+    const Mat6& mass = system.mass[bodies.solver_index[b]];
     for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j)
-            system.momentum[model_->bodies.solver_index[b]][i] += mass[6 * i + j] * more[j];
+        for (int j = 0; j < 6; ++j) system.momentum[bodies.solver_index[b]][i] += mass[6 * i + j] * more[j];
 }
 
-bool SuccessiveImpacts::come_in_order(const StepContact& point) const {
-    if (model_->options.impacts == ImpactOrder::successive) return true;
+bool SuccessiveImpacts::come_in_order(const ContactModel& model, const StepContact& point) const {
+    if (model.options.impacts == ImpactOrder::successive) return true;
     if (clock_.empty()) return false;
     for (const int b : {point.contact.first, point.contact.second})
-        if (model_->bodies.moves(static_cast<int>(b)) && in_order_[b] <= 0) return false;
+        if (model.bodies.moves(static_cast<int>(b)) && in_order_[b] <= 0) return false;
     return true;
 }
 
@@ -77,29 +79,30 @@ bool SuccessiveImpacts::come_in_order(const StepContact& point) const {
 /// alone touches when the next impact comes. Then there is nothing that all of them could take part in.
 void SuccessiveImpacts::find_orderly(const Islands& islands, const StepMotion& motion,
                                      const ContactPoints& points) {
+    const ContactBodies& bodies = motion.model().bodies;
     orderly_.assign(islands.count, 1);
-    if (model_->options.impacts == ImpactOrder::successive) return;
+    if (motion.model().options.impacts == ImpactOrder::successive) return;
     pairs_.assign(islands.count, 0);
     const auto island = [&](std::size_t b) {
-        return model_->bodies.moves(b) ? islands.of_body[model_->bodies.solver_index[b]] : -1;
+        return bodies.moves(b) ? islands.of_body[bodies.solver_index[b]] : -1;
     };
-    for (std::size_t b = 0; b < model_->bodies.count(); ++b)
+    for (std::size_t b = 0; b < bodies.count(); ++b)
         if (island(b) >= 0)
             orderly_[island(b)] =
-                orderly_[island(b)] && model_->bodies.ball[b] && motion.is_free(b) && in_order_[b] >= 0;
+                orderly_[island(b)] && bodies.ball[b] && motion.is_free(b) && in_order_[b] >= 0;
     for (std::size_t k = 0; k < points.all.size(); ++k) {
         const StepContact& point = points.all[k];
-        const int own = islands.of_body[model_->bodies.solver_body(point.contact)];
+        const int own = islands.of_body[bodies.solver_body(point.contact)];
         const double now = first_[own];
         if (now == unbounded ||
-            (closing_[k] > now && !model_->bodies.is_closed(point.contact, gap_at(motion, point, now))))
+            (closing_[k] > now && !bodies.is_closed(point.contact, gap_at(motion, point, now))))
             continue;
-        const std::uint64_t pair = (point.contact.key >> feature_bits) + 1;
+        const std::uint64_t pair = pair_of(point.contact) + 1;
         const bool another = pairs_[own] != 0 && pairs_[own] != pair;
-        if (another || !(model_->surfaces.pair(point.contact).restitution > 0.0)) orderly_[own] = 0;
+        if (another || !(motion.model().surfaces.pair(point.contact).restitution > 0.0)) orderly_[own] = 0;
         pairs_[own] = pair;
     }
-    for (std::size_t b = 0; b < model_->bodies.count(); ++b)
+    for (std::size_t b = 0; b < bodies.count(); ++b)
         if (island(b) >= 0 && first_[island(b)] < unbounded)
             in_order_[b] =
                 orderly_[island(b)] ? 1 : -1;  // where they are is not followed after another impact
@@ -107,11 +110,14 @@ void SuccessiveImpacts::find_orderly(const Islands& islands, const StepMotion& m
 
 void SuccessiveImpacts::find_earliest(MixedSystem& system, const OpenPairs& open_pairs, StepMotion& motion,
                                       ContactPoints& points, std::vector<std::size_t>& hit_points) {
+    const ContactBodies& bodies = motion.model().bodies;
+    const ContactOptions& options = motion.model().options;
+    const ContactSurfaces& surfaces = motion.model().surfaces;
     connected_.begin(system, system.rows.size());
-    points.tie(model_->bodies, connected_);
+    points.tie(bodies, connected_);
     for (const OpenPair& open : open_pairs.pairs)
         if (!open.has_met())
-            connected_.tie(model_->bodies.solver_index[open.first], model_->bodies.solver_index[open.second]);
+            connected_.tie(bodies.solver_index[open.first], bodies.solver_index[open.second]);
     const Islands& islands = connected_.find();
     const auto is_impact = [](const StepContact& point) {
         return point.bounce >= 0.0 && point.approach < -point.rounding;
@@ -120,54 +126,51 @@ void SuccessiveImpacts::find_earliest(MixedSystem& system, const OpenPairs& open
     for (std::size_t k = 0; k < points.all.size(); ++k) {
         if (!is_impact(points.all[k])) continue;
         closing_[k] = closing_time(motion, points.all[k]);
-        double& earliest = first_[islands.of_body[model_->bodies.solver_body(points.all[k].contact)]];
+        double& earliest = first_[islands.of_body[bodies.solver_body(points.all[k].contact)]];
         earliest = std::min(earliest, closing_[k]);
     }
     find_orderly(islands, motion, points);
-    hit_.assign(model_->bodies.count(), 0), balls_.assign(islands.count, 1);
+    hit_.assign(bodies.count(), 0), balls_.assign(islands.count, 1);
     for (std::size_t k = 0; k < points.all.size(); ++k) {
         const StepContact& point = points.all[k];
-        const int own = islands.of_body[model_->bodies.solver_body(point.contact)];
+        const int own = islands.of_body[bodies.solver_body(point.contact)];
         const double now = first_[own];
         if (!orderly_[own]) {
             if (point.bounce >= 0.0) hit_points.push_back(k);
             continue;
         }
         if (!is_impact(point) ||
-            (closing_[k] > now && !model_->bodies.is_closed(point.contact, gap_at(motion, point, now))))
+            (closing_[k] > now && !bodies.is_closed(point.contact, gap_at(motion, point, now))))
             continue;
         hit_points.push_back(k);
         hit_[point.contact.first] = hit_[point.contact.second] = 1;
     }
     const auto island = [&](std::size_t b) {
-        return model_->bodies.moves(b) ? islands.of_body[model_->bodies.solver_index[b]] : -1;
+        return bodies.moves(b) ? islands.of_body[bodies.solver_index[b]] : -1;
     };
-    for (std::size_t b = 0; b < model_->bodies.count(); ++b)
-        if (island(b) >= 0)
-            balls_[island(b)] = balls_[island(b)] && model_->bodies.ball[b] && !model_->bodies.jointed[b];
-    for (std::size_t b = 0; b < model_->bodies.count(); ++b) {
+    for (std::size_t b = 0; b < bodies.count(); ++b)
+        if (island(b) >= 0) balls_[island(b)] = balls_[island(b)] && bodies.ball[b] && !bodies.jointed[b];
+    for (std::size_t b = 0; b < bodies.count(); ++b) {
         const int own = island(b);
         if (own < 0 || first_[own] == unbounded || !orderly_[own]) continue;
-        if (const double time = std::min(first_[own], model_->options.time_step);
-            hit_[b] && time > clock_[b]) {
+        if (const double time = std::min(first_[own], options.time_step); hit_[b] && time > clock_[b]) {
             path_[b] = path_until(motion, b, time);
             clock_[b] = time;
             if (balls_[own])
-                apply_forces_before(
-                    b, part_of_forces(time / model_->options.time_step, model_->surfaces.rebounds), motion,
-                    system);
+                apply_forces_before(b, part_of_forces(time / options.time_step, surfaces.rebounds), motion,
+                                    system);
         }
         if (!balls_[own] || motion.moves_along_forces(static_cast<int>(b))) continue;
         motion.event_time[b] = clock_[b];
         if (clock_[b] > 0.0) motion.predicted[b] = sum(Vec6{}, path_[b], 1.0 / clock_[b]);
     }
     for (StepContact& point : points.all)
-        if (come_in_order(point)) move_to_last_impact(motion, point);
+        if (come_in_order(motion.model(), point)) move_to_last_impact(motion, point);
     for (const std::size_t k : hit_points) {
         StepContact& point = points.all[k];
         point.approach = relative_velocity(point, point.contact.point.normal, motion.velocity);
-        if (point.event && come_in_order(point))
-            point.bounce = model_->surfaces.pair(point.contact).restitution;
+        if (point.event && come_in_order(motion.model(), point))
+            point.bounce = surfaces.pair(point.contact).restitution;
     }
 }
 

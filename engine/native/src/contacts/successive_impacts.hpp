@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdint>
-#include <memory>
 #include <vector>
 
 #include "contacts/contact_points.hpp"
@@ -14,13 +13,12 @@ namespace spook {
 
 class SuccessiveImpacts {
 public:
-    explicit SuccessiveImpacts(std::shared_ptr<const ContactModel> model) : model_(std::move(model)) {}
     /// Of a step.
-    void begin();
+    void begin(const ContactModel& model);
     /// Whether impacts may come one after the other at all.
     bool possible() const noexcept { return !clock_.empty(); }
     /// Whether impacts come one after the other between the bodies of a point.
-    bool come_in_order(const StepContact& point) const;
+    bool come_in_order(const ContactModel& model, const StepContact& point) const;
     /// Of impacts that come in order those to be answered next, of the others all, as places in `points`: of what may meet in
     /// this step the points that are approached, and closed when the first of them is. Free balls are moved there, as to the time
     /// of a single impact.
@@ -37,7 +35,6 @@ private:
     void apply_forces_before(std::size_t body, double part, StepMotion& motion, MixedSystem& system);
     void find_orderly(const Islands& islands, const StepMotion& motion, const ContactPoints& points);
 
-    std::shared_ptr<const ContactModel> model_;
     std::vector<double> clock_;          // by body: up to when its way in the step is known, s
     std::vector<Vec6> path_;             // and that way, m and rad
     std::vector<signed char> in_order_;  // bodies: 1 if impacts come one by one in this step, −1 if not

@@ -20,11 +20,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::supported_bodies;
-
-}  // namespace
 
 bool is_along(Vec3 kick, Vec3 velocity) {
     return std::abs(dot(kick, velocity)) > level * norm(kick) * (norm(kick) + norm(velocity));
@@ -54,7 +50,7 @@ void SupportedBodies::note(StepContact& point, const ContactBodies& bodies, cons
 void SupportedBodies::find(const ContactBodies& bodies) {
     for (std::size_t b = 0; b < bodies.count(); ++b)
         supported_[b] = supported_[b] && (!bodies.moves(b) || bodies.jointed[b]);
-    const auto carry = [this](const SupportPair& at) {
+    const auto carry = [this](const Pair& at) {
         char &first = supported_[at.first], &second = supported_[at.second];
         const bool more = (at.first_presses && !first && (second || at.both)) ||
                           (at.second_presses && !second && (first || at.both));

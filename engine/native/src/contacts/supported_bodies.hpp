@@ -3,9 +3,9 @@
 
 #include <vector>
 
-#include "contacts/contact_arrays.hpp"
 #include "contacts/contact_bodies.hpp"
 #include "contacts/contact_cache.hpp"
+#include "contacts/islands.hpp"
 #include "contacts/step_contact.hpp"
 
 namespace spook {
@@ -29,8 +29,13 @@ public:
               std::vector<CachedContact>& cache) const;
 
 private:
+    /// Of a closed point: which body the forces press on the other.
+    struct Pair {
+        int first, second;
+        bool first_presses, second_presses, both;  // on each other, supported or not
+    };
     std::vector<char> supported_;
-    std::vector<SupportPair> pairs_;
+    std::vector<Pair> pairs_;
     std::vector<Vec6> impulse_dv_;  // what supports took of a body's kick until they let it go
 };
 

@@ -83,18 +83,9 @@ inline constexpr std::size_t event_bodies =
 
 // contact_pgs.cpp
 namespace tolerances::contact_pgs {
-inline constexpr int most_turns =
-    16;  // times the work of `iterations`, where a step would be unsettled otherwise
-inline constexpr int joint_turns =
-    4;  // the same where a joint is furthest off: all of them are updated each time
 inline constexpr double too_much = 1e6;  // times the energy there is
 inline constexpr double focus =
     0.5;  // of the residual allowed: contacts that change less are unfinished alone then
-inline constexpr int warm_start_iterations = 100;  // at most, before points found late are solved for
-inline constexpr double warm_started = 1e-6;       // of the speeds: what changes less is
-inline constexpr std::size_t few_points =
-    100;                               // points of an island: so many are solved for again at less cost
-inline constexpr int many_rounds = 8;  //   unless that has been done so often
 }  // namespace tolerances::contact_pgs
 
 // contact_stage.cpp
@@ -234,6 +225,19 @@ inline constexpr int patience = 8;       // steps without half the best residual
 inline constexpr double relief =
     1e-9;  // of a row's own entry of W, in Newton's matrix only: redundant points
 }  // namespace tolerances::reduced_newton
+
+// solve_by_pgs.cpp
+namespace tolerances::solve_by_pgs {
+inline constexpr int most_turns =
+    16;  // times the work of `iterations`, where a step would be unsettled otherwise
+inline constexpr int joint_turns =
+    4;  // the same where a joint is furthest off: all of them are updated each time
+inline constexpr int warm_start_iterations = 100;  // at most, before points found late are solved for
+inline constexpr double warm_started = 1e-6;       // of the speeds: what changes less is
+inline constexpr std::size_t few_points =
+    100;                               // points of an island: so many are solved for again at less cost
+inline constexpr int many_rounds = 8;  //   unless that has been done so often
+}  // namespace tolerances::solve_by_pgs
 
 // supported_bodies.cpp
 namespace tolerances::supported_bodies {

@@ -58,7 +58,7 @@ void Sleeping::take(const RigidScene& scene) {
     });
     for (int i = 0; i < model_.bodies(); ++i) {
         const BodyConstants& body = model_.constants[i];
-        double reach = mixed_.surfaces()->bodies().radius[i];
+        double reach = mixed_.surfaces()->model().bodies.radius[i];
         if (body.motion == Motion::kinematic && reach == 0.0) reach = far;  // a plane
         if (body.moves() && !body.particle)
             reach = std::max(
@@ -141,7 +141,7 @@ void Sleeping::sleep() {
     for (const auto& [a, b] : rules_.ties) tie(a, b);
     for (const CachedContact& cached : mixed_.contacts()->cache().points) {
         tie(cached.contact.first, cached.contact.second);
-        if (mixed_.contacts()->surfaces().is_conveyed(cached.contact))
+        if (mixed_.contacts()->model().surfaces.is_conveyed(cached.contact))
             kept_up[cached.contact.first] = kept_up[cached.contact.second] = 1;
     }
     for (const int i : model_.constrained) scratch_.finder.tie(i, i);
