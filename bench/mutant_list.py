@@ -288,8 +288,8 @@ MUTANTS = (
         "fluids carry 1 % less",
         "floating_box",
         "rigid/rigid_loads.cpp",
-        "-(fluid.density * below.volume) * gravity_",
-        "-(0.99 * fluid.density * below.volume) * gravity_",
+        "-(fluid.density * below.volume) * model_.gravity",
+        "-(0.99 * fluid.density * below.volume) * model_.gravity",
     ),
     wrong(
         "loads",
