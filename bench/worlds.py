@@ -37,7 +37,7 @@ from spook_tracker.scalar_tests.pendulum import scene as pendulum
 
 COUNTS = (1, 16, 256, 4096)
 STEPS_A_SECOND = (60, 240, 1000)
-BATCHED = ("mjx", "mujoco_warp", "newton")
+BATCHED = ("mjx", "motrixsim", "mujoco_warp", "newton")
 DURATION, BOXES = 1.0, 10  # s
 ON_CPU = "Engines made for GPUs, on a CPU: no chart is drawn of this."
 

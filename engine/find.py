@@ -38,6 +38,7 @@ EXTRAS: Mapping[str, str] = {
     "mjx": "mujoco-mjx",
     "newton": "newton",
     "mujoco_warp": "mujoco-warp",
+    "motrixsim": "motrixsim",
 }  # engine: its package, from PyPI
 NODE: Mapping[str, str] = {
     "cannon": "cannon-es",

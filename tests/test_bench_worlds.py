@@ -22,7 +22,8 @@ def test_ours_errs_as_its_step_has_it_and_processes_change_no_bit() -> None:
 
 
 @pytest.mark.parametrize(
-    ("engine", "package"), [("newton", "newton"), ("mujoco_warp", "mujoco_warp"), ("mjx", "mujoco.mjx")]
+    ("engine", "package"),
+    [("newton", "newton"), ("mujoco_warp", "mujoco_warp"), ("mjx", "mujoco.mjx"), ("motrixsim", "motrixsim")],
 )
 def test_every_world_of_a_batch_is_the_one_world(engine: str, package: str) -> None:
     pytest.importorskip(package, reason=f"the extra {engine} is not installed")
@@ -60,4 +61,7 @@ def test_a_batch_that_takes_too_long_is_left_out_and_the_device_is_said(
     assert worlds.ON_CPU in capsys.readouterr().out
     with pytest.raises(SystemExit):
         worlds.main(["jolt"])
-    assert "'jolt' has no worlds; there are spook, mjx, mujoco_warp, newton" in capsys.readouterr().err
+    assert (
+        "'jolt' has no worlds; there are spook, mjx, motrixsim, mujoco_warp, newton"
+        in capsys.readouterr().err
+    )

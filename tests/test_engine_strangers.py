@@ -6,6 +6,7 @@ pulls sideways slides for 2 s on a friction of .5; 1/60 s. Equal to the last dig
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 from spook_tracker.engine import Final, Particle, Position, Scene
@@ -13,6 +14,7 @@ from spook_tracker.engine.find import find
 from tests import peer_scenes
 
 DIGITS = 6  # pages print three
+SINGLE = 4  # of what sums masses in single precision, given here by shapes
 FALL = Scene(bodies=(Particle(name="ball", mass=2.0, position=(0.0, 0.0, 0.0)),), gravity=peer_scenes.GRAVITY)
 SCENES = {
     "fall": (FALL, "ball", 2, 120),
@@ -90,6 +92,27 @@ def test_pybullet(scene: str) -> None:
     p.disconnect()
 
     assert f"{told[SCENES[scene][2]]:.{DIGITS}g}" == through_the_adapter("pybullet", scene, "joints")
+
+
+@pytest.mark.parametrize("scene", SCENES)
+def test_motrixsim(scene: str) -> None:
+    """It reads the file that MuJoCo reads, and is stepped in single precision."""
+    motrixsim = pytest.importorskip("motrixsim", reason="the extra motrixsim is not installed")
+    pull = 0.7 * 9.81 if scene == "slide" else 0.0
+    model = motrixsim.load_mjcf_str(
+        f'<mujoco><option timestep="{1 / 60!r}" gravity="{pull!r} 0 -9.81"/><worldbody>{BODIES[scene]}</worldbody></mujoco>'
+    )
+    data = motrixsim.SceneData(model)
+    model.step_n(data, SCENES[scene][3])
+    model.forward_kinematic(data)
+    link = list(model.links)[-1]
+    place = link.get_pose(data)[:3]
+    if scene == "swing":  # of a body whose place is its joint and whose centre is a metre beside
+        turn = np.array(link.get_pose(data)[3:], dtype=float)
+        place = [1.0 - 2.0 * float(turn[1:3] @ turn[1:3]), 0.0, 0.0]
+
+    told = float(through_the_adapter("motrixsim", scene, "defaults"))
+    assert f"{place[SCENES[scene][2]]:.{SINGLE}g}" == f"{told:.{SINGLE}g}"
 
 
 @pytest.mark.parametrize("scene", SCENES)

@@ -78,6 +78,7 @@ FACTS: Mapping[str, Facts] = {
     "exudyn": Facts("64 bits", "EXUDYN General License", "C++, Python", "CPU"),
     "jolt": Facts("32 bits", "MIT", "C++, JavaScript", "CPU"),
     "mjx": Facts("64 bits", "Apache-2.0", "Python (JAX)", "CPU, GPU, TPU"),
+    "motrixsim": Facts("32 bits", "Apache-2.0", "Rust, Python", "CPU"),
     "mujoco": Facts("64 bits", "Apache-2.0", "C, Python", "CPU"),
     "mujoco_warp": Facts("32 bits", "Apache-2.0", "Python (Warp)", "CPU, GPU"),
     "newton": Facts("32 bits", "Apache-2.0", "Python (Warp)", "CPU, GPU"),
