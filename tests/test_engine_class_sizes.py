@@ -1,4 +1,4 @@
-"""No class of the native core grows: what is over the limits of a class of one job may only become smaller."""
+"""No class and no function of the native core grows: what is over the limits of one job may only become smaller."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import lizard
 import pytest
 
 SOURCES = Path(__file__).parent.parent / "engine/native/src"
@@ -15,6 +16,32 @@ LARGER = {  # members and methods of those that are over: lower a number that ha
     "contacts/PgsSolver": (48, 42),
     "particles/ParticleSystem": (17, 46),
     "rigid/JointSet": (13, 53),
+}
+MOST_BRANCHES = 25
+LONGER = {  # cyclomatic numbers of functions that are over: as above
+    "collision/frustum.cpp rim_and_rim": 33,
+    "collision/submerged.cpp slices_below": 29,
+    "contacts/candidate_search.cpp CandidateSearch::look_at": 29,
+    "contacts/cone_newton.cpp ConeNewton::solve": 38,
+    "contacts/friction_direct.cpp settle_by_rounds": 46,
+    "contacts/impact_events.cpp ImpactEvents::find": 41,
+    "contacts/impact_solver.cpp ImpactSolver::solve": 29,
+    "contacts/internal_edges.cpp InternalEdges::is_internal_edge": 27,
+    "contacts/pgs_solver.cpp PgsSolver::run": 30,
+    "contacts/pivot_solver.cpp PivotSolver::solve": 40,
+    "contacts/reduced_newton.cpp ReducedContacts::find_step": 27,
+    "contacts/solve_by_pgs.cpp ContactStage::solve_by_pgs": 35,
+    "contacts/successive_impacts.cpp SuccessiveImpacts::find_earliest": 32,
+    "particles/particle_composition.cpp ParticleComposition::constrained_stage": 29,
+    "particles/particle_stages.cpp choose_stages": 58,
+    "rigid/joint_set.cpp JointSet::JointSet": 34,
+    "rigid/joint_tree.cpp JointTree::attach": 52,
+    "rigid/joint_tree_stage.cpp JointTree::stage": 26,
+    "rigid/locked_tree_order.cpp LockedTree::analyse": 44,
+    "rigid/rigid_locking.cpp LoopWatch::take": 34,
+    "rigid/rigid_stages.cpp choose_stages": 84,
+    "rigid/sleep.cpp Sleeping::sleep": 28,
+    "run/recorder.cpp Recorder::sample": 27,
 }
 OPENS = re.compile(r"\b(class|struct)\s+(?:alignas\([^)]*\)\s*)?([\w:]+)(?:\s+final)?(?:\s*:\s*[^{;]*)?\s*$")
 NO_MEMBER = re.compile(
@@ -92,6 +119,42 @@ def test_no_class_grows_beyond_one_job() -> None:
     over = {name: size for name, size in core().items() if size[0] > MOST_MEMBERS or size[1] > MOST_METHODS}
 
     assert over == LARGER
+
+
+def branches(name: str, text: str) -> dict[str, int]:
+    """Cyclomatic number (McCabe 1976) of each function of a file, the largest of those of one name; a lambda's
+    count where it stands."""
+    found: dict[str, int] = {}
+    for function in lizard.analyze_file.analyze_source_code(name, text).function_list:
+        called = f"{name} {function.name.removeprefix('spook::')}"
+        found[called] = max(found.get(called, 0), function.cyclomatic_complexity)
+    return found
+
+
+def test_no_function_has_more_branches_than_one_can_follow() -> None:
+    over = {
+        function: number
+        for source in sorted(SOURCES.glob("*/*.[ch]pp"))
+        for function, number in branches(str(source.relative_to(SOURCES)), source.read_text()).items()
+        if number > MOST_BRANCHES
+    }
+
+    assert over == LONGER
+
+
+def test_which_branches_are_counted() -> None:
+    text = """namespace spook {
+    int A::f(int a) {
+        const auto g = [&](int b) { return b > 0 && a > 0 ? b : a; };
+        for (int k = 0; k < a || k < 2; ++k)
+            if (g(k)) a += k;
+        switch (a) { case 1: return 2; case 2: return 3; }
+        while (a > 9) --a;
+        return a;
+    }
+    void A::f() {}
+    }"""
+    assert branches("a.cpp", text) == {"a.cpp A::f": 1 + 2 + 2 + 1 + 2 + 1}
 
 
 @pytest.mark.parametrize(
