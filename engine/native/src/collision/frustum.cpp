@@ -190,29 +190,34 @@ void side_and_rims(Search<Gap>& search, const Frustum& one, const Frustum& other
     }
 }
 
-/// Where the rims come nearest: each point of one, and the nearest of the other's. Round the smaller: about the larger's
-/// circle the distance changes over less than a part of it.
-template <class Gap>
-void rim_and_rim(Search<Gap>& search, const Frustum& one, int i, const Frustum& two, int j,
-                 double sign) noexcept {
-    const double r = one.radius[i], far = two.radius[j];
-    if (far > r) return rim_and_rim(search, two, j, one, i, -sign);
-    const Vec3 u = two.sideways, v = cross(two.axis, u);
-    Vec3 apart, first_along, second_along;
-    const auto slope = [&](SineCosine turn, double* bend = nullptr) noexcept {
-        const Vec3 e = turn.cosine * u + turn.sine * v, p = two.centre[j] + far * e;
-        second_along = turn.cosine * v - turn.sine * u;
-        const Vec3 away = one.radial(p - one.centre[i]);
-        const Vec3 out = one.unit_across(away);
-        first_along = cross(one.axis, out);
-        apart = p - (one.centre[i] + r * out);
+/// Two rims, and how far apart they are where the second's turn is looked at: its point, and the nearest of the first's.
+class Rims {
+public:
+    Rims(const Frustum& one, int i, const Frustum& two, int j) noexcept
+        : one_(one),
+          u_(two.sideways),
+          v_(cross(two.axis, two.sideways)),
+          middle_(one.centre[i]),
+          other_(two.centre[j]),
+          r_(one.radius[i]),
+          far_(two.radius[j]) {}
+
+    /// Looks at a turn: half the slope of the squared distance over it, and unless null how that bends.
+    double slope(SineCosine turn, double* bend = nullptr) noexcept {
+        const Vec3 e = turn.cosine * u_ + turn.sine * v_, p = other_ + far_ * e;
+        second_along_ = turn.cosine * v_ - turn.sine * u_;
+        const Vec3 away = one_.radial(p - middle_);
+        const Vec3 out = one_.unit_across(away);
+        first_along_ = cross(one_.axis, out);
+        apart_ = p - (middle_ + r_ * out);
         if (bend != nullptr) {
-            const double side = dot(first_along, second_along), distance = norm(away);
-            *bend = far - dot(apart, e) - (distance > 0.0 ? r * far * side * side / distance : 0.0);
+            const double side = dot(first_along_, second_along_), distance = norm(away);
+            *bend = far_ - dot(apart_, e) - (distance > 0.0 ? r_ * far_ * side * side / distance : 0.0);
         }
-        return dot(apart, second_along);
-    };
-    const auto visit = [&](double low, double at_low, double high, double at_high) noexcept {
+        return dot(apart_, second_along_);
+    }
+    /// Looks at where the slope is zero between two turns at which its signs differ.
+    void find_zero(double low, double at_low, double high, double at_high) noexcept {
         double angle = high, here = at_high, old = low, there = at_low;
         if (here == 0.0) slope(sine_cosine(angle));  // what was asked last may lie elsewhere
         for (int round = 0; round < 100 && here != 0.0;
@@ -224,57 +229,80 @@ void rim_and_rim(Search<Gap>& search, const Frustum& one, int i, const Frustum& 
             angle = next, here = slope(sine_cosine(angle));
             ((here > 0.0) == (at_low > 0.0) ? low : high) = angle;
         }
-        const double distance = norm(apart);
-        const Vec3 crossed = cross(first_along, second_along);
+    }
+    /// The directions that may part the rims where they were looked at last.
+    template <class Gap> void visit(Search<Gap>& search, double sign) const noexcept {
+        const double distance = norm(apart_);
+        const Vec3 crossed = cross(first_along_, second_along_);
         const double sine = norm(crossed);
         // Crossing rims: the difference of two nearly equal points has no direction, their tangents have one.
-        if (distance > 1e-3 * std::min(r, far)) search.curved((sign / distance) * apart);
+        if (distance > 1e-3 * std::min(r_, far_)) search.curved((sign / distance) * apart_);
         if (sine > parallel) {
             search.curved((1.0 / sine) * crossed);
             search.curved((-1.0 / sine) * crossed);
         }
-    };
-    // Between two places the slope is taken for the cubic that has its values and bends there. Where that turns beyond
-    // zero, or nearly so, it is asked: rims that nearly touch have two nearest points close to each other.
-    const auto turns = [](double at_low, double bend_low, double at_high, double bend_high) noexcept {
-        const double rise = at_high - at_low, a = 3.0 * (bend_low + bend_high - 2.0 * rise),
-                     b = 3.0 * rise - 2.0 * bend_low - bend_high, root = b * b - a * bend_low;
-        if (!(root > 0.0)) return 0.0;
-        const double q = -(b + std::copysign(std::sqrt(root), b)), one = q / a, two = bend_low / q;
-        const double early = std::min(one, two), late = std::max(one, two);
-        const double near = 0.1 * std::max(std::abs(at_low), std::abs(at_high)),
-                     side = at_low > 0.0 ? 1.0 : -1.0;
-        const auto above = [&](double t) { return side * (at_low + t * (bend_low + t * (b + t * a / 3.0))); };
-        if ((at_low > 0.0) != (at_high > 0.0))  // once; or three times
-            return early > 0.0 && late < 1.0 && above(early) < near && above(late) > -near ? early : 0.0;
-        if (early > 0.0 && early < 1.0 && above(early) < near) return early;
-        return late > 0.0 && late < 1.0 && above(late) < near ? late : 0.0;
-    };
-    struct Place {
-        double angle, slope, bend;
-    };
-    const auto between = [&](const auto& self, const Place& low, const Place& high,
-                             int depth) noexcept -> void {
-        const double width = high.angle - low.angle;
-        const bool crosses = (low.slope > 0.0) != (high.slope > 0.0);
-        const double t = turns(low.slope, width * low.bend, high.slope, width * high.bend);
-        if (t > 0.0 && depth > 0) {
-            Place middle{low.angle + t * width, 0.0, 0.0};
-            middle.slope = slope(sine_cosine(middle.angle), &middle.bend);
-            self(self, low, middle, depth - 1);
-            self(self, middle, high, depth - 1);
-        } else if (crosses) {
-            visit(low.angle, low.slope, high.angle, high.slope);
-        }
-    };
+    }
+
+private:
+    const Frustum& one_;
+    Vec3 u_, v_, middle_, other_;
+    double r_, far_;
+    Vec3 apart_, first_along_, second_along_;
+};
+
+/// Where the cubic that has these values and bends at both ends of a way turns beyond zero, or nearly so: a part of the
+/// way; 0 if it does not.
+double where_it_turns(double at_low, double bend_low, double at_high, double bend_high) noexcept {
+    const double rise = at_high - at_low, a = 3.0 * (bend_low + bend_high - 2.0 * rise),
+                 b = 3.0 * rise - 2.0 * bend_low - bend_high, root = b * b - a * bend_low;
+    if (!(root > 0.0)) return 0.0;
+    const double q = -(b + std::copysign(std::sqrt(root), b)), one = q / a, two = bend_low / q;
+    const double early = std::min(one, two), late = std::max(one, two);
+    const double near = 0.1 * std::max(std::abs(at_low), std::abs(at_high)), side = at_low > 0.0 ? 1.0 : -1.0;
+    const auto above = [&](double t) { return side * (at_low + t * (bend_low + t * (b + t * a / 3.0))); };
+    if ((at_low > 0.0) != (at_high > 0.0))  // once; or three times
+        return early > 0.0 && late < 1.0 && above(early) < near && above(late) > -near ? early : 0.0;
+    if (early > 0.0 && early < 1.0 && above(early) < near) return early;
+    return late > 0.0 && late < 1.0 && above(late) < near ? late : 0.0;
+}
+
+struct RimPlace {
+    double angle, slope, bend;
+};
+
+/// Visits the nearest points between two places. Where the slope may turn beyond zero in between it is asked: rims that
+/// nearly touch have two nearest points close to each other.
+template <class Gap>
+void visit_between(Search<Gap>& search, Rims& rims, double sign, const RimPlace& low, const RimPlace& high,
+                   int depth) noexcept {
+    const double width = high.angle - low.angle;
+    const double t = where_it_turns(low.slope, width * low.bend, high.slope, width * high.bend);
+    if (t > 0.0 && depth > 0) {
+        RimPlace middle{low.angle + t * width, 0.0, 0.0};
+        middle.slope = rims.slope(sine_cosine(middle.angle), &middle.bend);
+        visit_between(search, rims, sign, low, middle, depth - 1);
+        visit_between(search, rims, sign, middle, high, depth - 1);
+    } else if ((low.slope > 0.0) != (high.slope > 0.0)) {
+        rims.find_zero(low.angle, low.slope, high.angle, high.slope);
+        rims.visit(search, sign);
+    }
+}
+
+/// Where the rims come nearest: each point of one, and the nearest of the other's. Round the smaller: about the larger's
+/// circle the distance changes over less than a part of it.
+template <class Gap>
+void rim_and_rim(Search<Gap>& search, const Frustum& one, int i, const Frustum& two, int j,
+                 double sign) noexcept {
+    if (two.radius[j] > one.radius[i]) return rim_and_rim(search, two, j, one, i, -sign);
+    Rims rims(one, i, two, j);
     constexpr int parts = 24;
-    Place low{circle_angle(0, parts), 0.0, 0.0};
-    low.slope = slope(circle().turns[0], &low.bend);
-    const Place first = low;  // and last: rounding may not part the circle from itself
+    RimPlace low{circle_angle(0, parts), 0.0, 0.0};
+    low.slope = rims.slope(circle().turns[0], &low.bend);
+    const RimPlace first = low;  // and last: rounding may not part the circle from itself
     for (int k = 1; k <= parts; ++k) {
-        Place high{circle_angle(k, parts), first.slope, first.bend};
-        if (k < parts) high.slope = slope(circle().turns[k * Circle::count / parts], &high.bend);
-        between(between, low, high, 4);
+        RimPlace high{circle_angle(k, parts), first.slope, first.bend};
+        if (k < parts) high.slope = rims.slope(circle().turns[k * Circle::count / parts], &high.bend);
+        visit_between(search, rims, sign, low, high, 4);
         low = high;
     }
 }

@@ -104,6 +104,8 @@ constexpr double WEIGHT[] = {0.18945061045506864,  0.18260341504492364, 0.169156
 /// height + slope s above the slice's centre and rises across it with `tilt`.
 struct Slices {
     double radius, half_length, height, slope, tilt, apex;  // apex: of a cone, m up its axis, else zero
+    bool caps;                                              // of a capsule
+    double first, last;                                     // where it begins and ends along its axis
 
     double rho2(double s) const noexcept {  // of a cylinder no slice is beyond
         if (apex > 0.0) {
@@ -121,6 +123,54 @@ struct Slices {
         area = r2 * (0.5 * kPi + arc_tangent(edge, chord)) + edge * chord;
         moment = -2.0 / 3.0 * chord * chord * chord;
     }
+    /// Where pieces end, in order: the caps, and where the surface meets the side |over| = tilt ρ. How many.
+    int find_ends(double (&ends)[20]) const noexcept {
+        ends[0] = first, ends[1] = last;
+        int count = 2;
+        const auto add = [&](double s) {
+            if (s > first && s < last) ends[count++] = s;
+        };
+        if (apex > 0.0) {  // both sides linear
+            for (const double side : {-0.5 * tilt * radius / half_length, 0.5 * tilt * radius / half_length})
+                if (slope + side != 0.0) add((side * last - height) / (slope + side));
+        } else if (slope != 0.0) {
+            for (const double side : {-1.0, 1.0}) add((side * tilt * radius - height) / slope);
+        }
+        if (caps) {
+            ends[count++] = -half_length, ends[count++] = half_length;
+            add_caps(add);
+        }
+        std::sort(ends, ends + count);
+        return count;
+    }
+    /// Where the surface meets the caps' sides: (over + slope x)² = tilt² (r² − x²), slope² + tilt² = 1.
+    template <class Add> void add_caps(Add add) const noexcept {
+        for (const double middle : {-half_length, half_length}) {
+            const double over = height + slope * middle, root = radius * radius - over * over;
+            if (root < 0.0) continue;
+            for (const double side : {-1.0, 1.0}) add(middle - slope * over + side * tilt * std::sqrt(root));
+        }
+    }
+    /// Volume of a piece and its moments along the axis and across, by sixteen nodes of Gauss.
+    struct Moments {
+        double volume = 0.0, along = 0.0, aside = 0.0;
+    };
+    void add_piece(double from, double to, Moments& sum) const noexcept {
+        const double middle = 0.5 * (from + to), width = 0.5 * (to - from);
+        if (!(width > 0.0)) return;
+        for (int node = 0; node < 16; ++node) {
+            // s = middle − width cos φ: roots at the ends become smooth.
+            const double x = node < 8 ? -NODE[node] : NODE[node - 8];
+            const SineCosine turn = sine_cosine(0.5 * kPi * (1.0 + x));
+            const double s = middle - width * turn.cosine,
+                         weight = WEIGHT[node % 8] * 0.5 * kPi * width * turn.sine;
+            double area, moment;
+            slice(s, area, moment);
+            sum.volume += weight * area;
+            sum.along += weight * area * s;
+            sum.aside += weight * moment;
+        }
+    }
 };
 
 Submerged slices_below(const Primitive& shape, const Pose& at, Vec3 up, double height) noexcept {
@@ -136,46 +186,15 @@ Submerged slices_below(const Primitive& shape, const Pose& at, Vec3 up, double h
                  tall = cone ? std::max(r * tilt + slope * first, slope * last) : reach;
     if (height >= deep) return {0.0, at.position};
     if (height <= -tall) return {volume(shape), at.position};
-    const Slices slices{r, half, height, slope, tilt, cone ? last : 0.0};
-    // Where pieces end: the caps, and where the surface meets the side |over| = tilt ρ of cylinder and caps.
-    double ends[20] = {first, last};
-    int count = 2;
-    if (caps) ends[count++] = -half, ends[count++] = half;
-    const auto add = [&](double s) {
-        if (s > first && s < last) ends[count++] = s;
-    };
-    if (cone)  // |over| = tilt ρ, both linear
-        for (const double side : {-0.5 * tilt * r / half, 0.5 * tilt * r / half})
-            if (slope + side != 0.0) add((side * last - height) / (slope + side));
-    if (slope != 0.0 && !cone)
-        for (const double side : {-1.0, 1.0}) add((side * tilt * r - height) / slope);
-    for (const double middle : {-half, half}) {
-        if (!caps) break;  // (over + slope x)² = tilt² (r² − x²), slope² + tilt² = 1
-        const double over = height + slope * middle, root = r * r - over * over;
-        if (root < 0.0) continue;
-        for (const double side : {-1.0, 1.0}) add(middle - slope * over + side * tilt * std::sqrt(root));
-    }
-    std::sort(ends, ends + count);
-    double volume = 0.0, along = 0.0, aside = 0.0;
-    for (int k = 0; k + 1 < count; ++k) {
-        const double middle = 0.5 * (ends[k] + ends[k + 1]), width = 0.5 * (ends[k + 1] - ends[k]);
-        if (!(width > 0.0)) continue;
-        for (int node = 0; node < 16; ++node) {
-            // s = middle − width cos φ: roots at the ends become smooth.
-            const double x = node < 8 ? -NODE[node] : NODE[node - 8];
-            const SineCosine turn = sine_cosine(0.5 * kPi * (1.0 + x));
-            const double s = middle - width * turn.cosine,
-                         weight = WEIGHT[node % 8] * 0.5 * kPi * width * turn.sine;
-            double area, moment;
-            slices.slice(s, area, moment);
-            volume += weight * area;
-            along += weight * area * s;
-            aside += weight * moment;
-        }
-    }
-    if (!(volume > 0.0)) return {0.0, at.position};
+    const Slices slices{r, half, height, slope, tilt, cone ? last : 0.0, caps, first, last};
+    double ends[20];
+    const int count = slices.find_ends(ends);
+    Slices::Moments below;
+    for (int k = 0; k + 1 < count; ++k) slices.add_piece(ends[k], ends[k + 1], below);
+    if (!(below.volume > 0.0)) return {0.0, at.position};
     const Vec3 up_across = tilt > 0.0 ? (1.0 / tilt) * across : Vec3{};
-    return {volume, at.position + (along / volume) * axis + (aside / volume) * up_across};
+    return {below.volume,
+            at.position + (below.along / below.volume) * axis + (below.aside / below.volume) * up_across};
 }
 
 }  // namespace

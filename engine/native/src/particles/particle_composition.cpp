@@ -129,45 +129,17 @@ void ParticleComposition::find_kicks() noexcept {
 
 /// `history` holds this stage's forces one, two and three steps ago. False if no solution was found.
 bool ParticleComposition::constrained_stage(double tau, double* history) {
-    const std::size_t count = rows_.size();
     const double span = state_.pending + 0.5 * tau, part = span / h_;
-    double *one = history, *two = history + count, *three = history + 2 * count;
     find_kicks();
     if (clock_ && forces_.any()) clock_->mark({Stage::apply_central_gravity, Stage::apply_springs});
-    const double a1 = state_.stage_steps >= 3 ? 3.0 : state_.stage_steps == 2 ? 2.0 : 1.0;
-    const double a2 = state_.stage_steps >= 3   ? -3.0
-                      : state_.stage_steps == 2 ? -1.0
-                                                : 0.0,
-                 a3 = state_.stage_steps >= 3 ? 1.0 : 0.0;
-    for (std::size_t k = 0; k < count; ++k)
-        rows_.link[k].lambda = span * (a1 * one[k] + a2 * two[k] + a3 * three[k]);
-    if (solver_ == ParticleSolver::path) {
-        predict_paths(part);
-    } else {
-        for (std::size_t k = 0; k < count; ++k)
-            rows_.link[k].u =
-                rows_.row[k].rest_inverse * (nodes_.x[rows_.row[k].b] - nodes_.x[rows_.row[k].a]);
-        for (std::size_t node = 0; node < nodes_.v.size(); ++node) nodes_.v[node] += part * nodes_.kick[node];
-        rows_.push(nodes_, nodes_.v);
-    }
+    extrapolate(span, history);
+    if (solver_ == ParticleSolver::path) predict_paths(part);
+    else predict_blocks(part);
     if (clock_) clock_->mark(Stage::assemble_rows);
-    double before = std::numeric_limits<double>::infinity();
-    bool fresh = true;
-    for (int iteration = 0;; ++iteration) {
-        const double off =
-            solver_ == ParticleSolver::path ? lengthen_paths(tau, fresh) : lengthen_blocks(tau, fresh);
-        const double ratio = off / before;
-        ++state_.newton_iterations;
-        if (off <= SETTLED || (off < 1e-12 && ratio > 0.5)) break;  // settled, or down in the rounding
-        if (!(off < FARTHEST) || iteration == MOST_ITERATIONS) return false;
-        fresh = iteration > 0 && ratio > SLOW;
-        if (solver_ == ParticleSolver::path) shorten_paths();
-        else shorten_blocks();
-        // What is left is below rounding already: by Newton's rate, or by that of the kept factor.
-        if (off * (iteration == 0 ? 100.0 * off : ratio) <= 0.1 * SETTLED) break;
-        before = off;
-    }
+    if (!find_impulses(tau)) return false;
     if (clock_) clock_->mark(solver_ == ParticleSolver::path ? Stage::solve_path : Stage::solve_block);
+    const std::size_t count = rows_.size();
+    double *one = history, *two = history + count, *three = history + 2 * count;
     const double per_span = 1.0 / span;
     for (std::size_t k = 0; k < count; ++k) {
         three[k] = two[k];
@@ -178,6 +150,44 @@ bool ParticleComposition::constrained_stage(double tau, double* history) {
     state_.pending = 0.5 * tau;
     if (clock_) clock_->mark(Stage::integrate_positions);
     return true;
+}
+
+/// Where to look for impulses over `span`: by the forces of as many steps as there were, up to three.
+void ParticleComposition::extrapolate(double span, const double* history) noexcept {
+    const std::size_t count = rows_.size();
+    const double *one = history, *two = history + count, *three = history + 2 * count;
+    const std::int64_t steps = state_.stage_steps;
+    const double a1 = steps >= 3 ? 3.0 : steps == 2 ? 2.0 : 1.0;
+    const double a2 = steps >= 3 ? -3.0 : steps == 2 ? -1.0 : 0.0, a3 = steps >= 3 ? 1.0 : 0.0;
+    for (std::size_t k = 0; k < count; ++k)
+        rows_.link[k].lambda = span * (a1 * one[k] + a2 * two[k] + a3 * three[k]);
+}
+
+void ParticleComposition::predict_blocks(double part) noexcept {
+    for (std::size_t k = 0; k < rows_.size(); ++k)
+        rows_.link[k].u = rows_.row[k].rest_inverse * (nodes_.x[rows_.row[k].b] - nodes_.x[rows_.row[k].a]);
+    for (std::size_t node = 0; node < nodes_.v.size(); ++node) nodes_.v[node] += part * nodes_.kick[node];
+    rows_.push(nodes_, nodes_.v);
+}
+
+/// Impulses with which the rows hold after τ, by Newton's method. False if they are not near.
+bool ParticleComposition::find_impulses(double tau) {
+    double before = std::numeric_limits<double>::infinity();
+    bool fresh = true;
+    for (int iteration = 0;; ++iteration) {
+        const double off =
+            solver_ == ParticleSolver::path ? lengthen_paths(tau, fresh) : lengthen_blocks(tau, fresh);
+        const double ratio = off / before;
+        ++state_.newton_iterations;
+        if (off <= SETTLED || (off < 1e-12 && ratio > 0.5)) return true;  // settled, or down in the rounding
+        if (!(off < FARTHEST) || iteration == MOST_ITERATIONS) return false;
+        fresh = iteration > 0 && ratio > SLOW;
+        if (solver_ == ParticleSolver::path) shorten_paths();
+        else shorten_blocks();
+        // What is left is below rounding already: by Newton's rate, or by that of the kept factor.
+        if (off * (iteration == 0 ? 100.0 * off : ratio) <= 0.1 * SETTLED) return true;
+        before = off;
+    }
 }
 
 /// Residual of every row and the way down: L U of the Jacobian if `fresh`, else forward substitution only.

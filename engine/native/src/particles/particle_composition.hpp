@@ -46,7 +46,10 @@ private:
     bool constrained_stage(double tau, double* history);
     double lengthen_paths(double tau, bool fresh) noexcept;
     void shorten_paths() noexcept;
+    void extrapolate(double span, const double* history) noexcept;
+    bool find_impulses(double tau);
     void predict_paths(double part) noexcept;
+    void predict_blocks(double part) noexcept;
     double lengthen_blocks(double tau, bool fresh);
     void shorten_blocks();
     void solve_rigidly();

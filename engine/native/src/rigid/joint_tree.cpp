@@ -31,6 +31,90 @@ bool freedom(const JointConstants& joint, bool backwards, int& turns, int& slide
     return !backwards || turns == 0 || along_axis;
 }
 
+/// Whether every joint may be one of a forest or close a loop of it.
+bool may_be_a_forest(std::span<const BodyConstants> constants, const JointSet& joints) noexcept {
+    for (const JointBlock& block : joints.blocks()) {
+        if (block.axial && block.size == 1 && block.rotor == 0) continue;
+        const JointKind kind = joints.constants(block.joint).kind;
+        if (block.axial || kind == JointKind::relation || kind == JointKind::wire) return false;
+        for (int body : {block.first, block.second})
+            if (body >= 0 && constants[body].motion == Motion::kinematic) return false;
+    }
+    return true;
+}
+
+/// A body, with the block of the joint it is attached by (−1: it floats) to another (−1: the world).
+struct Hung {
+    int body, block, parent;
+};
+
+/// Every body as near to the world as it can be, by breadth: parents stand first.
+class BreadthFirst {
+public:
+    BreadthFirst(std::span<const BodyConstants> constants, const JointSet& joints)
+        : constants_(constants), joints_(joints), place_(constants.size(), -1) {}
+
+    /// False if the bodies `tied` are not all held by joints of a forest.
+    bool find(std::span<const int> tied) {
+        hang_on(-1);
+        follow();
+        for (int body : tied) {  // what nothing holds to the world floats with the first of its bodies
+            if (place_[body] >= 0) continue;
+            const std::size_t root = found_.size();
+            take({body, -1, -1});
+            follow();
+            if (is_held_since(root)) return false;
+        }
+        return found_.size() == tied.size();
+    }
+    std::span<const Hung> found() const noexcept { return found_; }
+
+private:
+    bool moves(int body) const noexcept { return body >= 0 && constants_[body].moves(); }
+    void take(const Hung& one) {
+        place_[one.body] = static_cast<int>(found_.size());
+        found_.push_back(one);
+    }
+    void follow() {
+        for (; next_ < found_.size(); ++next_) hang_on(found_[next_].body);
+    }
+    /// Takes what is attached to a body, or to the world.
+    void hang_on(int parent) {
+        const auto blocks = joints_.blocks();
+        for (std::size_t k = 0; k < blocks.size(); ++k) {
+            const JointBlock& block = blocks[k];
+            for (const bool backwards : {false, true}) {
+                if (block.axial) continue;
+                const int holder = backwards ? block.second : block.first;
+                const int body = backwards ? block.first : block.second;
+                if (!moves(body) || place_[body] >= 0) continue;
+                if (parent < 0 ? moves(holder) : holder != parent) continue;
+                int turns = 0, slides = 0;
+                Vec3 axes[3];
+                const JointConstants& joint = joints_.constants(block.joint);
+                if (!at_one_place(joint) || !freedom(joint, backwards, turns, slides, axes)) continue;
+                take({body, static_cast<int>(k), parent});
+            }
+        }
+    }
+    /// Whether one of the bodies from `root` on is held after all, by a joint not known here.
+    bool is_held_since(std::size_t root) const noexcept {
+        for (const JointBlock& block : joints_.blocks())
+            for (const bool second : {false, true}) {
+                const int end = second ? block.second : block.first,
+                          other = second ? block.first : block.second;
+                if (moves(end) && place_[end] >= static_cast<int>(root) && !moves(other)) return true;
+            }
+        return false;
+    }
+
+    std::span<const BodyConstants> constants_;
+    const JointSet& joints_;
+    std::vector<int> place_;  // of a body in found_
+    std::vector<Hung> found_;
+    std::size_t next_ = 0;
+};
+
 }  // namespace
 
 void JointTree::analyse(std::span<const BodyConstants> constants, const JointSet& joints,
@@ -44,118 +128,78 @@ void JointTree::analyse(std::span<const BodyConstants> constants, const JointSet
     coordinates_ = 0;
 }
 
-/// The forest, by breadth: every body as near to the world as it can be.
+/// The forest, its nodes by depth.
 bool JointTree::attach(std::span<const int> tied) {
-    struct Hung {
-        int body, joint, parent;  // joint: −1 if it floats; parent: a body, −1 the world
-    };
-    const auto blocks = joints_->blocks();
-    const auto moving = [&](int body) { return body >= 0 && constants_[body].moves(); };
-    for (const JointBlock& block : blocks) {
-        if (block.axial && block.size == 1 && block.rotor == 0) continue;
-        if (block.axial || joints_->constants(block.joint).kind == JointKind::relation ||
-            joints_->constants(block.joint).kind == JointKind::wire)
-            return false;
-        for (int body : {block.first, block.second})
-            if (body >= 0 && constants_[body].motion == Motion::kinematic) return false;
-    }
-    std::vector<int> hung(constants_.size(), -1);  // place in `found`
-    std::vector<Hung> found;
-    const auto hang_on = [&](int parent) {
-        for (std::size_t k = 0; k < blocks.size(); ++k) {
-            const JointBlock& block = blocks[k];
-            for (const bool backwards : {false, true}) {
-                if (block.axial) continue;
-                const int holder = backwards ? block.second : block.first;
-                const int body = backwards ? block.first : block.second;
-                if (!moving(body) || hung[body] >= 0) continue;
-                if (parent < 0 ? moving(holder) : holder != parent) continue;
-                int turns = 0, slides = 0;
-                Vec3 axes[3];
-                const JointConstants& joint = joints_->constants(block.joint);
-                if (!at_one_place(joint) || !freedom(joint, backwards, turns, slides, axes)) continue;
-                hung[body] = static_cast<int>(found.size());
-                found.push_back({body, static_cast<int>(k), parent});
-            }
-        }
-    };
-    if (tied.size() > 2000) return false;
-    hang_on(-1);
-    std::size_t next = 0;
-    const auto follow = [&] {
-        for (; next < found.size(); ++next) hang_on(found[next].body);
-    };
-    follow();
-    for (int body : tied) {  // what nothing holds to the world floats with the first of its bodies
-        if (hung[body] >= 0) continue;
-        hung[body] = static_cast<int>(found.size());
-        const std::size_t root = found.size();
-        found.push_back({body, -1, -1});
-        follow();
-        for (const JointBlock& block : blocks)  // held after all, by a joint not known here
-            for (const bool second : {false, true}) {
-                const int end = second ? block.second : block.first,
-                          other = second ? block.first : block.second;
-                if (moving(end) && hung[end] >= static_cast<int>(root) && !moving(other)) return false;
-            }
-    }
-    if (found.size() != tied.size()) return false;
-
+    BreadthFirst bodies(constants_, *joints_);
+    if (!may_be_a_forest(constants_, *joints_) || tied.size() > 2000 || !bodies.find(tied)) return false;
     nodes_.clear();
     node_of_.assign(constants_.size(), -1);
     trees_ = 0;
     double scale = 0.0;
     const auto add = [&](const auto& self, const Hung& one) -> void {
-        Node node;
-        node.body = one.body;
+        Node node = node_held_by(one.block, one.body);
         node.parent = one.parent < 0 ? -1 : node_of_[one.parent];
-        if (one.joint < 0) {
-            node.turns = node.slides = 3;
-            node.slide_axes[0] = {1, 0, 0}, node.slide_axes[1] = {0, 1, 0}, node.slide_axes[2] = {0, 0, 1};
-        } else {
-            node.joint = blocks[one.joint].joint;
-            const JointConstants& joint = joints_->constants(node.joint);
-            node.backwards = blocks[one.joint].first == one.body;
-            freedom(joint, node.backwards, node.turns, node.slides, node.slide_axes);
-            node.axis = joint.axes[0];
-            node.parent_arm = node.backwards ? joint.second_arm : joint.first_arm;
-            node.arm = node.backwards ? joint.first_arm : joint.second_arm;
-            if (const std::size_t own = static_cast<std::size_t>(one.joint) + 1;
-                own < blocks.size() && blocks[own].joint == node.joint)
-                node.armature = 1.0 / blocks[own].softness[0];
-        }
-        const double arms = norm(node.parent_arm) + norm(node.arm);
-        node.extent = arms > 0.0 ? arms : 1.0;
-        const BodyConstants& body = constants_[one.body];
-        node.mass = body.mass;
-        node.inertia = body.inertia;
         node.tree = one.parent < 0 ? trees_++ : nodes_[static_cast<std::size_t>(node.parent)].tree;
         node.first = coordinates_;
         coordinates_ += node.coordinates();
-        const Vec3 i = body.inertia;
-        scale += (i.x + i.y + i.z) / 3.0 + body.mass * dot(node.arm, node.arm);
+        const Vec3 i = node.inertia;
+        scale += (i.x + i.y + i.z) / 3.0 + node.mass * dot(node.arm, node.arm);
         const std::size_t at = nodes_.size();
         node_of_[one.body] = static_cast<int>(at);
         nodes_.push_back(node);
-        for (const Hung& next : found)
+        for (const Hung& next : bodies.found())
             if (next.parent == one.body) self(self, next);
         nodes_[at].end = static_cast<int>(nodes_.size());
     };
-    for (const Hung& one : found) {
+    for (const Hung& one : bodies.found()) {
         if (constants_[one.body].particle) return false;
         if (one.parent < 0) add(add, one);
     }
     scale_ = scale / static_cast<double>(std::max<std::size_t>(1, nodes_.size()));
-    std::vector<int> in_tree(static_cast<std::size_t>(trees_), 0);
-    std::size_t with_rotor = 0;
-    for (const Node& node : nodes_) {
-        in_tree[node.tree] += node.coordinates();
-        with_rotor += node.armature > 0.0;
-    }
-    if (with_rotor < joints_->rotors().size()) return false;
     courses_.assign(nodes_.size(), Course{});
     pushes_.assign(nodes_.size(), {});
     twists_.assign(nodes_.size(), {});
+    return has_all_rotors() && has_small_trees();
+}
+
+/// A body with its way to move: by the joint of a block, or floating (−1).
+JointTree::Node JointTree::node_held_by(int block, int body) const noexcept {
+    Node node;
+    node.body = body;
+    if (block < 0) {
+        node.turns = node.slides = 3;
+        node.slide_axes[0] = {1, 0, 0}, node.slide_axes[1] = {0, 1, 0}, node.slide_axes[2] = {0, 0, 1};
+    } else {
+        const auto blocks = joints_->blocks();
+        node.joint = blocks[block].joint;
+        const JointConstants& joint = joints_->constants(node.joint);
+        node.backwards = blocks[block].first == body;
+        freedom(joint, node.backwards, node.turns, node.slides, node.slide_axes);
+        node.axis = joint.axes[0];
+        node.parent_arm = node.backwards ? joint.second_arm : joint.first_arm;
+        node.arm = node.backwards ? joint.first_arm : joint.second_arm;
+        if (const std::size_t own = static_cast<std::size_t>(block) + 1;
+            own < blocks.size() && blocks[own].joint == node.joint)
+            node.armature = 1.0 / blocks[own].softness[0];
+    }
+    const double arms = norm(node.parent_arm) + norm(node.arm);
+    node.extent = arms > 0.0 ? arms : 1.0;
+    node.mass = constants_[body].mass;
+    node.inertia = constants_[body].inertia;
+    return node;
+}
+
+/// Whether no joint that closes a loop has a rotor.
+bool JointTree::has_all_rotors() const noexcept {
+    const auto has_one = [](const Node& node) { return node.armature > 0.0; };
+    const auto with_rotor = std::count_if(nodes_.begin(), nodes_.end(), has_one);
+    return static_cast<std::size_t>(with_rotor) >= joints_->rotors().size();
+}
+
+/// Whether something moves, and no tree is dearer than rows.
+bool JointTree::has_small_trees() const {
+    std::vector<int> in_tree(static_cast<std::size_t>(trees_), 0);
+    for (const Node& node : nodes_) in_tree[node.tree] += node.coordinates();
     const int most = has_light() ? MOST_WITH_LIGHT : MOST_IN_A_TREE;
     return coordinates_ > 0 && *std::max_element(in_tree.begin(), in_tree.end()) <= most;
 }

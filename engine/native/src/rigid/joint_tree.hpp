@@ -105,6 +105,9 @@ private:
     };
 
     bool attach(std::span<const int> tied);
+    Node node_held_by(int block, int body) const noexcept;
+    bool has_all_rotors() const noexcept;
+    bool has_small_trees() const;
     bool has_light() const noexcept;
     bool close(const LargeArray<BodyState>& start);
     void drop_fulfilled_rows();
@@ -118,6 +121,8 @@ private:
     void turn_ends() noexcept;
     void place() noexcept;
     void turn_by(const double* step) noexcept;
+    void deliver(double tau, LargeArray<BodyState>& bodies, JointStates& joints,
+                 double* increments) const noexcept;
     void gain(const LargeArray<BodyState>& bodies, const JointStates& joints, double tau) noexcept;
     static double moved(const Node& node, const Course& course) noexcept;
     void fill_masses() noexcept;

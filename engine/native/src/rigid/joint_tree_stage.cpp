@@ -382,6 +382,13 @@ bool JointTree::stage(double tau, LargeArray<BodyState>& bodies, JointStates& jo
     move(tau);
     ++rounds;
     place();
+    deliver(tau, bodies, joints, increments);
+    return true;
+}
+
+/// Poses at the end, momenta on the way, speeds of rotors, and what each joint moved.
+void JointTree::deliver(double tau, LargeArray<BodyState>& bodies, JointStates& joints,
+                        double* increments) const noexcept {
     const double over = 1.0 / tau;
     for (std::size_t k = 0; k < nodes_.size(); ++k) {
         const Node& node = nodes_[k];
@@ -400,7 +407,6 @@ bool JointTree::stage(double tau, LargeArray<BodyState>& bodies, JointStates& jo
         for (int i = 0; i < 3 && node.turns == 3; ++i) own[i] = e[i];
         for (int i = 0; i < node.slides; ++i) own[node.turns + i] = m.slid[i];
     }
-    return true;
 }
 
 }  // namespace spook

@@ -103,6 +103,7 @@ private:
         Twist momentum;
     };
 
+    int gain_of(const JointSet& joints, int joint);
     template <bool FIRST>
     void eliminate(std::span<const BodyState> bodies, const LockedLoads& loads, bool again) noexcept;
     void eliminate(std::span<const BodyState> bodies, const LockedLoads& loads, bool first,

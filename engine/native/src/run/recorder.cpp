@@ -6,6 +6,25 @@
 
 namespace spook {
 
+namespace {
+
+/// What a reduction has found with one more value, the `first` or after what it found `before`; a mean is divided at
+/// the end. A NaN is taken and then stays: every comparison with it is false.
+double reduced(Reduction reduction, bool first, double before, double value) noexcept {
+    const double size = std::fabs(value);
+    switch (reduction) {
+        case Reduction::maximum: return first || value > before || value != value ? value : before;
+        case Reduction::minimum: return first || value < before || value != value ? value : before;
+        case Reduction::maximum_absolute: return first || size > before || size != size ? size : before;
+        case Reduction::mean: return first ? value : before + value;
+        case Reduction::trace:
+        case Reduction::final: break;
+    }
+    return value;
+}
+
+}  // namespace
+
 Recorder::Recorder(std::vector<Sampler> samplers, std::vector<Observation> observations)
     : samplers_(std::move(samplers)) {
     for (const Observation& what : observations) {
@@ -75,22 +94,7 @@ void Recorder::sample(std::int64_t n) {
         if (what.reduction == Reduction::trace) out += (channel.count - 1) * static_cast<std::int64_t>(width);
         for (std::size_t i = 0; i < width; ++i) {
             const double value = now[i] - (what.from_start ? channel.start[i] : 0.0);
-            const double size = std::fabs(value);
-            // A NaN is taken and then stays: every comparison with it is false.
-            switch (what.reduction) {
-                case Reduction::maximum:
-                    if (first || value > out[i] || value != value) out[i] = value;
-                    break;
-                case Reduction::minimum:
-                    if (first || value < out[i] || value != value) out[i] = value;
-                    break;
-                case Reduction::maximum_absolute:
-                    if (first || size > out[i] || size != size) out[i] = size;
-                    break;
-                case Reduction::mean: out[i] = first ? value : out[i] + value; break;
-                case Reduction::trace:
-                case Reduction::final: out[i] = value; break;
-            }
+            out[i] = reduced(what.reduction, first, out[i], value);
         }
     }
 }
