@@ -8,15 +8,21 @@ comes of a choice that an engine's makers made.
     tracker run --engine newton --catalogue bench.engine_facts:ARM
 
 asks one more, of those that have stops in joints: an arm of light links.
+
+    tracker run --engine mjx --catalogue bench.engine_facts:TWINS
+
+asks what makes itself MuJoCo again, in XLA or Warp, how far it is from MuJoCo where it says that it computes the same.
 """
 
 from __future__ import annotations
 
+import contextlib
 from functools import partial
 
 import numpy as np
 
 from spook_tracker.engine import (
+    Ball,
     Energy,
     Final,
     Hinge,
@@ -28,6 +34,8 @@ from spook_tracker.engine import (
     Scene,
     Trace,
 )
+from spook_tracker.engine.find import find
+from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.scalar_tests.beam.scene import COUNT as BOXES
 from spook_tracker.scalar_tests.beam.scene import scene as beam
 from spook_tracker.scalar_tests.case import Example, Measurement, Metric, ScalarTest, Simulate
@@ -43,6 +51,7 @@ STANDING, LANDED, STAND = 0.3, 1.0, 10.0  # slope, below the friction coefficien
 FLIGHT, FLIGHT_STEPS = 10.0, 1000  # m, in one second
 ARM_LINKS, LINK, LINK_MASS, STOP, ARM_FALL = 6, 0.1, 0.1, 0.5, 2.0  # m, kg, rad either way, s
 ROUNDED = 1e-3  # J, of the 1.8 J that it lacks when it hangs straight down
+TWIN_STEP, TWIN_LASTS, EQUAL, SLIDING = 1.0 / 240.0, 1.0, 1e-9, 0.7  # s, s, m, slope
 ARM_AXES = (
     (0.0, 0.0, 1.0),
     (0.0, 1.0, 0.0),
@@ -137,6 +146,46 @@ def arm_gain(simulate: Simulate, time_step: float) -> dict[str, float]:
     return {"energy_gain": float(np.max(energy))}
 
 
+def apart(simulate: Simulate, built: Scene) -> dict[str, float]:
+    """How far any body is after a second from where MuJoCo has it, in whichever of MuJoCo's settings is nearest [m]."""
+    seen = {"place": Final(quantity=Position())}
+    how = {"time_step": TWIN_STEP, "duration": TWIN_LASTS, "observe": seen}
+    there, mujoco, theirs = simulate(built, **how)["place"], find("mujoco"), []
+    for one in mujoco.configurations:
+        with contextlib.suppress(NotSupported):
+            theirs.append(mujoco.simulate(built, configuration=one.name, **how)["place"])
+    return {"apart": min(float(np.abs(there - place).max()) for place in theirs)}
+
+
+def whirling(joint: type[Hinge] | type[Ball] = Hinge, friction: float = 0.0, closed: bool = False) -> Scene:
+    """Two bodies that spin, the second on the first and that on the world; `closed`: the far end held as well."""
+    spin = 0.0 if closed else 3.0
+    bodies = tuple(
+        RigidBody(
+            name=f"{k}",
+            mass=1.0,
+            inertia=(0.02, 0.05, 0.04),
+            position=(k + 0.5, 0.0, 0.0),
+            velocity=(0.0, spin * (k + 0.5), 0.0),
+            angular_velocity=(0.0, 0.0, spin),
+        )
+        for k in range(2)
+    )
+    axes = ((0.0, 0.0, 1.0), (0.0, 0.6, 0.8))
+    joints: list[Hinge | Ball] = [
+        joint(
+            name=f"joint {k}",
+            between=(f"{k - 1}" if k else "world", f"{k}"),
+            at=(float(k), 0.0, 0.0),
+            **({"axis": axes[k], "friction": friction} if joint is Hinge else {}),
+        )
+        for k in range(2)
+    ]
+    if closed:
+        joints.append(Ball(name="far end", between=("world", "1"), at=(1.6, 0.3, 0.0)))
+    return Scene(bodies=bodies, constraints=tuple(joints), gravity=(1.0, 2.0, -9.81))
+
+
 def _fact(
     title: str,
     name: str,
@@ -146,6 +195,7 @@ def _fact(
     example: object,
     steps: tuple[float, ...] = (TIME_STEP,),
     limit: float | None = None,
+    source: str = "stops give no energy; rounding remains",
 ) -> ScalarTest:
     metric = Metric(
         name=name,
@@ -153,7 +203,7 @@ def _fact(
         unit=unit,
         role="reported" if limit is None else "gate",
         limit=limit,
-        limit_source="stops give no energy; rounding remains",
+        limit_source=source,
         limit_kind="physical",
     )
     return ScalarTest(
@@ -236,4 +286,25 @@ ARM = {
         (TIME_STEP, 1.0 / 240.0),
         limit=ROUNDED,
     ),
+}
+
+TWINS = {
+    f"fact_twin_{name}": _fact(
+        f"Does {what} move as in MuJoCo",
+        "apart",
+        "m",
+        f"how far any body of {what} is after {TWIN_LASTS:g} s from where MuJoCo has it, in the nearest of its settings",
+        partial(apart, built=built),
+        lambda built=built: Example(scene=built, time_step=TWIN_STEP),  # type: ignore[misc]
+        (TWIN_STEP,),
+        limit=EQUAL,
+        source="the same equations in double precision, summed in another order",
+    )
+    for name, what, built in (
+        ("hinges", "a chain of two hinges askew", whirling()),
+        ("balls", "a chain of two ball joints", whirling(Ball)),
+        ("friction", "a chain of two hinges with dry friction", whirling(friction=0.5)),
+        ("loop", "a chain of two ball joints whose far end is held", whirling(Ball, closed=True)),
+        ("contacts", "a box that slides down a slope", slope(SLIDING)),
+    )
 }

@@ -135,6 +135,22 @@ ARM = (
     "([newton#4269](https://github.com/newton-physics/newton/issues/4269) reports it of robots).",
     "",
 )
+TWINS = (
+    "## Is MuJoCo XLA MuJoCo?",
+    "",
+    "`tracker run --engine mjx --catalogue bench.engine_facts:TWINS --all --limit 300` asks how far any body is after a second from where",
+    "MuJoCo has it, in the nearest of MuJoCo's settings, at 1/240 s. Both are of double precision: equal is a nanometre. With mjx",
+    "3.17.0 and mujoco 4.0.0:",
+    "",
+    "| scene | defaults | rk4 | why |",
+    "|---|---|---|---|",
+    "| two hinges askew | 9×10⁻¹⁶ m | 2×10⁻¹⁵ m | the same to rounding |",
+    "| two ball joints | 2×10⁻¹⁵ m | 3×10⁻⁵ m | MJX's Runge-Kutta is of order 2 where quaternions turn, MuJoCo 4's of order 4; mujoco 3.17 has MJX's to rounding |",
+    "| two hinges with dry friction | 7×10⁻¹⁶ m | 3×10⁻⁸ m | our setting of MuJoCo sweeps dry friction once more, which MJX has not |",
+    "| two ball joints, the far end held | 0.02 m | 0.004 m | MuJoCo adds the acceleration of the moving constraint to what its equality asks, MJX does not |",
+    "| a box that slides down a slope | 2×10⁻¹⁵ m | 10⁻¹² m | the same to rounding |",
+    "",
+)
 NEWCOMERS = (
     "## MotrixSim, asked since that night",
     "",

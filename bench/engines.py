@@ -214,6 +214,7 @@ def page(database: str, of_facts: str = "") -> str:
         *engine_places.single(run),
         *_facts(facts),
         *engine_kinds.ARM,
+        *engine_kinds.TWINS,
         *engine_kinds.NEWCOMERS,
         *engine_kinds.NOT_ASKED,
         *_gates(samples),

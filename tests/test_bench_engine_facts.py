@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import bench.engine_kinds as engine_kinds
-from bench.engine_facts import FACTS
+from bench.engine_facts import FACTS, TWINS
 from spook_tracker.engine import simulate
 from spook_tracker.engine.find import find
 from spook_tracker.engine.result import SimulationFailed
@@ -115,6 +115,23 @@ def test_mujoco_shows_three_of_them_here() -> None:
     assert FACTS["fact_creep"].measurements[0].measure(ask)["creep"] > 0.01
     held = partial(find("mujoco").simulate, configuration="equalities")
     assert FACTS["fact_beam"].measurements[0].measure(held)["sag"] > 1.0
+
+
+def test_mujoco_is_its_own_twin_and_ours_is_not() -> None:
+    pytest.importorskip("mujoco")
+    hinges, loop = (TWINS[f"fact_twin_{name}"].measurements[0].measure for name in ("hinges", "loop"))
+
+    assert hinges(partial(find("mujoco").simulate, configuration="defaults"))["apart"] == 0.0
+    assert 1e-9 < hinges(simulate)["apart"] < 0.1  # the same scene by another method
+    assert 1e-9 < loop(simulate)["apart"] < 0.1
+
+
+def test_mujoco_xla_is_mujoco_to_rounding_and_turns_balls_with_order_two() -> None:
+    pytest.importorskip("mujoco.mjx", reason="the extra mjx is not installed")
+    hinges, balls = (TWINS[f"fact_twin_{name}"].measurements[0].measure for name in ("hinges", "balls"))
+
+    assert hinges(partial(find("mjx").simulate, configuration="defaults"))["apart"] < 1e-12
+    assert 1e-6 < balls(partial(find("mjx").simulate, configuration="rk4"))["apart"] < 1e-4
 
 
 def test_ours_shows_none_of_them() -> None:

@@ -213,7 +213,10 @@ def test_the_published_page_says_which_engines_are_not_asked_and_what_stops_do_t
     engines: Any,
 ) -> None:
     told = engines.PAGE.read_text(encoding="utf-8")
-    assert "\n".join((*engine_kinds.ARM, *engine_kinds.NEWCOMERS, *engine_kinds.NOT_ASKED)) in told
+    assert (
+        "\n".join((*engine_kinds.ARM, *engine_kinds.TWINS, *engine_kinds.NEWCOMERS, *engine_kinds.NOT_ASKED))
+        in told
+    )
     assert not {*find.EXTRAS, *find.NODE, *find.BUILT} & {
         line.split(" | ")[0].strip("| ").lower() for line in engine_kinds.NOT_ASKED
     }
