@@ -111,7 +111,7 @@ def _store(session: Session, run: RunDocument, there: Present) -> bool:
             "series_list_id": list_id,
             "gates": len(gate_samples),
             "gates_passed": sum(sample.passed for sample in gate_samples),
-            "content": rows.content_of(run),
+            "content": rows.content_of(run, definitions),
         },
     )
     place = {"started_at": started_at, "run_key": run_key}

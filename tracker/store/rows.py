@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from datetime import UTC, datetime
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -183,9 +183,9 @@ def definition_of(body: str) -> document.SeriesDefinition:
     return decode(body, document.SeriesDefinition)
 
 
-def content_of(run: document.RunDocument) -> str:
-    """A hash of all values of a run, with what stands behind them and their definitions."""
-    definitions = [definition_row(definition)["id"] for definition in run.series]
+def content_of(run: document.RunDocument, rows: Sequence[Row] = ()) -> str:
+    """A hash of all values of a run, with what stands behind them and their definitions, whose rows may be known."""
+    definitions = [row["id"] for row in rows or map(definition_row, run.series)]
     return hashlib.sha256(encode((definitions, run.samples))).hexdigest()[:16]
 
 

@@ -80,11 +80,12 @@ def import_files(session: Session, paths: Iterable[Path]) -> Imported:
     in it. Each run is whole or absent, so an interrupted import can simply be repeated.
     """
     files = list(_files(paths))
+    whole: set[bytes] = set()  # digests of what needs no second look when it is read to be stored
     for file in files:
-        refuse_ahead(read_document(file), str(file))
+        refuse_ahead(read_document(file, whole), str(file))
     stored: list[str] = []
     present: list[str] = []
-    for runs in _together(map(read_document, files)):
+    for runs in _together(read_document(file, whole) for file in files):
         for run, new in zip(runs, record_together(session, runs), strict=True):
             (stored if new else present).append(run.id)
     return Imported(tuple(stored), tuple(present))
@@ -116,14 +117,14 @@ def _together(runs: Iterable[RunDocument]) -> Iterator[list[RunDocument]]:
         yield found
 
 
-def read_document(path: Path) -> RunDocument:
-    """The run document in a file. DocumentError if it cannot be read or is not valid."""
+def read_document(path: Path, whole: set[bytes] | None = None) -> RunDocument:
+    """The run document in a file. DocumentError if it cannot be read or is not valid; `whole` as for `decoded`."""
     try:
         with path.open("rb") as file:
             content = file.read(MAX_BYTES + 1)
     except OSError as error:
         raise DocumentError(f"{path} cannot be read: {error.strerror}") from None
-    return decoded(content, str(path))
+    return decoded(content, str(path), whole)
 
 
 def _files(paths: Iterable[Path]) -> Iterator[Path]:
