@@ -7,8 +7,8 @@
 // do not add up to zero: a turn of the whole, rigid and so free for the joints, gives the angular momentum back.
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 
+#include "linear/disjoint_sets.hpp"
 #include "rigid/island_frame.hpp"
 #include "rigid/joint_pulls.hpp"
 #include "rigid/string_stiffness.hpp"
@@ -69,21 +69,16 @@ void StringStiffness::find_tensions() {
 
 /// Tied bodies by what joins them, without those that the world, a fixed or a driven body holds.
 void StringStiffness::find_islands() {
-    std::vector<int> root(model_.constrained.size() + 1);  // the last one is all that does not float
-    std::iota(root.begin(), root.end(), 0);
-    const auto find = [&root](int i) {
-        while (root[i] != i) i = root[i] = root[root[i]];
-        return i;
+    const int world = static_cast<int>(model_.constrained.size());  // all that does not float
+    DisjointSets tied;
+    tied.begin(model_.constrained.size() + 1);
+    const auto place = [this, world](int body) {
+        return body < 0 || model_.solver_index[body] < 0 ? world : model_.solver_index[body];
     };
-    const auto place = [this](int body) {
-        return body < 0 || model_.solver_index[body] < 0 ? static_cast<int>(model_.constrained.size())
-                                                         : model_.solver_index[body];
-    };
-    for (const JointBlock& block : joints_.blocks())
-        root[find(place(block.first))] = find(place(block.second));
-    std::vector<std::vector<int>> members(root.size());
-    for (int k = 0; k < static_cast<int>(model_.constrained.size()); ++k) members[find(k)].push_back(k);
-    const int held = find(static_cast<int>(model_.constrained.size()));
+    for (const JointBlock& block : joints_.blocks()) tied.join(place(block.first), place(block.second));
+    std::vector<std::vector<int>> members(model_.constrained.size());
+    for (int k = 0; k < world; ++k) members[tied.root(k)].push_back(k);
+    const int held = tied.root(world);
     for (int k = 0; k < static_cast<int>(members.size()); ++k)
         if (k != held && !members[k].empty()) islands_.push_back(members[k]);
 }

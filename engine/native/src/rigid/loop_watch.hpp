@@ -42,6 +42,8 @@ private:
         bool bends(const JointSet& joints, const LargeArray<BodyConstants>& constants,
                    std::vector<BodyState> along, const std::vector<int>& constrained, double floor) const;
     };
+    class Ties;
+    void analyse_probes(Ties& ties, const std::vector<int>& at);
     void take_probe(Loop& loop, double part);
     void find_extents(Loop& loop);
     void watch(Loop& loop, RigidState::Watched& seen);

@@ -7,9 +7,9 @@
 // Gᵀλ' = 0, whatever they carry; of rows that are all needed λ' is small.
 #include <algorithm>
 #include <cmath>
-#include <numeric>
 #include <utility>
 
+#include "linear/disjoint_sets.hpp"
 #include "rigid/loop_watch.hpp"
 #include "rigid/tolerances.hpp"
 
@@ -21,68 +21,92 @@ using namespace tolerances::rigid_locking;
 
 }  // namespace
 
+/// Which bodies joints tie to which, and which of these close a loop.
+class LoopWatch::Ties {
+public:
+    Ties(const RigidModel& model, const JointSet& joints)
+        : model_(model), anchor_(joints.blocks().size(), -1) {
+        DisjointSets closing;  // with all that does not move by itself
+        closing.begin(model.constrained.size() + 1);
+        tied_.begin(model.constrained.size());
+        for (int k = 0; k < static_cast<int>(anchor_.size()); ++k) {
+            const JointBlock& block = joints.blocks()[k];
+            if (block.axial) continue;
+            tie(k, place(block.first));
+            tie(k, place(block.second));
+            for (const int body : joints.others(k)) tie(k, place(body));
+            if (!closing.join(place(block.first), place(block.second)) && anchor_[k] >= 0)
+                closes_.push_back(anchor_[k]);
+        }
+    }
+
+    int world() const noexcept { return static_cast<int>(model_.constrained.size()); }
+    /// Among the constrained bodies; `world()` of all that does not move by itself.
+    int place(int body) const noexcept {
+        return body < 0 || model_.solver_index[body] < 0 ? world() : model_.solver_index[body];
+    }
+    /// Gives each set of tied bodies that has a loop in it a number; how many there are.
+    int number() {
+        of_root_.assign(static_cast<std::size_t>(world()), -1);
+        int count = 0;
+        for (const int member : closes_)
+            if (int& loop = of_root_[tied_.root(member)]; loop < 0) loop = count++;
+        return count;
+    }
+    /// Of a member, or of a block of joints; −1: none.
+    int loop_of(int member) { return member == world() ? -1 : of_root_[tied_.root(member)]; }
+    int loop_of_block(int block) { return anchor_[block] < 0 ? -1 : loop_of(anchor_[block]); }
+
+private:
+    void tie(int block, int member) {
+        if (member == world()) return;
+        if (anchor_[block] >= 0) tied_.join(member, anchor_[block]);
+        else anchor_[block] = member;
+    }
+
+    const RigidModel& model_;
+    DisjointSets tied_;
+    std::vector<int> anchor_, closes_, of_root_;  // per block: one of its members; some member of a loop
+};
+
 /// The loops that joints close, each with all that joints hang on it: what else moves in the scene says nothing of it.
 /// Motors, limits and springs tie nothing here; they are loads.
 void LoopWatch::take() {
     if (model_.composed) return;
     const auto blocks = joints_.blocks();
-    const int world = static_cast<int>(model_.constrained.size());  // all that does not move by itself
-    std::vector<int> closing(model_.constrained.size() + 1), root(model_.constrained.size());
-    std::iota(closing.begin(), closing.end(), 0);
-    std::iota(root.begin(), root.end(), 0);
-    const auto find = [](std::vector<int>& up, int i) {
-        while (up[i] != i) i = up[i] = up[up[i]];
-        return i;
-    };
-    const auto place = [&](int body) {
-        return body < 0 || model_.solver_index[body] < 0 ? world : model_.solver_index[body];
-    };
-    std::vector<int> anchor(blocks.size(), -1),
-        closes;  // per block: one of its members; some member of a loop
+    Ties ties(model_, joints_);
+    loops_.resize(static_cast<std::size_t>(ties.number()));
     for (int k = 0; k < static_cast<int>(blocks.size()); ++k) {
-        const int one = place(blocks[k].first), two = place(blocks[k].second);
-        const auto tie = [&](int member) {
-            if (member == world) return;
-            if (anchor[k] >= 0) root[find(root, member)] = find(root, anchor[k]);
-            else anchor[k] = member;
-        };
-        if (blocks[k].axial) continue;
-        tie(one), tie(two);
-        for (int body : joints_.others(k)) tie(place(body));
-        const int a = find(closing, one), b = find(closing, two);
-        if (a == b && anchor[k] >= 0) closes.push_back(anchor[k]);
-        closing[a] = b;
-    }
-    std::vector<int> loop_of(model_.constrained.size(), -1), at(model_.constrained.size());
-    for (int member : closes) {
-        int& loop = loop_of[find(root, member)];
-        if (loop >= 0) continue;
-        loop = static_cast<int>(loops_.size());
-        loops_.emplace_back();
-    }
-    const auto loop_at = [&](int member) { return loop_of[find(root, member)]; };
-    for (int k = 0; k < static_cast<int>(blocks.size()); ++k) {
-        if (anchor[k] >= 0 && loop_at(anchor[k]) >= 0) loops_[loop_at(anchor[k])].blocks.push_back(k);
-        if (!blocks[k].axial) continue;
-        const int one = place(blocks[k].first), two = place(blocks[k].second);
-        const int first = one == world ? -1 : loop_at(one), second = two == world ? -1 : loop_at(two);
+        if (!blocks[k].axial) {
+            if (const int loop = ties.loop_of_block(k); loop >= 0) loops_[loop].blocks.push_back(k);
+            continue;
+        }
+        const int first = ties.loop_of(ties.place(blocks[k].first)),
+                  second = ties.loop_of(ties.place(blocks[k].second));
         if (first >= 0) loops_[first].drives.push_back(k);
         if (second >= 0 && second != first) loops_[second].drives.push_back(k);
     }
-    for (int member = 0; member < world; ++member) {
-        if (loop_at(member) < 0) continue;
-        Loop& loop = loops_[loop_at(member)];
-        at[member] = static_cast<int>(loop.members.size());
-        loop.members.push_back(member);
+    std::vector<int> at(model_.constrained.size());
+    for (int member = 0; member < ties.world(); ++member) {
+        const int loop = ties.loop_of(member);
+        if (loop < 0) continue;
+        at[member] = static_cast<int>(loops_[loop].members.size());
+        loops_[loop].members.push_back(member);
     }
+    analyse_probes(ties, at);
+}
+
+/// `at`: the place of each member in its loop.
+void LoopWatch::analyse_probes(Ties& ties, const std::vector<int>& at) {
+    const auto blocks = joints_.blocks();
     std::vector<int> row_at(blocks.size());
     std::vector<std::vector<BlockEdge>> edges(loops_.size());
     for (const Loop& loop : loops_)
         for (std::size_t k = 0; k < loop.blocks.size(); ++k) row_at[loop.blocks[k]] = static_cast<int>(k);
     for (int edge = 0; edge < static_cast<int>(rows_.matrix.edges().size()); ++edge) {
         const BlockEdge& e = rows_.matrix.edges()[edge];
-        if (anchor[e.first] < 0 || loop_at(anchor[e.first]) < 0) continue;
-        const int index = loop_at(anchor[e.first]);
+        const int index = ties.loop_of_block(e.first);
+        if (index < 0) continue;
         Loop& loop = loops_[index];
         const int member = e.second - static_cast<int>(blocks.size());
         edges[index].push_back({row_at[e.first], static_cast<int>(loop.blocks.size()) + at[member]});

@@ -116,23 +116,23 @@ bool Sleeping::still(int i) const noexcept {
     return speed + rules_.reach[i] * std::max(norm(s.angular_velocity), turned) < model_.method.sleep_speed;
 }
 
-/// The end of a step: what was met by a displaced body is awake, and islands that have been at rest fall asleep.
-void Sleeping::sleep() {
-    if (!rules_.on()) return;
-    Sleep& sleep = live_.sleep;
-    if (!mixed_.contacts()->woken().empty()) wake(mixed_.contacts()->woken());
-    sleep.slept += static_cast<std::int64_t>(sleep.sleepers);
+/// For how many steps each body has been still; whether some has been for long enough.
+bool Sleeping::count_still_steps() {
     const bool broke = !joints_.breaks.empty() && joints_.breaks.back().step == live_.step;
     bool some = false;
     for (const int i : model_.constrained) {
         if (live_.asleep(i)) continue;
-        const bool quiet = rules_.may[i] != 0 && !broke && still(i);
-        sleep.quiet[i] = quiet ? std::min(sleep.quiet[i] + 1, rules_.after) : 0;
-        some = some || sleep.quiet[i] == rules_.after;
+        std::int64_t& quiet = live_.sleep.quiet[i];
+        quiet = rules_.may[i] != 0 && !broke && still(i) ? std::min(quiet + 1, rules_.after) : 0;
+        some = some || quiet == rules_.after;
     }
-    if (!some) return;
+    return some;
+}
+
+/// What contacts, joints and springs connect; `kept_up`: per body, whether something that moves as it is told holds it awake.
+const Islands& Sleeping::find_islands(std::vector<char>& kept_up) {
     scratch_.finder.begin(model_.bodies());
-    std::vector<char> kept_up(model_.constants.size(), 0);
+    kept_up.assign(model_.constants.size(), 0);
     const auto tie = [&](int a, int b) {
         for (const auto& [one, other] : {IndexPair{a, b}, IndexPair{b, a}})
             if (is_moving(other)) kept_up[one] = 1;
@@ -145,7 +145,17 @@ void Sleeping::sleep() {
             kept_up[cached.contact.first] = kept_up[cached.contact.second] = 1;
     }
     for (const int i : model_.constrained) scratch_.finder.tie(i, i);
-    const Islands& islands = scratch_.finder.find();
+    return scratch_.finder.find();
+}
+
+/// The end of a step: what was met by a displaced body is awake, and islands that have been at rest fall asleep.
+void Sleeping::sleep() {
+    Sleep& sleep = live_.sleep;
+    if (!mixed_.contacts()->woken().empty()) wake(mixed_.contacts()->woken());
+    sleep.slept += static_cast<std::int64_t>(sleep.sleepers);
+    if (!count_still_steps()) return;
+    std::vector<char> kept_up;
+    const Islands& islands = find_islands(kept_up);
     std::vector<char> awake(static_cast<std::size_t>(islands.count), 0);
     for (const int i : model_.constrained)
         if (sleep.quiet[i] < rules_.after || kept_up[i]) awake[islands.of_body[i]] = 1;

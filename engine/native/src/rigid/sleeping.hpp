@@ -47,6 +47,8 @@ private:
     };
     bool is_moving(int body) const noexcept;
     bool still(int body) const noexcept;
+    bool count_still_steps();
+    const Islands& find_islands(std::vector<char>& kept_up);
     void keep_jacobians();
 
     const RigidModel& model_;

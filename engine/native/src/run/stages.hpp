@@ -6,7 +6,9 @@
 
 #include <algorithm>
 #include <array>
+#include <concepts>
 #include <initializer_list>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -32,18 +34,48 @@ struct StageChoice {
 /// One choice per stage, in the order of the step.
 using StageChoices = std::array<StageChoice, STAGES>;
 
-/// choose(stage) for every stage there is.
-template <class Choose> StageChoices choose_each(Choose choose) {
-    StageChoices choices;
-    for (std::size_t k = 0; k < STAGES; ++k) choices[k] = choose(static_cast<Stage>(k));
-    return choices;
+/// Words, or what finds them for the facts of a scene.
+template <class Facts> struct Reason {
+    const char* words = nullptr;
+    std::string (*find)(const Facts&) = nullptr;
+
+    constexpr Reason(const char* fixed) noexcept : words(fixed) {}
+    template <class Find>
+    constexpr Reason(Find found) noexcept
+        requires std::convertible_to<Find, std::string (*)(const Facts&)>
+        : find(found) {}
+    std::string operator()(const Facts& is) const { return words ? words : find(is); }
+};
+
+/// Whether a stage is kept for a scene, and the reason for the one or the other.
+template <class Facts> struct StageRule {
+    Stage stage;
+    bool (*keeps)(const Facts&);  // null: never
+    Reason<Facts> why, why_not;
+
+    constexpr StageRule(Stage stage, bool (*keeps)(const Facts&), Reason<Facts> why, Reason<Facts> why_not)
+        : stage(stage), keeps(keeps), why(why), why_not(why_not) {}
+    constexpr StageRule(Stage stage, Reason<Facts> why_not)
+        : stage(stage), keeps(nullptr), why(""), why_not(why_not) {}
+};
+
+/// One rule per stage, in the order of the step.
+template <class Facts> using StageTable = std::array<StageRule<Facts>, STAGES>;
+
+template <class Facts> constexpr bool is_in_order(const StageTable<Facts>& table) {
+    for (std::size_t k = 0; k < STAGES; ++k)
+        if (table[k].stage != static_cast<Stage>(k)) return false;
+    return true;
 }
 
-/// A stage kept or left out, with the reason for the one or the other.
-inline StageChoice choose_if(bool kept, const std::string& why, const std::string& why_not) {
-    return {kept, kept ? why : why_not};
+template <class Facts> StageChoices choose_by(const StageTable<Facts>& table, const Facts& is) {
+    StageChoices choices;
+    for (std::size_t k = 0; k < STAGES; ++k) {
+        const bool kept = table[k].keeps && table[k].keeps(is);
+        choices[k] = {kept, kept ? table[k].why(is) : table[k].why_not(is)};
+    }
+    return choices;
 }
-inline StageChoice leave_out(const std::string& why_not) { return {false, why_not}; }
 
 /// The stages in whose loops a stage is done where it has none of its own: the first of them that is kept has its time.
 inline std::vector<Stage> hosts(Stage stage) {
