@@ -287,74 +287,47 @@ void ConeNewton::move(const MixedSystem& system, const Search& found) {
     measure(system);
 }
 
-ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoint>& points) {
-    ConeReport report;
-    prepare(system, points);
-    connect();
-    speed_ = speed_of(system);
+double ConeNewton::relative(double speed) const noexcept { return speed_ > 0.0 ? speed / speed_ : speed; }
+
+/// m/s; none of a start that is an answer already.
+double ConeNewton::goal_from(const Left& start) const noexcept {
+    return start.speed > known * speed_ ? tightest * speed_ : unbounded;
+}
+
+/// Iterations without a gain after which the path is lost: far from its end it may crawl.
+int ConeNewton::patience(const Left& best) const noexcept {
+    return best.speed > far * speed_ ? long_patience : backoff;
+}
+
+/// Of the speeds in the system: the longer nothing better is found, the less is asked.
+double ConeNewton::asked_after(int stalled) noexcept {
+    double enough = 1e-12;
+    for (int k = 0; k < stalled && enough < loosest; ++k) enough *= 10.0;
+    return std::min(loosest, enough);
+}
+
+/// Far behind the blur what is held back is all that is left.
+void ConeNewton::let_go_behind(const Left& left, const Left& before, double blur) noexcept {
+    if (left.map > behind * blur && left.map > slow * before.map)
+        hold_ = std::max(0.1 * hold_, tightest_hold);
+}
+
+void ConeNewton::keep_met() {
+    for (ConeFour& four : fours_) scale(1.0, four.z, four.met);
+    joints_.keep_met();
+}
+
+/// Where the path is begun again, which was met last at the blur `met`: the blur, further from the end.
+double ConeNewton::back_from(double met, double blur, const MixedSystem& system) {
+    if (!(met > 0.0)) return back * blur;
+    near_ *= nearer;
+    for (ConeFour& four : fours_) scale(1.0, four.met, four.z);
+    joints_.back_to_met();
     measure(system);
-    Left best = worst();
-    keep();
-    double blur = start_blur * best.map, met = -1.0;  // the blur where the path was met last
-    int stalled = 0, jumps = -1, losses = 0;          // jumps made, negative on the path; times it was lost
-    double least = unbounded;                         // residual of this row of jumps, m/s
-    near_ = nearest, hold_ = loosest_hold;
-    Left before = best;
-    const double goal = best.speed > known * speed_ ? tightest * speed_ : unbounded;
-    while (best.speed > goal && report.iterations < max_iterations && losses < max_losses) {
-        double enough = 1e-12;  // the longer nothing better is found, the less is asked
-        for (int k = 0; k < stalled && enough < loosest; ++k) enough *= 10.0;
-        if (stalled > 0 && best.speed <= std::min(loosest, enough) * speed_) break;
-        Watch::look();
-        hold();
-        if (!step(system, blur)) break;
-        ++report.iterations;
-        const Search found = jumps >= 0 ? Search{0.0, 1.0, 0.0} : search(blur);
-        move(system, found);
-        const Left left = worst();
-        stalled = left.speed < 0.5 * best.speed || found.along > 0.3 ? 0 : stalled + 1;
-        if (left.speed < best.speed) {
-            best = left;
-            keep();
-        }
-        // Far behind the blur: what is held back is all that is left.
-        if (left.map > behind * found.blur && left.map > slow * before.map)
-            hold_ = std::max(0.1 * hold_, tightest_hold);
-        before = left;
-        if (found.along > 0.0) {
-            met = found.blur;
-            for (ConeFour& four : fours_) scale(1.0, four.z, four.met);
-            joints_.keep_met();
-        }
-        blur = found.blur;
-        const bool lost =
-            stalled >= (best.speed > far * speed_ ? long_patience : backoff) || found.length < narrow;
-        if (lost && best.speed <= near_enough * speed_) break;
-        if (jumps < 0 && !lost) continue;
-        if (jumps < 0 && met > 0.0) {
-            jumps = 0, blur = 0.0;
-            least = unbounded;
-            continue;
-        }
-        if (jumps >= 0) {
-            jumps = left.speed < 0.5 * least ? 0 : jumps + 1;
-            least = std::min(least, left.speed);
-            if (jumps < max_jumps) continue;
-        }
-        if (best.speed <= near_enough * speed_) break;
-        // Begin anew, further from the end and more carefully.
-        jumps = -1, stalled = 0, hold_ = loosest_hold, ++losses;
-        if (met > 0.0) {
-            near_ *= nearer;
-            blur = back * met;
-            for (ConeFour& four : fours_) scale(1.0, four.met, four.z);
-            joints_.back_to_met();
-            measure(system);
-        } else {
-            blur *= back;
-        }
-    }
-    if (max_frozen > 0 && !(best.speed <= near_enough * speed_)) best = follow_frozen(system, report, best);
+    return back * met;
+}
+
+void ConeNewton::take_best(MixedSystem& system) {
     for (std::size_t k = 0; k < fours_.size(); ++k) {
         ConeFour& four = fours_[k];
         scale(1.0, best_[k].z, four.z);
@@ -369,8 +342,58 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
     joints_.deliver(system);
     measure(system);  // what is handed over, not what led to it
     system.velocity = velocity_;
-    const double speed = std::max(worst().speed, rounding());
-    report.residual = speed_ > 0.0 ? speed / speed_ : speed;
+}
+
+ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoint>& points) {
+    ConeReport report;
+    prepare(system, points);
+    connect();
+    speed_ = speed_of(system);
+    measure(system);
+    Left best = worst();
+    keep();
+    double blur = start_blur * best.map, met = -1.0;  // the blur where the path was met last
+    int stalled = 0, jumps = -1, losses = 0;          // jumps made, negative on the path; times it was lost
+    double least = unbounded;                         // residual of this row of jumps, m/s
+    near_ = nearest, hold_ = loosest_hold;
+    Left before = best;
+    const double goal = goal_from(best);
+    while (best.speed > goal && report.iterations < max_iterations && losses < max_losses) {
+        if (stalled > 0 && best.speed <= asked_after(stalled) * speed_) break;
+        Watch::look();
+        hold();
+        if (!step(system, blur)) break;
+        ++report.iterations;
+        const Search found = jumps >= 0 ? Search{0.0, 1.0, 0.0} : search(blur);
+        move(system, found);
+        const Left left = worst();
+        stalled = left.speed < 0.5 * best.speed || found.along > 0.3 ? 0 : stalled + 1;
+        if (left.speed < best.speed) best = left, keep();
+        let_go_behind(left, before, found.blur);
+        before = left;
+        if (found.along > 0.0) met = found.blur, keep_met();
+        blur = found.blur;
+        const bool lost = stalled >= patience(best) || found.length < narrow;
+        if (lost && best.speed <= near_enough * speed_) break;
+        if (jumps < 0 && !lost) continue;
+        if (jumps < 0 && met > 0.0) {
+            jumps = 0, blur = 0.0;
+            least = unbounded;
+            continue;
+        }
+        if (jumps >= 0) {
+            if (left.speed < 0.5 * least) jumps = -1;
+            least = std::min(least, left.speed);
+            if (++jumps < max_jumps) continue;
+        }
+        if (best.speed <= near_enough * speed_) break;
+        // Begin anew, further from the end and more carefully.
+        jumps = -1, stalled = 0, hold_ = loosest_hold, ++losses;
+        blur = back_from(met, blur, system);
+    }
+    if (max_frozen > 0 && !(best.speed <= near_enough * speed_)) best = follow_frozen(system, report, best);
+    take_best(system);
+    report.residual = relative(std::max(worst().speed, rounding()));
     report.converged = report.residual <= loosest;
     return report;
 }
@@ -404,8 +427,7 @@ ConeNewton::Left ConeNewton::follow_frozen(MixedSystem& system, ConeReport& repo
                 if (!(found.length > 0.0)) break;
                 move(system, found);
                 const Left left = worst();
-                if (left.map > behind * found.blur && left.map > slow * before.map)
-                    hold_ = std::max(0.1 * hold_, tightest_hold);
+                let_go_behind(left, before, found.blur);
                 // A short step tries too much at once: units are held harder, and let go again.
                 if (found.length < brief) hold_ = std::min(10.0 * hold_, hardest_hold);
                 else hold_ = std::max(0.1 * hold_, std::min(hold_, loosest_hold));

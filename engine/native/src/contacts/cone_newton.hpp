@@ -82,6 +82,14 @@ private:
     static void scale(double share, const ConeFour::Each* from, ConeFour::Each* to) noexcept;
     double speed_of(const MixedSystem& system) const;
     void keep();
+    void keep_met();
+    double relative(double speed) const noexcept;
+    double goal_from(const Left& start) const noexcept;
+    int patience(const Left& best) const noexcept;
+    static double asked_after(int stalled) noexcept;
+    void let_go_behind(const Left& left, const Left& before, double blur) noexcept;
+    void take_best(MixedSystem& system);
+    double back_from(double met, double blur, const MixedSystem& system);
     bool step(const MixedSystem& system, double blur);
 
     BlockLu matrix_;

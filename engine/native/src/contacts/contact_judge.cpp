@@ -114,6 +114,41 @@ RowsResidual rows_residual(const MixedSystem& system, const std::vector<Friction
     return worst;
 }
 
+bool still_right(const MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model) {
+    constexpr double moves = 1e-14, pushes = 1e-13;  // of the largest speed, and of the largest impulse
+    for (const FrictionPoint& point : points)
+        if (point.normal < 0.0) return false;
+    double largest = 0.0;
+    for (const RowBlock& block : system.rows)
+        for (int i = 0; i < block.size; ++i) {
+            if (block.multiplier[i] < block.lower[i] || block.multiplier[i] > block.upper[i]) return false;
+            largest = std::max(largest, std::abs(block.multiplier[i]));
+        }
+    if (largest == 0.0) return false;
+    static thread_local std::vector<Vec6> missing;  // p + Gᵀ z − M v; its memory outlives a call
+    missing = system.momentum;
+    double speed = 0.0;
+    for (std::size_t b = 0; b < missing.size(); ++b)
+        for (int a = 0; a < 6; ++a) {
+            for (int c = 0; c < 6; ++c) missing[b][a] -= system.mass[b][6 * a + c] * system.velocity[b][c];
+            if (a < 3) speed = std::max(speed, std::abs(missing[b][a]) / system.mass[b][7 * a]);
+        }
+    for (const RowBlock& block : system.rows)
+        for (int i = 0; i < block.size; ++i)
+            for (int a = 0; a < 6; ++a) {
+                if (block.first >= 0)
+                    missing[block.first][a] += block.first_jacobian[i][a] * block.multiplier[i];
+                if (block.second >= 0)
+                    missing[block.second][a] += block.second_jacobian[i][a] * block.multiplier[i];
+                for (const FurtherBody& other : block.further)
+                    missing[other.body][a] += other.jacobian[a] * block.multiplier[i];
+            }
+    for (const Vec6& part : missing)
+        for (const double impulse : part)
+            if (!(std::abs(impulse) <= pushes * largest)) return false;
+    return rows_residual(system, points, model, moves * speed).residual <= moves * speed;
+}
+
 SolveQuality judge(const JudgedStep& step, const MixedSystem& system,
                    const std::vector<FrictionPoint>& points, const FrictionReport& report) {
     const ContactOptions& options = step.motion.model().options;

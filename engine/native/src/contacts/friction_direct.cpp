@@ -35,6 +35,18 @@ struct Answer {
     std::vector<Vec6> velocity;
     std::vector<FrictionPoint> points;
     FrictionReport report;
+
+    void keep(const MixedSystem& system, const std::vector<FrictionPoint>& now, const FrictionReport& told) {
+        rows = system.rows, velocity = system.velocity;
+        points = now, report = told;
+    }
+    /// `told` keeps the work that was done.
+    void give_back(MixedSystem& system, std::vector<FrictionPoint>& now, FrictionReport& told) const {
+        const int rounds = told.rounds, pivots = told.pivots;
+        system.rows = rows, system.velocity = velocity;
+        now = points, told = report;
+        told.rounds = rounds, told.pivots = pivots;
+    }
 };
 
 /// What a solve needs besides what it gives. One per thread: its memory outlives a solve, its values do not.
@@ -44,7 +56,7 @@ struct Work {
     Answer answer;
     Acceleration acceleration;
     MassFactors mass;
-    std::vector<Vec6> free_velocity, missing;
+    std::vector<Vec6> free_velocity;
     std::vector<double> scale, used, given;
     std::vector<std::pair<int, int>> pairs;  // see is_redundant()
 };
@@ -59,6 +71,16 @@ void bound_rows(RowBlock& block, const FrictionPoint& point, double bound) noexc
         block.lower[i] = -bound;
         block.upper[i] = bound;
     }
+}
+
+void bound_by_normals(MixedSystem& system, const std::vector<FrictionPoint>& points) noexcept {
+    for (const FrictionPoint& point : points)
+        bound_rows(system.rows[point.block], point, point.coefficient * std::max(0.0, point.normal));
+}
+
+/// Contradicting rigid contacts leave residuals that no round removes: less is asked after 25 rounds.
+double accepted_in(int round, double before) noexcept {
+    return round >= 25 && round % 5 == 0 ? std::min(10.0 * before, loosest) : before;
 }
 
 /// Turns first tangents along the slip that would be without any constraint force. work() has the masses' factors.
@@ -180,6 +202,74 @@ void start_near(MixedSystem& system, const std::vector<FrictionPoint>& points,
     }
 }
 
+/// The normal forces without friction are the first guess where no step before knows them. `solve`: false where that is none.
+template <class Solve>
+bool guess_normals(MixedSystem& system, std::vector<FrictionPoint>& points, const Solve& solve) {
+    if (std::none_of(points.begin(), points.end(), [](const FrictionPoint& p) { return p.normal < 0.0; }))
+        return true;
+    for (const FrictionPoint& point : points) bound_rows(system.rows[point.block], point, 0.0);
+    if (!solve()) return false;
+    for (FrictionPoint& point : points)
+        if (point.normal < 0.0) point.normal = system.rows[point.block].multiplier[0];
+    for (const FrictionPoint& point : points)
+        for (int i = point.row; i < point.row + point.size; ++i)
+            system.rows[point.block].state[i] = RowState::free;
+    return true;
+}
+
+struct LawsLeft {
+    double residual = 0.0;  // of the largest normal impulse
+    bool moved = false;     // frames or softness changed: the matrix is another one
+};
+
+/// How far a solution is from the law at all points, and what the next round begins with. work() keeps which normal forces were used,
+/// and which were found.
+LawsLeft renew_bounds(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
+                      int round) {
+    const std::vector<double>& scale = work().scale;
+    std::vector<double>&used = work().used, &given = work().given;
+    used.resize(points.size()), given.resize(points.size());
+    // The bounds in use count, too: without them a round in which every normal force vanishes would settle at
+    // once, with the friction of the step before.
+    double largest = 0.0, change = 0.0, residual = 0.0;
+    for (const FrictionPoint& point : points)
+        largest = std::max({largest, system.rows[point.block].multiplier[0], point.normal});
+    LawsLeft left;
+    for (std::size_t k = 0; k < points.size(); ++k) {
+        FrictionPoint& point = points[k];
+        RowBlock& block = system.rows[point.block];
+        const double now = std::max(0.0, block.multiplier[0]);
+        if (model != FrictionModel::box)
+            change = std::max(change, point.coefficient * std::abs(now - point.normal));
+        if (model == FrictionModel::cone && point.size == 2) {
+            const double hysteresis = direction_hysteresis * std::ldexp(1.0, -std::max(0, round - 5));
+            const Law law = step_cone(block, point, scale[k], point.coefficient * point.normal,
+                                      exact * point.coefficient * largest, hysteresis, system.velocity);
+            residual = std::max(residual, law.residual);
+            left.moved = left.moved || law.moved;
+        }
+        used[k] = point.normal;
+        given[k] = now;
+        if (model != FrictionModel::box) point.normal = now;
+    }
+    left.residual = largest > 0.0 ? std::max(change, residual) / largest : 0.0;
+    return left;
+}
+
+/// The scale of each point's friction, and where its directions start.
+void start_directions(MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model,
+                      bool near) {
+    std::vector<double>& scale = work().scale;
+    scale.assign(points.size(), 1.0);
+    if (model == FrictionModel::cone) {
+        work().mass.find(system.mass);
+        if (!near) turn_along_predicted_slip(system, points);
+        for (std::size_t k = 0; k < points.size(); ++k)
+            scale[k] = tangent_scale(system.rows[points[k].block], points[k], work().mass);
+    }
+    if (near) start_near(system, points, scale);
+}
+
 /// Pivoting with bounds and directions renewed until the law holds. True when it does; a system that is not finite is
 /// reported.
 bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, FrictionModel model,
@@ -194,26 +284,10 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
     };
     const RoundLimitKept kept(solver);
     if (effort.cycling == 1) solver.round_limit = effort.pivots;  // the first guess, too
-    const bool some_unknown =
-        std::any_of(points.begin(), points.end(), [](const FrictionPoint& p) { return p.normal < 0.0; });
-    if (some_unknown) {  // no step before: the normal forces without friction are the first guess
-        for (const FrictionPoint& point : points) bound_rows(system.rows[point.block], point, 0.0);
-        if (!solve(false) || (effort.cycling == 1 && !report.converged)) return false;
-        for (FrictionPoint& point : points)
-            if (point.normal < 0.0) point.normal = system.rows[point.block].multiplier[0];
-        for (const FrictionPoint& point : points)
-            for (int i = point.row; i < point.row + point.size; ++i)
-                system.rows[point.block].state[i] = RowState::free;
-    }
-    std::vector<double>& scale = work().scale;
-    scale.assign(points.size(), 1.0);
-    if (model == FrictionModel::cone) {
-        work().mass.find(system.mass);
-        if (!effort.near) turn_along_predicted_slip(system, points);
-        for (std::size_t k = 0; k < points.size(); ++k)
-            scale[k] = tangent_scale(system.rows[points[k].block], points[k], work().mass);
-    }
-    if (effort.near) start_near(system, points, scale);
+    const bool guessed = guess_normals(
+        system, points, [&] { return solve(false) && (effort.cycling != 1 || report.converged); });
+    if (!guessed) return false;
+    start_directions(system, points, model, effort.near);
 
     bool same_matrix = false;
     Acceleration& acceleration = work().acceleration;
@@ -222,58 +296,22 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
     int cycling = 0;
     Answer& answer = work().answer;
     bool answered = false;  // accepted; the next round may find it to rounding
-    std::vector<double>&used = work().used, &given = work().given;
-    used.resize(points.size()), given.resize(points.size());
     if (model == FrictionModel::cone) solver.round_limit = effort.pivots;
     for (int round = 0; round < effort.rounds; ++round) {
-        for (const FrictionPoint& point : points)
-            bound_rows(system.rows[point.block], point, point.coefficient * std::max(0.0, point.normal));
+        bound_by_normals(system, points);
         if (!solve(same_matrix) && !answered) return false;
-        same_matrix = true;
-
-        // Contradicting rigid contacts leave residuals that no round removes: ask less after 25 rounds.
-        if (round >= 25 && round % 5 == 0) accepted = std::min(10.0 * accepted, loosest);
-        // The bounds in use count, too: without them a round in which every normal force vanishes would settle at
-        // once, with the friction of the step before.
-        double largest = 0.0, change = 0.0;
-        for (const FrictionPoint& point : points)
-            largest = std::max({largest, system.rows[point.block].multiplier[0], point.normal});
-        double residual = 0.0;
-        for (std::size_t k = 0; k < points.size(); ++k) {
-            FrictionPoint& point = points[k];
-            RowBlock& block = system.rows[point.block];
-            const double now = std::max(0.0, block.multiplier[0]);
-            if (model != FrictionModel::box)
-                change = std::max(change, point.coefficient * std::abs(now - point.normal));
-            if (model == FrictionModel::cone && point.size == 2) {
-                const double hysteresis = direction_hysteresis * std::ldexp(1.0, -std::max(0, round - 5));
-                const Law law = step_cone(block, point, scale[k], point.coefficient * point.normal,
-                                          exact * point.coefficient * largest, hysteresis, system.velocity);
-                residual = std::max(residual, law.residual);
-                if (law.moved) same_matrix = false;
-            }
-            used[k] = point.normal;
-            given[k] = now;
-            if (model != FrictionModel::box) point.normal = now;
-        }
-        report.residual = largest > 0.0 ? std::max(change, residual) / largest : 0.0;
+        accepted = accepted_in(round, accepted);
+        const LawsLeft left = renew_bounds(system, points, model, round);
+        report.residual = left.residual;
+        same_matrix = !left.moved;
         const bool is_answer = report.residual <= accepted && report.converged;
         if (is_answer && report.residual <= exact) return true;
         if (answered && !(is_answer && report.residual <= falling * answer.report.residual)) {
-            if (!is_answer || report.residual > answer.report.residual) {
-                const int rounds = report.rounds, pivots = report.pivots;
-                system.rows = answer.rows, system.velocity = answer.velocity;
-                points = answer.points;
-                report = answer.report;
-                report.rounds = rounds, report.pivots = pivots;
-            }
+            if (!is_answer || report.residual > answer.report.residual)
+                answer.give_back(system, points, report);
             return true;
         }
-        if (is_answer) {
-            answered = true;
-            answer.rows = system.rows, answer.velocity = system.velocity;
-            answer.points = points, answer.report = report;
-        }
+        if (is_answer) answered = true, answer.keep(system, points, report);
         cycling = report.converged ? 0 : cycling + 1;
         if (cycling >= effort.cycling) break;
         if (points.empty() || model == FrictionModel::box) {
@@ -281,7 +319,7 @@ bool settle_by_rounds(MixedSystem& system, std::vector<FrictionPoint>& points, F
             break;
         }
         if (round < plain_rounds) continue;
-        const std::vector<double>& next = acceleration.next(used, given);
+        const std::vector<double>& next = acceleration.next(work().used, work().given);
         for (std::size_t k = 0; k < points.size(); ++k) points[k].normal = next[k];
     }
     if (answered) {  // the last round's
@@ -418,41 +456,6 @@ void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points
 }
 
 }  // namespace
-
-bool still_right(const MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model) {
-    constexpr double moves = 1e-14, pushes = 1e-13;  // of the largest speed, and of the largest impulse
-    for (const FrictionPoint& point : points)
-        if (point.normal < 0.0) return false;
-    double largest = 0.0;
-    for (const RowBlock& block : system.rows)
-        for (int i = 0; i < block.size; ++i) {
-            if (block.multiplier[i] < block.lower[i] || block.multiplier[i] > block.upper[i]) return false;
-            largest = std::max(largest, std::abs(block.multiplier[i]));
-        }
-    if (largest == 0.0) return false;
-    std::vector<Vec6>& missing = work().missing;  // p + Gᵀ z − M v
-    missing = system.momentum;
-    double speed = 0.0;
-    for (std::size_t b = 0; b < missing.size(); ++b)
-        for (int a = 0; a < 6; ++a) {
-            for (int c = 0; c < 6; ++c) missing[b][a] -= system.mass[b][6 * a + c] * system.velocity[b][c];
-            if (a < 3) speed = std::max(speed, std::abs(missing[b][a]) / system.mass[b][7 * a]);
-        }
-    for (const RowBlock& block : system.rows)
-        for (int i = 0; i < block.size; ++i)
-            for (int a = 0; a < 6; ++a) {
-                if (block.first >= 0)
-                    missing[block.first][a] += block.first_jacobian[i][a] * block.multiplier[i];
-                if (block.second >= 0)
-                    missing[block.second][a] += block.second_jacobian[i][a] * block.multiplier[i];
-                for (const FurtherBody& other : block.further)
-                    missing[other.body][a] += other.jacobian[a] * block.multiplier[i];
-            }
-    for (const Vec6& part : missing)
-        for (const double impulse : part)
-            if (!(std::abs(impulse) <= pushes * largest)) return false;
-    return rows_residual(system, points, model, moves * speed).residual <= moves * speed;
-}
 
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
                                      FrictionModel model, DirectSolver& direct, int max_rounds) {

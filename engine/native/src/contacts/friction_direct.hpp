@@ -42,9 +42,4 @@ struct DirectSolver {
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
                                      FrictionModel model, DirectSolver& direct, int max_rounds = 60);
 
-/// Whether velocities and multipliers in `system` are the answer already, as those of the step before are at rest:
-/// looking costs one pass over the rows, and no factor. Rows must hold to 1e-14 of the speed that forces give in a
-/// step, and impulses balance to 1e-13 of the largest; a velocity that is kept does not gather rounding.
-bool still_right(const MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model);
-
 }  // namespace spook

@@ -353,14 +353,8 @@ int PivotSolver::free_degenerate_rows(MixedSystem& system) {
     return count;
 }
 
-PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
-    PivotReport report;
-    report.converged = false;
-    system.velocity.resize(system.mass.size());
-    if (analyse(system)) same_matrix = false;
-    tolerance_ = tightest;
-    if (!same_matrix) measure(system);
-
+/// The states that bounds allow; how many rows have a choice.
+int PivotSolver::begin_states(MixedSystem& system) const {
     int bounded = 0;
     for (RowBlock& block : system.rows)
         for (int i = 0; i < block.size; ++i)
@@ -373,7 +367,54 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
         else if (state == RowState::at_upper && block.upper[i] == unbounded) block.state[i] = RowState::free;
         bounded += block.lower[i] != block.upper[i];
     }
+    return bounded;
+}
 
+/// Whether other rows are free than when the matrix was factored.
+bool PivotSolver::is_stale(const MixedSystem& system) const {
+    for (std::size_t b = 0; b < bounded_.size(); ++b)
+        if (is_free(system.rows[bounded_[b].block], bounded_[b].row) != static_cast<bool>(factored_free_[b]))
+            return true;
+    return false;
+}
+
+int PivotSolver::flip_offenders(MixedSystem& system) const {
+    int flips = 0;
+    for (std::size_t b = 0; b < bounded_.size(); ++b) {
+        if (!offends_[b]) continue;
+        const auto& [k, i, own] = bounded_[b];
+        RowBlock& block = system.rows[k];
+        ++flips;
+        if (!is_free(block, i)) block.state[i] = RowState::free;
+        else block.state[i] = block.multiplier[i] < block.lower[i] ? RowState::at_lower : RowState::at_upper;
+    }
+    return flips;
+}
+
+void PivotSolver::count_work() {
+    const BlockLdlt::Counters now = graph_.matrix.counters();
+    counters_.factorisations += now.factorisations - last_.factorisations;
+    counters_.block_operations += now.block_operations - last_.block_operations;
+    counters_.floored_pivots += now.floored_pivots - last_.floored_pivots;
+    counters_.solves += now.solves - last_.solves;
+    last_ = now;
+}
+
+/// With less asked, and after the first two times from another guess.
+void PivotSolver::begin_again(MixedSystem& system, int restarts) {
+    tolerance_ = std::min(10.0 * tolerance_, loosest);
+    if (restarts > 1) guess_by_pgs(system, 5 << restarts);
+}
+
+PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
+    PivotReport report;
+    report.converged = false;
+    system.velocity.resize(system.mass.size());
+    if (analyse(system)) same_matrix = false;
+    tolerance_ = tightest;
+    if (!same_matrix) measure(system);
+
+    const int bounded = begin_states(system);
     // After so many rounds the singular problem may be cycling: decide then on the relieved matrix, a P-matrix.
     const int refined_rounds = 50 + 4 * bounded;
     const int last_round = std::min(round_limit, refined_rounds + 50 + 8 * bounded);
@@ -381,11 +422,7 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
     bool tied = false;  // whether ties were freed
     for (int round = 0; round < last_round; ++round) {
         Watch::look();
-        bool stale = !same_matrix || !factored_;
-        for (std::size_t b = 0; b < bounded_.size() && !stale; ++b)
-            stale = is_free(system.rows[bounded_[b].block], bounded_[b].row) !=
-                    static_cast<bool>(factored_free_[b]);
-        if (stale) {
+        if (!same_matrix || !factored_ || is_stale(system)) {
             factored_ = false;
             report.finite = factor(system);
         }
@@ -412,31 +449,15 @@ PivotReport PivotSolver::solve(MixedSystem& system, bool same_matrix) {
         if (count < best && refined) best = count, left = backoff;
         else if (left > 0) --left;
         if (left == 0 && report.restarts < max_restarts) {
-            tolerance_ = std::min(10.0 * tolerance_, loosest);
-            if (report.restarts > 1) guess_by_pgs(system, 5 << report.restarts);
-            ++report.restarts;
+            begin_again(system, report.restarts++);
             best = 1 << 30, left = backoff;
             if (report.restarts > 2) continue;
         }
         const bool all = left > 0 && refined;
         if (!all) offenders(system, false);
-        for (std::size_t b = 0; b < bounded_.size(); ++b) {
-            if (!offends_[b]) continue;
-            const auto& [k, i, own] = bounded_[b];
-            RowBlock& block = system.rows[k];
-            ++report.flips;
-            if (!is_free(block, i)) block.state[i] = RowState::free;
-            else
-                block.state[i] =
-                    block.multiplier[i] < block.lower[i] ? RowState::at_lower : RowState::at_upper;
-        }
+        report.flips += flip_offenders(system);
     }
-    const BlockLdlt::Counters now = graph_.matrix.counters();
-    counters_.factorisations += now.factorisations - last_.factorisations;
-    counters_.block_operations += now.block_operations - last_.block_operations;
-    counters_.floored_pivots += now.floored_pivots - last_.floored_pivots;
-    counters_.solves += now.solves - last_.solves;
-    last_ = now;
+    count_work();
     return report;
 }
 

@@ -60,6 +60,11 @@ private:
     void guess_by_pgs(MixedSystem& system, int iterations);
     int offenders(const MixedSystem& system, bool mark_all);
     int free_degenerate_rows(MixedSystem& system);
+    int begin_states(MixedSystem& system) const;
+    bool is_stale(const MixedSystem& system) const;
+    int flip_offenders(MixedSystem& system) const;
+    void count_work();
+    void begin_again(MixedSystem& system, int restarts);
 
     struct Bounded {  // a row that is not bilateral
         int block, row;

@@ -72,6 +72,7 @@ private:
     void find_disc(const Unit& unit);
     double residual_of(const Unit& unit, const double* z, const double* u) const;
     double residual() const;
+    bool rests_at_bound(const Unit& unit) const;
     bool find_step(double& worst);
     bool eliminate(std::size_t m);
     double share_to_edge(const Unit& unit) const;

@@ -10,6 +10,12 @@ namespace spook {
 
 using namespace tolerances::reduced_newton;
 
+/// Whether a row is at a bound that it pushes against.
+bool ReducedContacts::rests_at_bound(const Unit& unit) const {
+    const double z = z_[unit.at], u = u_[unit.at];
+    return (z <= unit.lower && u >= 0.0) || (z >= unit.upper && u <= 0.0);
+}
+
 /// The laws to first order over the working set, solved for the steps of all rows. Of rows between bounds, those that are
 /// pinned, or at a bound that they push against, stay; friction that is pinned slides on the edge of its disc. `worst`: of the laws
 /// in the set, m/s. False if there is no factor.
@@ -28,9 +34,7 @@ bool ReducedContacts::find_step(double& worst) {
         const int at = unit.at;
         if (!(unit.own > 0.0)) continue;
         if (unit.normal < 0) {
-            if (pinned_[at] == 0 && !(z_[at] <= unit.lower && u_[at] >= 0.0) &&
-                !(z_[at] >= unit.upper && u_[at] <= 0.0))
-                free(at);
+            if (pinned_[at] == 0 && !rests_at_bound(unit)) free(at);
         } else if (place[unit.normal] >= 0) {
             for (int i = 0; i < unit.size; ++i) free(at + i);
         }  // else an open contact, whose friction is none
