@@ -18,6 +18,7 @@ ROOMS = [header.parent for header in HEADERS]
 NAMED = re.compile(r"^(?:inline )?constexpr (?:double|int|unsigned|std::\w+) (\w+) =[^({]*;", re.MULTILINE)
 NO_TOLERANCES = {  # a number of another kind
     "lanes",  # of a vector
+    "none",  # a link that is not there
     "no_bound",  # infinity
     "unbounded",
     "swung_in",  # a bit
