@@ -14,7 +14,6 @@ MOST_MEMBERS, MOST_METHODS = 30, 40
 LARGER = {  # members and methods of those that are over: lower a number that has become smaller
     "contacts/ConeFour": (37, 4),
     "contacts/PgsSolver": (48, 42),
-    "particles/ParticleSystem": (17, 46),
     "rigid/JointSet": (13, 53),
 }
 MOST_BRANCHES = 25

@@ -42,7 +42,7 @@ Vec3 tip_after(const ParticleScene& scene, int steps) {
     ParticleSystem system = system_of(scene);
     system.reset(nullptr);
     system.advance(steps);
-    return system.position(static_cast<int>(scene.bodies.size()) - 1);
+    return system.readings().position(static_cast<int>(scene.bodies.size()) - 1);
 }
 
 void a_step_allocates_nothing() {
@@ -110,7 +110,7 @@ void only_the_listed_stages_run() {
         ParticleSystem system(falling, stages);
         system.reset(nullptr);
         system.advance(10);
-        return system.position(0) - falling.bodies[0].position;
+        return system.readings().position(0) - falling.bodies[0].position;
     };
     const Stage fall = Stage::apply_gravity, load = Stage::apply_loads, move = Stage::integrate_positions;
     EXPECT(is_zero(after({move})));

@@ -108,7 +108,7 @@ void ParticleSystem::reset(StageClock* clock) {
     velocity_ready_ = false;
     parts_.pgs.work = {};
     parts_.saddle.reset();
-    for (int body = 0; body < bodies(); ++body) {
+    for (int body = 0; body < readings_.bodies(); ++body) {
         nodes_.x[nodes_.of_body[body]] = scene_.bodies[body].position;
         nodes_.v[nodes_.of_body[body]] = scene_.bodies[body].velocity;
     }

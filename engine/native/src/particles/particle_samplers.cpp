@@ -7,8 +7,8 @@
 namespace spook {
 
 Sampler sampler_of(ParticleSystem& system, const QuantityRequest& request) {
-    const ParticleSystem* s = &system;
-    const int index = request.index, bodies = system.bodies(), rows = system.rows();
+    const ParticleReadings* s = &system.readings();
+    const int index = request.index, bodies = s->bodies(), rows = s->rows();
     const Vec3 about = request.point;
     switch (from_text<Quantity>(request.kind, "quantity")) {
         case Quantity::position:

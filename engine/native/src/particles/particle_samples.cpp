@@ -22,7 +22,7 @@ void ParticleSystem::observe(Recorder& recorder, std::int64_t sample) {
         for (std::size_t node = 0; node < nodes_.v.size(); ++node)
             seen_.v[node] = 0.5 * (seen_.v[node] + nodes_.v[node]);
         if (sample == 0)
-            for (int body = 0; body < bodies(); ++body)
+            for (int body = 0; body < readings_.bodies(); ++body)
                 seen_.v[nodes_.of_body[body]] = scene_.bodies[body].velocity;
     }
     recorder.sample(sample);
@@ -32,7 +32,7 @@ void ParticleSystem::observe(Recorder& recorder, std::int64_t sample) {
 /// Rows that cannot be told apart may leave the velocities at the sample no numbers, where the steps go on.
 void ParticleSystem::read_composition() {
     composition_->read(seen_);
-    for (int body = bodies() - 1; body >= 0; --body)
+    for (int body = readings_.bodies() - 1; body >= 0; --body)
         if (!finite(seen_.v[nodes_.of_body[body]])) unread_ = body;
 }
 
@@ -42,7 +42,7 @@ Health ParticleSystem::health() const noexcept {
         return {Status::diverged, parts_.saddle.contradicted(),
                 "is held by rows that contradict each other; give one of them a compliance"};
     Health health;
-    for (int body = 0; body < bodies(); ++body) {
+    for (int body = 0; body < readings_.bodies(); ++body) {
         const Vec3 x = nodes_.x[nodes_.of_body[body]], v = nodes_.v[nodes_.of_body[body]];
         if (!finite(x) || !finite(v)) return {Status::not_finite, body};
         const double largest = std::max(
@@ -127,8 +127,8 @@ void ParticleSystem::count(RunReport& report, std::int64_t steps) const {
 std::vector<double> ParticleSystem::places() const {
     constexpr double UNKNOWN = std::numeric_limits<double>::quiet_NaN();
     std::vector<double> state;
-    for (int body = 0; body < bodies(); ++body) {
-        const Vec3 x = position(body);
+    for (int body = 0; body < readings_.bodies(); ++body) {
+        const Vec3 x = readings_.position(body);
         state.insert(state.end(),
                      {x.x, x.y, x.z, 1.0, 0.0, 0.0, 0.0, UNKNOWN, UNKNOWN, UNKNOWN, 0.0, 0.0, 0.0});
     }
@@ -149,33 +149,33 @@ std::vector<double> ParticleSystem::final_state() {
                 reported[node] = 0.5 * (reported[node] + nodes_.v[node]);
         }
     }
-    for (int body = 0; body < bodies(); ++body) {
-        const Vec3 x = position(body), v = reported[nodes_.of_body[body]];
+    for (int body = 0; body < readings_.bodies(); ++body) {
+        const Vec3 x = readings_.position(body), v = reported[nodes_.of_body[body]];
         state.insert(state.end(), {x.x, x.y, x.z, 1.0, 0.0, 0.0, 0.0, v.x, v.y, v.z, 0.0, 0.0, 0.0});
     }
     return state;
 }
 
-double ParticleSystem::violation(int row) const noexcept {
-    const Row& r = rows_.row[rows_.slot[row]];
-    return norm(nodes_.x[r.b] - nodes_.x[r.a]) - r.rest;
+double ParticleReadings::violation(int row) const noexcept {
+    const Row& r = parts_.rows.row[parts_.rows.slot[row]];
+    return norm(parts_.nodes.x[r.b] - parts_.nodes.x[r.a]) - r.rest;
 }
 
-double ParticleSystem::kinetic_energy() const noexcept {
+double ParticleReadings::kinetic_energy() const noexcept {
     double energy = 0.0;
     for (int body = 0; body < bodies(); ++body)
         energy += 0.5 * mass(body) * dot(velocity(body), velocity(body));
     return energy;
 }
 
-double ParticleSystem::potential_energy() const noexcept {
+double ParticleReadings::potential_energy() const noexcept {
     double energy = 0.0;
     for (int body = 0; body < bodies(); ++body) {
         energy -= mass(body) * dot(scene_.gravity, position(body));
         for (const CentralField& field : parts_.forces.fields())
             energy -= mass(body) * field.strength / norm(position(body) - field.centre);
     }
-    return parts_.forces.spring_energy(nodes_, energy);
+    return parts_.forces.spring_energy(parts_.nodes, energy);
 }
 
 }  // namespace spook

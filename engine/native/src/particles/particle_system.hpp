@@ -11,6 +11,7 @@
 
 #include "particles/particle_composition.hpp"
 #include "particles/particle_parts.hpp"
+#include "particles/particle_readings.hpp"
 #include "particles/path_order.hpp"
 #include "run/recorder.hpp"
 #include "run/report.hpp"
@@ -57,16 +58,8 @@ public:
     /// The same without a solve: velocities are NaN.
     std::vector<double> places() const;
 
-    // --- what the samplers read, at the current sample ---
-    Vec3 position(int body) const noexcept { return nodes_.x[nodes_.of_body[body]]; }
-    Vec3 velocity(int body) const noexcept { return seen_.v[nodes_.of_body[body]]; }
-    double mass(int body) const noexcept { return scene_.bodies[body].mass; }
-    int bodies() const noexcept { return static_cast<int>(scene_.bodies.size()); }
-    int rows() const noexcept { return static_cast<int>(scene_.rows.size()); }
-    double violation(int row) const noexcept;
-    double tension(int row) const noexcept { return -seen_.lambda[rows_.slot[row]] / parts_.h; }
-    double kinetic_energy() const noexcept;
-    double potential_energy() const noexcept;
+    /// At the current sample.
+    const ParticleReadings& readings() const noexcept { return readings_; }
 
     struct Memory {
         std::vector<Vec3> x, v;
@@ -118,6 +111,7 @@ private:
     bool velocity_ready_ = false;  // the velocity stage of the coming step is already done
     std::int64_t block_ = 1024;
     Seen seen_;
+    ParticleReadings readings_{scene_, parts_, seen_};
     Memory saved_;
     StageClock* clock_ = nullptr;
 };
