@@ -23,7 +23,7 @@ void Forces::take_stages(const RigidScene& scene) {
 
 void Forces::apply_forces() {
     find();
-    joints_.begin_step();
+    joints_.stops().begin_step(joints_.states);
     for (int i : model_.free) kick_free_body(i);
     clock_.mark({Stage::apply_gravity, Stage::apply_loads});
 }

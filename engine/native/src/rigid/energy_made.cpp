@@ -34,7 +34,7 @@ void EnergyMade::begin() {
 
 /// Whether something gives energy that no book of the run has: loads, drives, fluids, what moves as it is told.
 bool EnergyMade::has_power() const noexcept {
-    if (forces_.have_power() || joints_.drives()) return true;
+    if (forces_.have_power() || joints_.drives().give_energy()) return true;
     for (int i = 0; i < model_.bodies(); ++i) {
         const bool led = !model_.constants[i].moves() &&
                          !(is_zero(live_.bodies[i].velocity) && is_zero(live_.bodies[i].angular_velocity));

@@ -1,34 +1,29 @@
-// Rows over several bodies: linear relations between free coordinates (gears, racks, screws, belts, differentials), and
-// the length of a wire that runs through points of bodies and may go slack.
-//
-//   relation   g = Σ c_k q_k                 q_k the free coordinate of joint k, turns counted, zero at the start
-//   wire       g = Σ |p_(i+1) − p_i| − L     p_i points of bodies or of the world; one-sided: it only pulls, λ <= 0;
-//              + Σ r_k q_k for the drums it is wound on
-//   eye        the wire behind a point of it goes through there at the rate of Σ |p_(i+1) − p_i| over what follows
-//              (and of its drums): kept at zero as far as friction reaches, see load_dependent_bounds.hpp
+#include "rigid/general_rows.hpp"
+
 #include <algorithm>
 #include <numbers>
 
 #include "linear/elementary.hpp"
-#include "rigid/joint_set.hpp"
 
 namespace spook {
 
-JointSet::General JointSet::general_of(const RigidScene& scene, const JointSpec& spec) const {
-    General general;
-    general.terms = spec.terms;
+void GeneralRows::add(const RigidScene& scene, const JointSpec& spec, double time_step) {
+    GeneralRow general;
     general.length = spec.rest_length;
     general.restitution = spec.restitution;
     general.one_sided = spec.one_sided;
-    general.row = regularise(spec.compliance[0], spec.damping[0], time_step_);
+    general.row = regularise(spec.compliance[0], spec.damping[0], time_step);
     const auto mention = [&](int body) {
         if (body < 0 || scene.bodies[body].motion == Motion::fixed) return;
         if (std::find(general.bodies.begin(), general.bodies.end(), body) == general.bodies.end())
             general.bodies.push_back(body);
     };
     for (const RelationTerm& term : spec.terms) {
-        mention(scene.joints[term.joint].first);
-        mention(scene.joints[term.joint].second);
+        const JointSpec& joint = scene.joints[term.joint];
+        mention(joint.first);
+        mention(joint.second);
+        general.terms.push_back(
+            {term.joint, term.coefficient, joint.first, joint.second, constants_of(scene, joint)});
     }
     for (const End& end : spec.points) {
         mention(end.body);
@@ -39,27 +34,29 @@ JointSet::General JointSet::general_of(const RigidScene& scene, const JointSpec&
     if (general.bodies.size() > 2)
         std::stable_partition(general.bodies.begin(), general.bodies.end(),
                               [&](int body) { return scene.bodies[body].motion == Motion::dynamic; });
-    return general;
+    gradient_.resize(std::max<std::size_t>({gradient_.size(), 12, 6 * general.bodies.size()}));
+    rows_.push_back(std::move(general));
 }
 
 /// An eye goes on where its wire stands in eyes_: those before it are further to the front.
-void JointSet::add_eye(const JointSpec& spec, General& general) {
+void GeneralRows::make_eye(const JointSpec& spec, int block, int wire, int wire_block) {
     EyeRow row;
-    row.block = static_cast<int>(blocks_.size());
-    row.wire = joints_[spec.wire].block;
+    row.block = block;
+    row.wire = wire_block;
     for (const EyeRow& other : eyes_)
         if (other.wire == row.wire) row.before.push_back(other.block);
+    GeneralRow& general = rows_.back();
     general.eye = static_cast<int>(eyes_.size());
-    general.previous = generals_[joints_[spec.wire].general].points[spec.eye - 1];
+    general.previous = rows_[wire].points[spec.eye - 1];
     general.friction = spec.friction[0];
     general.turned = 2.0 * std::numbers::pi * spec.turns;
     eyes_.push_back(std::move(row));
 }
 
 /// How hard the wire holds where it bends: tanh ½µφ, φ the angle of its bend and of its turns there.
-void JointSet::rub(const General& general, std::span<const BodyState> bodies) noexcept {
-    const auto place = [&](const General::Point& point) {
-        const BodyState& s = body(point.body, bodies);
+void GeneralRows::rub(const GeneralRow& general, std::span<const BodyState> bodies) noexcept {
+    const auto place = [&](const GeneralRow::Point& point) {
+        const BodyState& s = state_of(point.body, bodies);
         return point.start + s.displacement + s.turn_less_one * point.arm;
     };
     const Vec3 at = place(general.points[0]);
@@ -68,15 +65,9 @@ void JointSet::rub(const General& general, std::span<const BodyState> bodies) no
     eyes_[general.eye].grip = hyperbolic_tangent(0.5 * general.friction * (bend + general.turned));
 }
 
-std::span<const int> JointSet::others(int block) const noexcept {
-    const int general = blocks_[block].axial ? -1 : joints_[blocks_[block].joint].general;
-    if (general < 0 || generals_[general].bodies.size() <= 2) return {};
-    return std::span<const int>(generals_[general].bodies).subspan(2);
-}
-
 /// Violation, G v and, unless null, the gradient: six numbers per body of the row.
-JointSet::Along JointSet::along(const General& general, std::span<const BodyState> bodies,
-                                double* gradient) const noexcept {
+GeneralRows::Along GeneralRows::along(const GeneralRow& general, std::span<const BodyState> bodies,
+                                      const LargeArray<JointState>& states, double* gradient) const noexcept {
     Along sum;
     const auto add = [&](int index, Vec3 linear, Vec3 angular) {
         if (gradient == nullptr) return;
@@ -86,24 +77,23 @@ JointSet::Along JointSet::along(const General& general, std::span<const BodyStat
         for (int k = 0; k < 3; ++k) row[k] += linear[k], row[3 + k] += angular[k];
     };
     if (gradient) std::fill_n(gradient, std::max<std::size_t>(12, 6 * general.bodies.size()), 0.0);
-    for (const RelationTerm& term : general.terms) {
-        const Joint& joint = joints_[term.joint];
+    for (const GeneralRow::Term& term : general.terms) {
         const AxialRow row =
-            axial_row(joint.constants, body(joint.first, bodies), body(joint.second, bodies));
+            axial_row(term.constants, state_of(term.first, bodies), state_of(term.second, bodies));
         const double c = term.coefficient;
-        sum.violation += c * unwrapped(joint, row.coordinate, states[term.joint].angle);
+        sum.violation += c * unwrapped(term.constants, row.coordinate, states[term.joint].angle);
         sum.rate += c * row.rate;
         const auto scaled = [c](const double* j) { return c * Vec3{j[0], j[1], j[2]}; };
-        add(joint.first, scaled(row.first), scaled(row.first + 3));
-        add(joint.second, scaled(row.second), scaled(row.second + 3));
+        add(term.first, scaled(row.first), scaled(row.first + 3));
+        add(term.second, scaled(row.second), scaled(row.second + 3));
     }
     if (general.points.empty()) return sum;
-    const auto arm = [&](const General::Point& point) {
-        return point.arm + body(point.body, bodies).turn_less_one * point.arm;
+    const auto arm = [&](const GeneralRow::Point& point) {
+        return point.arm + state_of(point.body, bodies).turn_less_one * point.arm;
     };
     for (std::size_t k = 0; k + 1 < general.points.size(); ++k) {
-        const General::Point &from = general.points[k], &to = general.points[k + 1];
-        const BodyState &first = body(from.body, bodies), &second = body(to.body, bodies);
+        const GeneralRow::Point &from = general.points[k], &to = general.points[k + 1];
+        const BodyState &first = state_of(from.body, bodies), &second = state_of(to.body, bodies);
         const Vec3 from_arm = arm(from), to_arm = arm(to);
         const Vec3 d = to.start - from.start + (second.displacement - first.displacement) +
                        (to_arm - to.arm) - (from_arm - from.arm);
@@ -119,32 +109,31 @@ JointSet::Along JointSet::along(const General& general, std::span<const BodyStat
     return sum;
 }
 
-/// The second time derivative of the row when all its bodies go on with constant velocities.
-double JointSet::general_bias(const General& general, std::span<const BodyState> bodies) const noexcept {
+double GeneralRows::bias(int row, std::span<const BodyState> bodies) const noexcept {
+    const GeneralRow& general = rows_[row];
     double sum = 0.0;
-    for (const RelationTerm& term : general.terms) {
-        const Joint& joint = joints_[term.joint];
+    for (const GeneralRow::Term& term : general.terms)
         sum += term.coefficient *
-               axial_bias(joint.constants, body(joint.first, bodies), body(joint.second, bodies));
-    }
+               axial_bias(term.constants, state_of(term.first, bodies), state_of(term.second, bodies));
     for (std::size_t k = 0; k + 1 < general.points.size(); ++k) {
-        const General::Point &from = general.points[k], &to = general.points[k + 1];
+        const GeneralRow::Point &from = general.points[k], &to = general.points[k + 1];
         JointConstants piece;
         piece.kind = JointKind::distance;
         piece.first_arm = from.arm;
         piece.second_arm = to.arm;
         piece.span = to.start - from.start;
         double bias = 0.0;
-        joint_bias(piece, body(from.body, bodies), body(to.body, bodies), &bias);
+        joint_bias(piece, state_of(from.body, bodies), state_of(to.body, bodies), &bias);
         sum += bias;
     }
     return sum;
 }
 
-void JointSet::assemble_general(const Joint& joint, State& state, std::span<const BodyState> bodies,
-                                double* first, double* second, BlockRight& right) noexcept {
-    const General& general = generals_[joint.general];
-    const Along row = along(general, bodies, gradient_.data());
+void GeneralRows::assemble(int index, std::span<const BodyState> bodies, const LargeArray<JointState>& states,
+                           JointState& state, JointStops& stops, double* first, double* second,
+                           BlockRight& right) noexcept {
+    const GeneralRow& general = rows_[index];
+    const Along row = along(general, bodies, states, gradient_.data());
     std::copy_n(gradient_.data(), 6, first);
     std::copy_n(gradient_.data() + 6, 6, second);
     if (general.eye >= 0) {
@@ -156,8 +145,8 @@ void JointSet::assemble_general(const Joint& joint, State& state, std::span<cons
     }
     if (general.one_sided) {
         right.stop.row = 0;
-        right.right[0] = one_sided(-1.0, row.violation, row.rate, general.row, general.restitution, unbounded,
-                                   state, right.stop);
+        right.right[0] = stops.right(-1.0, row.violation, row.rate, general.row, general.restitution,
+                                     unbounded, state, right.stop);
         right.upper[0] = 0.0;
         return;
     }

@@ -1,6 +1,10 @@
 // The rows of every joint: violation, rate and Jacobian at the bodies' current state.
 #pragma once
 
+#include <cmath>
+#include <numbers>
+#include <span>
+
 #include "rigid/rigid_scene.hpp"
 #include "rigid/rigid_state.hpp"
 
@@ -28,6 +32,16 @@ struct JointConstants {
 
 JointConstants constants_of(const JointSpec& spec, const Vec3* first_start,
                             const Vec3* second_start) noexcept;
+inline JointConstants constants_of(const RigidScene& scene, const JointSpec& spec) noexcept {
+    const auto start = [&](int body) { return body < 0 ? nullptr : &scene.bodies[body].position; };
+    return constants_of(spec, start(spec.first), start(spec.second));
+}
+
+/// Of a body of the scene, or of the world (−1).
+inline const BodyState& state_of(int body, std::span<const BodyState> bodies) noexcept {
+    static const BodyState world;
+    return body < 0 ? world : bodies[body];
+}
 
 /// Violations are measured in the frame fixed to the first body:
 /// - translation: the second end's point minus the first's, along the joint's axes;
@@ -64,6 +78,12 @@ struct AxialRow {
     double first[6] = {}, second[6] = {};
 };
 AxialRow axial_row(const JointConstants& joint, const BodyState& first, const BodyState& second) noexcept;
+/// The free coordinate with the turns of a hinge counted: the nearest to `near` of what an angle within ±π may mean.
+inline double unwrapped(const JointConstants& joint, double coordinate, double near) noexcept {
+    if (joint.kind != JointKind::hinge) return coordinate;
+    constexpr double turn = 2.0 * std::numbers::pi;
+    return coordinate + turn * std::round((near - coordinate) / turn);
+}
 /// The slide along the axis, or the turn about it, of a joint that may have both.
 AxialRow axial_row(const JointConstants& joint, const BodyState& first, const BodyState& second,
                    bool slides) noexcept;

@@ -17,12 +17,10 @@ struct JointSpringPull {
 template <class Take>
 void pull_by_springs(JointSet& joints, const LargeArray<BodyConstants>& constants,
                      std::span<const BodyState> bodies, Take&& take) {
-    static const BodyState world;
-    const auto state = [&](int body) -> const BodyState& { return body < 0 ? world : bodies[body]; };
-    for (const JointSpring& spring : joints.springs()) {
+    for (const JointSpring& spring : joints.drives().springs()) {
         const JointBlock& block = joints.blocks()[spring.block];
-        const AxialRow row =
-            axial_row(joints.constants(block.joint), state(block.first), state(block.second));
+        const AxialRow row = axial_row(joints.constants(block.joint), state_of(block.first, bodies),
+                                       state_of(block.second, bodies));
         double& angle = joints.states[block.joint].angle;
         angle = joints.coordinate(block.joint, bodies);
         const double pull = -spring.stiffness * (angle - spring.rest);

@@ -10,7 +10,8 @@ namespace spook {
 void LoadDependentBounds::take(const JointSet& joints, bool eyes, bool tyres, bool bearings) {
     for (int k = 0; eyes && k < static_cast<int>(joints.eyes().size()); ++k) eyes_.push_back(k);
     for (int k = 0; tyres && k < static_cast<int>(joints.tyres().size()); ++k) tyres_.push_back(k);
-    for (int k = 0; bearings && k < static_cast<int>(joints.bearings().size()); ++k) bearings_.push_back(k);
+    for (int k = 0; bearings && k < static_cast<int>(joints.drives().bearings().size()); ++k)
+        bearings_.push_back(k);
     last_.resize(eyes_.size() + tyres_.size());
 }
 
@@ -120,7 +121,7 @@ void LoadDependentBounds::follow_tyre_late(int tyre, MixedSystem& solved, JointS
 }
 
 void LoadDependentBounds::follow_bearing(int bearing, MixedSystem& solved, JointSet& joints) {
-    const BearingRow& of = joints.bearings()[bearing];
+    const BearingRow& of = joints.drives().bearings()[bearing];
     RowBlock& rows = solved.rows[of.block];
     const RowBlock& holding = solved.rows[of.holding];
     const int joint = joints.blocks()[of.block].joint, linear = joints.constants(joint).holds.linear();

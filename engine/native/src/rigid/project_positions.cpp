@@ -40,7 +40,7 @@ Vec3 solved(const Mat3& a, Vec3 b) noexcept {
 }  // namespace
 
 void OverlapProjection::project_positions() {
-    if (joints_.take_given()) project_limits();
+    if (joints_.stops().take_given()) project_limits();
     if (mixed_.touching()) project_overlaps();
 }
 

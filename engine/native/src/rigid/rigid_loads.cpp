@@ -23,7 +23,7 @@ void Forces::take(const RigidScene& scene) {
     std::vector<char> follows(model_.constants.size(), 0);
     for (const TimeDrive& drive : drives_) {
         if (drive.kind == DriveKind::load) follows[drive.index] = 1;
-        if (drive.kind == DriveKind::rest) joints_.let_rest_move(drive.index);
+        if (drive.kind == DriveKind::rest) joints_.drives().let_rest_move(drive.index);
     }
     for (std::size_t i = 0; i < floaters_.size(); ++i)
         if (!floaters_[i].empty()) follows[i] = 1;
@@ -43,12 +43,12 @@ void Forces::follow_time() {
         const TimeFunction& f = drive.function;
         switch (drive.kind) {
             case DriveKind::load: break;
-            case DriveKind::motor: joints_.set_speed(drive.index, f.at(live)); break;
-            case DriveKind::push: joints_.set_push(drive.index, f.at(now)); break;
+            case DriveKind::motor: joints_.drives().set_speed(drive.index, f.at(live)); break;
+            case DriveKind::push: joints_.drives().set_push(drive.index, f.at(now)); break;
             case DriveKind::rest: {
                 const double rest = f.at(now);
-                joints_.set_moving_rest(drive.index, rest, (rest - f.at(now - model_.h)) / model_.h,
-                                        (f.at(now + model_.h) - rest) / model_.h);
+                joints_.drives().set_moving_rest(drive.index, rest, (rest - f.at(now - model_.h)) / model_.h,
+                                                 (f.at(now + model_.h) - rest) / model_.h);
                 break;
             }
             case DriveKind::pace: {

@@ -86,12 +86,12 @@ void RigidSystem::set_load(int body, Vec3 force, Vec3 torque) {
 }
 
 void RigidSystem::set_motor(int joint, double speed, double max_force) {
-    if (joints_.set_motor(joint, speed, max_force)) sleeping_.mark_joint(joint);
+    if (joints_.drives().set_motor(joint, speed, max_force)) sleeping_.mark_joint(joint);
 }
 
 void RigidSystem::set_rest(int joint, double rest) {
     composition_.catch_up();
-    if (joints_.set_rest(joint, rest)) sleeping_.mark_joint(joint);
+    if (joints_.drives().set_rest(joint, rest)) sleeping_.mark_joint(joint);
 }
 
 void RigidSystem::set_velocity(int body, Vec3 velocity, Vec3 angular_velocity) {

@@ -69,7 +69,7 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     model_.curved = method.corrections > 0 && !model_.composed && rows_.rows() > 0 && (!block || may_touch);
     if (!may_touch &&
         stops_are_apart(joints_, model_.solver_index, static_cast<int>(model_.constrained.size())))
-        joints_.let_stops_fold();
+        joints_.stops().let_fold();
     bilateral_.take();
     sleeping_.take(scene);
     if (model_.composed) composition_.take();

@@ -1,26 +1,20 @@
 #include "rigid/rotors.hpp"
 
 #include <cmath>
-#include <numbers>
 
 namespace spook {
 
 namespace {
 
 AxialRow row_of(const JointSet& joints, const JointBlock& block, std::span<const BodyState> bodies) noexcept {
-    static const BodyState world;
-    const auto body = [&](int index) -> const BodyState& { return index < 0 ? world : bodies[index]; };
-    return axial_row(joints.constants(block.joint), body(block.first), body(block.second));
+    return axial_row(joints.constants(block.joint), state_of(block.first, bodies),
+                     state_of(block.second, bodies));
 }
 
 /// From a place of the coordinate to where the bodies are; `near`: to within half a turn of a hinge.
 double way_of(const JointSet& joints, const JointBlock& block, double from, std::span<const BodyState> to,
               double near) noexcept {
-    constexpr double turn = 2.0 * std::numbers::pi;
-    const double way = row_of(joints, block, to).coordinate - from;
-    return joints.constants(block.joint).kind == JointKind::hinge
-               ? way + turn * std::round((near - way) / turn)
-               : way;
+    return unwrapped(joints.constants(block.joint), row_of(joints, block, to).coordinate - from, near);
 }
 
 }  // namespace

@@ -25,11 +25,11 @@ inline constexpr double again =
 // Read by several parts
 inline constexpr double SLIGHT = 1e-17;  // of the square of a tilt: what K need not know of it
 
-// joint_set.cpp
-namespace tolerances::joint_set {
+// joint_stops.cpp
+namespace tolerances::joint_stops {
 inline constexpr double OUT_OF_REACH = 1e5;  // m/s or rad/s: no gap that takes more closes within a step,
 inline constexpr double AS_FAST = 10.0;      // nor one that takes so many times the rate it has
-}  // namespace tolerances::joint_set
+}  // namespace tolerances::joint_stops
 
 // joint_tree.cpp
 namespace tolerances::joint_tree {

@@ -30,7 +30,7 @@ Stand stand(const JointConstants& joint, double radius, const BodyState& road,
 
 void JointSet::assemble_tyre(const Joint& joint, State& state, std::span<const BodyState> bodies,
                              double* first, double* second, BlockRight& right) noexcept {
-    const BodyState &road = body(joint.first, bodies), &wheel = body(joint.second, bodies);
+    const BodyState &road = state_of(joint.first, bodies), &wheel = state_of(joint.second, bodies);
     TyreForm& form = tyre_forms_[joint.tyre];
     const Stand at = stand(joint.constants, form.radius, road, wheel);
     state.first_reach = at.first_reach;
