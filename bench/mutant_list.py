@@ -198,8 +198,8 @@ MUTANTS = (
         "the largest size is the last one",
         "pendulum",
         "run/recorder.cpp",
-        "if (first || size > out[i] || size != size) out[i] = size;",
-        "out[i] = size;",
+        "return first || size > before || size != size ? size : before;",
+        "return size;",
     ),
     wrong(
         "recorder",
