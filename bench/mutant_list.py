@@ -333,8 +333,8 @@ MUTANTS = (
         "3 % of every restitution is lost",
         "bouncing_ball",
         "contacts/impact_solver.cpp",
-        "const double psi = motion.model().surfaces.pair(contact).restitution, speed",
-        "const double psi = 0.97 * motion.model().surfaces.pair(contact).restitution, speed",
+        "const double psi = motion.surfaces().pair(contact).restitution, speed",
+        "const double psi = 0.97 * motion.surfaces().pair(contact).restitution, speed",
     ),
     wrong(
         "contacts",
@@ -351,8 +351,8 @@ MUTANTS = (
         "an end that swings along its arc is stopped only along the way it faced where the step began",
         "tests/test_engine_late_impacts.py::test_the_far_end_of_a_bell_that_is_hit_meets_what_its_arc_leads_to",
         "contacts/impact_search.cpp",
-        "const bool stops = contact.point.gap + motion.model().options.time_step * closing < 0.0;",
-        "const bool stops = contact.point.gap + motion.model().options.time_step * closing < unbounded;",
+        "const bool stops = contact.point.gap + motion.options().time_step * closing < 0.0;",
+        "const bool stops = contact.point.gap + motion.options().time_step * closing < unbounded;",
     ),
     wrong(
         "contacts",

@@ -13,15 +13,13 @@ SOURCES = Path(__file__).parent.parent / "engine/native/src"
 MOST_MEMBERS, MOST_METHODS = 30, 40
 LARGER = {  # members and methods of those that are over: lower a number that has become smaller
     "contacts/ConeFour": (37, 4),
-    "contacts/PgsSolver": (48, 42),
 }
 MOST_BRANCHES = 25
 LONGER = {  # cyclomatic numbers of functions that are over: as above
-    "contacts/candidate_search.cpp CandidateSearch::look_at": 29,
+    "contacts/candidate_search.cpp CandidateSearch::look_at": 28,
     "contacts/impact_events.cpp ImpactEvents::find": 41,
     "contacts/impact_solver.cpp ImpactSolver::solve": 29,
     "contacts/internal_edges.cpp InternalEdges::is_internal_edge": 27,
-    "contacts/pgs_solver.cpp PgsSolver::run": 30,
     "contacts/solve_by_pgs.cpp ContactStage::solve_by_pgs": 35,
     "contacts/successive_impacts.cpp SuccessiveImpacts::find_earliest": 32,
 }

@@ -51,18 +51,16 @@ bool CandidateSearch::reachable(const StepMotion& motion, const Contact& contact
         return std::max(std::abs(dot(n, linear(motion.velocity[b]))), std::abs(dot(n, linear(free)))) +
                spin * radius[b];
     };
-    return contact.point.gap <=
-           motion.model().options.time_step * (speed(contact.first) + speed(contact.second)) +
-               closed * motion.model().bodies.size(contact);
+    return contact.point.gap <= motion.options().time_step * (speed(contact.first) + speed(contact.second)) +
+                                    closed * motion.bodies().size(contact);
 }
 
 void CandidateSearch::begin(StepMotion& motion, const std::vector<Vec6>& free_velocity,
                             ContactPoints& points) {
-    const ContactBodies& bodies = motion.model().bodies;
-    const ContactOptions& options = motion.model().options;
+    const ContactOptions& options = motion.options();
     woken.clear();
-    edges.begin(bodies.count());
-    margins_.begin(bodies, options.time_step, motion.velocity, free_velocity,
+    edges.begin(motion.bodies().count());
+    margins_.begin(motion.bodies(), options.time_step, motion.velocity, free_velocity,
                    options.solver == SolverKind::iterative || options.impacts == ImpactOrder::successive);
     find_open(motion, points, Cast::When::solved);
 }
@@ -74,10 +72,9 @@ void CandidateSearch::find_open(StepMotion& motion, ContactPoints& points, Cast:
 
 void CandidateSearch::widen(const Cast& cast, std::vector<char>& changed, StepMotion& motion,
                             ContactPoints& points) {
-    const ContactBodies& bodies = motion.model().bodies;
-    if (!margins_.outrun(bodies, motion.model().options.time_step, cast.velocity, changed)) return;
+    if (!margins_.outrun(motion.bodies(), motion.options().time_step, cast.velocity, changed)) return;
     if (!detection.near_again(margins_.grown(), margins_.search(), near_)) {
-        changed.assign(bodies.count(), 1);
+        changed.assign(motion.bodies().count(), 1);
         return find_open(motion, points, cast.when);
     }
     for (const int body : margins_.grown()) changed[body] = 1;
@@ -89,8 +86,8 @@ void CandidateSearch::widen(const Cast& cast, std::vector<char>& changed, StepMo
 
 void CandidateSearch::look_at(const std::vector<IndexPair>& near, StepMotion& motion, ContactPoints& points,
                               Cast::When when) {
-    const ContactBodies& bodies = motion.model().bodies;
-    const double h = motion.model().options.time_step;
+    const ContactBodies& bodies = motion.bodies();
+    const double h = motion.options().time_step;
     known_.clear();
     open_.bodies.clear();
     const std::size_t before = points.all.size();
@@ -143,11 +140,8 @@ void CandidateSearch::look_at(const std::vector<IndexPair>& near, StepMotion& mo
     if (skip_grazing(before, motion, points, when))
         std::sort(open_.pairs.begin() + unmet, open_.pairs.end(), OpenPairs::in_order);
     for (std::size_t k = before; k < points.all.size(); ++k) {
-        if (k + ahead < points.all.size()) {
-            const Contact& later = points.all[k + ahead].contact;
-            for (const int body : {later.first, later.second})
-                prefetch(motion.velocity[body]), prefetch(motion.dv_ext[body]);
-        }
+        if (k + ahead < points.all.size())
+            prefetch_bodies(points.all[k + ahead].contact, motion.velocity, motion.dv_ext);
         motion.supported.note(points.all[k], bodies, motion.velocity, motion.dv_ext);
     }
 }
@@ -173,8 +167,8 @@ StepContact& CandidateSearch::add_point(const ContactModel& model, ContactPoints
 /// obstacle. Whether there are such pairs: they are open then.
 bool CandidateSearch::skip_grazing(std::size_t from, const StepMotion& motion, ContactPoints& points,
                                    Cast::When when) {
-    if (!motion.model().bodies.swings || from == points.all.size()) return false;
-    const double h = motion.model().options.time_step;
+    if (!motion.bodies().swings || from == points.all.size()) return false;
+    const double h = motion.options().time_step;
     grazing_.clear();
     edges.index(step(motion, points));
     for (std::size_t k = from, end = from; k < points.all.size(); k = end) {
@@ -208,7 +202,6 @@ bool CandidateSearch::skip_grazing(std::size_t from, const StepMotion& motion, C
 /// round of time_of_impact(), without what that needs before.
 bool CandidateSearch::passes(const OpenPair& open, const StepMotion& motion, const ContactPoints& points,
                              const std::vector<Vec6>& velocity) const {
-    const ContactOptions& options = motion.model().options;
     const int a = open.first, b = open.second;
     if (motion.event_time[a] >= 0.0 || motion.event_time[b] >= 0.0) return false;
     const double closing = dot(open.apart.normal, linear(velocity[b]) - linear(velocity[a]));
@@ -220,9 +213,9 @@ bool CandidateSearch::passes(const OpenPair& open, const StepMotion& motion, con
         turning = first * open.first_arm + second * open.second_arm;
     }
     const double speed = std::max(0.0, closing) + turning;
-    if (!(speed * options.time_step > open.apart.gap)) return open.apart.gap > 0.0;
+    if (!(speed * motion.options().time_step > open.apart.gap)) return open.apart.gap > 0.0;
     const double slop = edges.slop(step(motion, points), open);
-    return open.apart.gap > -0.5 * slop && !(speed * options.time_step > open.apart.gap + slop);
+    return open.apart.gap > -0.5 * slop && !(speed * motion.options().time_step > open.apart.gap + slop);
 }
 
 }  // namespace spook

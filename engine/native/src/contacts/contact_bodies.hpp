@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "collision/detection.hpp"
@@ -23,6 +24,10 @@ struct ContactBodies {
     /// The index in MixedSystem of one of a contact's bodies that moves by itself.
     int solver_body(const Contact& contact) const noexcept {
         return std::max(solver_index[contact.first], solver_index[contact.second]);
+    }
+    /// Of both, −1 for what does not move by itself.
+    template <class Pair> std::pair<int, int> solver_pair(const Pair& contact) const noexcept {
+        return {solver_index[contact.first], solver_index[contact.second]};
     }
     /// The larger of a contact's bodies, and the smaller of those that move by themselves, by their radius, m.
     double size(const Contact& contact) const noexcept {

@@ -45,7 +45,7 @@ void IslandSolver::take_apart(MixedSystem& system, const Islands& islands,
     row_place_.resize(system.rows.size());
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
         const RowBlock& block = system.rows[k];
-        const int island = islands.of_body[std::max(block.first, block.second)];
+        const int island = islands.of(block);
         row_island_[k] = island;
         if (!open_[island]) continue;
         std::vector<RowBlock>& rows = parts_[island]->system.rows;
@@ -110,8 +110,7 @@ FrictionReport IslandSolver::run(MixedSystem& system, std::vector<FrictionPoint>
     if (islands.count <= 1) return solve(system, points, own_of(0).solver);
     open_.assign(islands.count, answered == nullptr);
     for (std::size_t k = 0; answered && k < system.rows.size(); ++k)
-        if (!(*answered)[k])
-            open_[islands.of_body[std::max(system.rows[k].first, system.rows[k].second)]] = 1;
+        if (!(*answered)[k]) open_[islands.of(system.rows[k])] = 1;
     take_apart(system, islands, points);
     for (Own* part : open_parts_) part->report = solve(part->system, part->points, part->solver);
     FrictionReport sum;
@@ -141,12 +140,9 @@ void IslandSolver::set_backoff(const BackoffOf& backoff) {
 BlockLdlt::Counters IslandSolver::counters() const noexcept {
     BlockLdlt::Counters sum;
     for (const auto& [body, own] : own_) {
-        const DirectSolver& solver = own.solver;
-        const BlockLdlt::Counters more = solver.pivot.counters();
-        sum.factorisations += more.factorisations + solver.newton.factorisations();
-        sum.block_operations += more.block_operations + solver.newton.block_operations();
-        sum.floored_pivots += more.floored_pivots;
-        sum.solves += more.solves;
+        sum.add(own.solver.pivot.counters());
+        sum.factorisations += own.solver.newton.factorisations();
+        sum.block_operations += own.solver.newton.block_operations();
     }
     return sum;
 }

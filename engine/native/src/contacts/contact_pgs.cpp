@@ -1,6 +1,7 @@
 #include "contacts/contact_pgs.hpp"
 
 #include <algorithm>
+#include <tuple>
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_rows.hpp"
@@ -13,10 +14,9 @@ namespace spook {
 using namespace tolerances::contact_pgs;
 
 void ContactPgs::hand_over(const StepMotion& motion, ContactPoints& points) {
-    const ContactBodies& bodies = motion.model().bodies;
-    const ContactSurfaces& surfaces = motion.model().surfaces;
+    const ContactBodies& bodies = motion.bodies();
     const ContactRows rows{motion, points};
-    const double h = motion.model().options.time_step;
+    const double h = motion.options().time_step;
     std::size_t next = solver_.count();
     for (std::size_t k = next; k < points.all.size(); ++k)
         solver_.announce(bodies.solver_index[points.all[k].contact.first],
@@ -24,16 +24,12 @@ void ContactPgs::hand_over(const StepMotion& motion, ContactPoints& points) {
     solver_.arrange();
     for (; next < points.all.size(); ++next) {
         StepContact& point = points.all[next];
-        if (next + ahead < points.all.size()) {
-            const Contact& later = points.all[next + ahead].contact;
-            for (const int body : {later.first, later.second})
-                prefetch(motion.velocity[body]), prefetch(motion.dv_ext[body]);
-        }
-        const PairMaterial material = surfaces.pair(point.contact);
+        if (next + ahead < points.all.size())
+            prefetch_bodies(points.all[next + ahead].contact, motion.velocity, motion.dv_ext);
+        const PairMaterial material = motion.surfaces().pair(point.contact);
         const ContactExtras& extras = points.extras(point);
         PgsContact row;
-        row.first = bodies.solver_index[point.contact.first];
-        row.second = bodies.solver_index[point.contact.second];
+        std::tie(row.first, row.second) = bodies.solver_pair(point.contact);
         row.normal = point.contact.point.normal;
         row.tangent = extras.axis_scale[0] * point.tangent;
         row.across = extras.axis_scale[1] * cross(row.normal, point.tangent);
@@ -46,7 +42,7 @@ void ContactPgs::hand_over(const StepMotion& motion, ContactPoints& points) {
         row.normal_before = point.before;
         row.impulse[0] = point.solved ? point.normal : std::max(0.0, point.before);
         for (int i = 0; i < 2; ++i) row.impulse[i + 1] = point.tangents[i] / extras.axis_scale[i];
-        if (surfaces.conveys || row.first < 0 || row.second < 0) {
+        if (motion.surfaces().conveys || row.first < 0 || row.second < 0) {
             const Vec3 directions[3] = {row.normal, row.tangent, row.across};
             for (int i = 0; i < 3; ++i)
                 row.right[i] = -relative_velocity(point, directions[i], motion.drive.prescribed());
@@ -89,7 +85,7 @@ void ContactPgs::follow(const ContactBodies& bodies, bool all, std::vector<Vec6>
 
 bool ContactPgs::judge(MixedSystem& system, const StepMotion& motion, const ContactPoints& points,
                        SolveQuality& quality) {
-    const ContactOptions& options = motion.model().options;
+    const ContactOptions& options = motion.options();
     quality.body = -1;
     quality.by = 0.0;
     if (!system.rows.empty()) solver_.write(system);
@@ -99,7 +95,7 @@ bool ContactPgs::judge(MixedSystem& system, const StepMotion& motion, const Cont
     quality.residual = std::max(contact.residual, joint.residual);
     if (contact.row >= 0 && contact.residual >= joint.residual) {
         const Contact& pair = points.all[contact.row].contact;
-        blame(quality, motion, contact.residual, motion.model().bodies.solver_body(pair));
+        blame(quality, motion, contact.residual, motion.bodies().solver_body(pair));
     } else if (!system.rows.empty()) {
         const RowBlock& block = system.rows[joint.row];
         blame(quality, motion, joint.residual, std::max(block.first, block.second));
@@ -109,13 +105,13 @@ bool ContactPgs::judge(MixedSystem& system, const StepMotion& motion, const Cont
 
 bool ContactPgs::runs_away(const MixedSystem& system, const StepMotion& motion,
                            const ContactPoints& points) const {
-    const ContactBodies& bodies = motion.model().bodies;
+    const ContactBodies& bodies = motion.bodies();
     double speed = 0.0, had = 0.0, has = 0.0;  // of what moves as it is told, or along itself
     for (std::size_t b = 0; motion.drive.any() && b < motion.drive.prescribed().size(); ++b)
         speed = std::max(speed, norm(linear(motion.drive.prescribed()[b])) +
                                     bodies.radius[b] * norm(angular(motion.drive.prescribed()[b])));
     for (const StepContact& point : points.all)
-        if (motion.model().surfaces.conveys)
+        if (motion.surfaces().conveys)
             speed = std::max(
                 {speed, std::abs(motion.surface_speed(point, point.tangent)),
                  std::abs(motion.surface_speed(point, cross(point.contact.point.normal, point.tangent)))});
@@ -169,7 +165,7 @@ void ContactPgs::store_unanswered(ContactPoints& points) const {
 void ContactPgs::deliver(MixedSystem& system, bool unsettled, const StepMotion& motion,
                          const ContactPoints& points, EnergyLimit& energy, std::vector<char>& has_rows,
                          std::vector<CachedContact>& cache, ContactCounters& counters) const {
-    const ContactBodies& bodies = motion.model().bodies;
+    const ContactBodies& bodies = motion.bodies();
     const auto pushes = [this](std::size_t k) {
         const double* z = solver_.impulse(static_cast<int>(k));
         return std::any_of(z, z + 3, [](double each) { return each != 0.0; });

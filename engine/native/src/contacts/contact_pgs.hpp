@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "contacts/contact_points.hpp"
-#include "contacts/energy_limit.hpp"
 #include "contacts/pgs_solver.hpp"
 #include "contacts/solve_quality.hpp"
 #include "contacts/step_motion.hpp"

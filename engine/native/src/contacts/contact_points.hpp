@@ -29,8 +29,7 @@ struct ContactPoints {
 
     /// Tells what they connect.
     void tie(const ContactBodies& bodies, IslandFinder& finder) const {
-        for (const StepContact& point : all)
-            finder.tie(bodies.solver_index[point.contact.first], bodies.solver_index[point.contact.second]);
+        for (const StepContact& point : all) finder.tie(bodies.solver_pair(point.contact));
     }
 
     const ContactExtras& extras(const StepContact& point) const noexcept {

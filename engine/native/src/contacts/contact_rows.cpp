@@ -31,12 +31,11 @@ double compression(const ContactRows& rows, const MixedSystem& system, const Ste
 }  // namespace
 
 RowBlock ContactRows::row_block(const StepContact& point, int rows) const {
-    const ContactBodies& bodies = motion.model().bodies;
     const Contact& contact = point.contact;
     RowBlock block;
     block.is_contact = true;
-    block.first = bodies.solver_index[contact.first];
-    block.second = bodies.solver_index[contact.second];
+    block.first = motion.bodies().solver_index[contact.first];
+    block.second = motion.bodies().solver_index[contact.second];
     block.size = std::min(rows, 3);
     const double* const axis_scale = points.extras(point).axis_scale;
     const Vec3 directions[3] = {contact.point.normal, axis_scale[0] * point.tangent,
@@ -56,7 +55,7 @@ RowBlock ContactRows::row_block(const StepContact& point, int rows) const {
 /// Rolling about both tangents and turning about the normal, as speeds at the larger body's radius: what is left of
 /// them then compares with that of other rows.
 void ContactRows::add_turning(const StepContact& point, RowBlock& block) const {
-    const double scale = motion.model().bodies.size(point.contact);
+    const double scale = motion.bodies().size(point.contact);
     const Vec3 n = point.contact.point.normal;
     const Vec3 axes[3] = {point.tangent, cross(n, point.tangent), n};
     for (int i = 0; i < 3; ++i) {
@@ -73,12 +72,12 @@ void ContactRows::add_turning(const StepContact& point, RowBlock& block) const {
 
 void ContactRows::add_friction(const StepContact& point, int block,
                                std::vector<FrictionPoint>& friction) const {
-    const ContactOptions& options = motion.model().options;
-    const PairMaterial material = motion.model().surfaces.pair(point.contact);
-    const double soft = material.slip_compliance / options.time_step,
-                 scale = motion.model().bodies.size(point.contact);
+    const PairMaterial material = motion.surfaces().pair(point.contact);
+    const double soft = material.slip_compliance / motion.options().time_step,
+                 scale = motion.bodies().size(point.contact);
     double normal = point.before;
-    if (options.friction == FrictionModel::box) normal = normal < 0.0 ? points.extras(point).guessed : normal;
+    if (motion.options().friction == FrictionModel::box)
+        normal = normal < 0.0 ? points.extras(point).guessed : normal;
     else if (point.solved) normal = point.normal;
     if (point.friction > 0.0) {
         friction.push_back({block, point.friction, soft, normal});
@@ -89,14 +88,14 @@ void ContactRows::add_friction(const StepContact& point, int block,
 }
 
 double ContactRows::resting_right(StepContact& point) const {
-    const ContactBodies& bodies = motion.model().bodies;
-    const double h = motion.model().options.time_step, gap = bodies.gap(point.contact);
+    const ContactBodies& bodies = motion.bodies();
+    const double h = motion.options().time_step, gap = bodies.gap(point.contact);
     motion.measure(point);
     const bool touching = bodies.is_closed(point.contact);
     if (point.event)  // another point of a pair that meets may still be open
         return -(touching ? 0.0 : gap / motion.time_left(point));
     if (!touching) return -gap / h;
-    const PairMaterial material = motion.model().surfaces.pair(point.contact);
+    const PairMaterial material = motion.surfaces().pair(point.contact);
     const Regularisation row = regularise(material.compliance, material.damping, h);
     const double depth = -row.violation_gain * std::max(gap, -elastic_depth(bodies, point));
     // A rigid contact that opens is not pushed after its own speed.
@@ -105,16 +104,16 @@ double ContactRows::resting_right(StepContact& point) const {
 
 /// Whether a point is likely to push: what a solver starts from.
 bool ContactRows::is_pressed(const StepContact& point) const noexcept {
-    const double h = motion.model().options.time_step, gap = point.contact.point.gap;
+    const double h = motion.options().time_step, gap = point.contact.point.gap;
     if (point.solved) return point.normal > 0.0;
     return point.before > 0.0 || point.toi >= 0.0 ||
-           (point.before < 0.0 && (motion.model().bodies.is_closed(point.contact) ||
+           (point.before < 0.0 && (motion.bodies().is_closed(point.contact) ||
                                    gap + h * (point.resting_approach() + point.dv_ext) < 0.0));
 }
 
 RowBlock ContactRows::resting(StepContact& point) const {
-    const double h = motion.model().options.time_step;
-    const PairMaterial material = motion.model().surfaces.pair(point.contact);
+    const double h = motion.options().time_step;
+    const PairMaterial material = motion.surfaces().pair(point.contact);
     const bool turning = material.resists_turning();
     RowBlock block = row_block(point, turning ? 6 : point.friction > 0.0 ? 3 : 1);
     if (turning && !(point.friction > 0.0))
@@ -169,7 +168,7 @@ CachedContact& cache_contact(const ContactRows& rows, const MixedSystem& system,
     cached.tangent[1] = dot(along, cross(n, point.tangent));
     cached.friction = rows.points.extras(point).axis_scale[0] * point.friction;
     cached.active =
-        cached.normal > 0.0 || cached.impact > 0.0 || rows.motion.model().bodies.is_closed(point.contact);
+        cached.normal > 0.0 || cached.impact > 0.0 || rows.motion.bodies().is_closed(point.contact);
     return cached;
 }
 

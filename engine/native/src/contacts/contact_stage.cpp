@@ -232,8 +232,7 @@ const PositionProjection* ContactStage::project_positions(const MixedSystem& sys
 
 void ContactStage::apply_balancing_impulse(const Islands& islands, int island, Vec3 momentum) noexcept {
     for (CachedContact& cached : state_.cache.points) {
-        const int first = model_->bodies.solver_index[cached.contact.first],
-                  second = model_->bodies.solver_index[cached.contact.second];
+        const auto [first, second] = model_->bodies.solver_pair(cached.contact);
         if (std::min(first, second) >= 0 || islands.of_body[std::max(first, second)] != island) continue;
         if (!cached.pushes()) continue;
         cached.impulse += first >= 0 ? -momentum : momentum;
@@ -243,13 +242,8 @@ void ContactStage::apply_balancing_impulse(const Islands& islands, int island, V
 
 BlockLdlt::Counters ContactStage::factor_counters() const noexcept {
     BlockLdlt::Counters sum = resting_.islands().counters();
-    for (const IslandSolver* solver : {&impacts_.solver(), &projector_.solver()}) {
-        const BlockLdlt::Counters more = solver->counters();
-        sum.factorisations += more.factorisations;
-        sum.block_operations += more.block_operations;
-        sum.floored_pivots += more.floored_pivots;
-        sum.solves += more.solves;
-    }
+    sum.add(impacts_.solver().counters());
+    sum.add(projector_.solver().counters());
     return sum;
 }
 

@@ -44,9 +44,9 @@ bool CandidateSearch::is_known(const ContactPoints& points, const Contact& conta
 /// Looks where `velocity` leads the pairs that have points; true if some feature swings in and got a row.
 bool CandidateSearch::find_turned(const std::vector<Vec6>& velocity, const StepMotion& motion,
                                   ContactPoints& points) {
-    const ContactBodies& bodies = motion.model().bodies;
+    const ContactBodies& bodies = motion.bodies();
     if (!bodies.swings) return false;
-    const double h = motion.model().options.time_step;
+    const double h = motion.options().time_step;
     const std::size_t known = points.all.size();
     for (std::size_t from = 0, end = 0; from < points.ordered; from = end) {
         const std::uint64_t key = pair_of(points.all[from].contact);

@@ -17,9 +17,9 @@ using namespace tolerances::impact_events;
 }  // namespace
 
 void ImpactEvents::find(const CandidateSearch& search, StepMotion& motion, ContactPoints& points) {
-    const ContactBodies& bodies = motion.model().bodies;
-    const ContactOptions& options = motion.model().options;
-    const ContactSurfaces& surfaces = motion.model().surfaces;
+    const ContactBodies& bodies = motion.bodies();
+    const ContactOptions& options = motion.options();
+    const ContactSurfaces& surfaces = motion.surfaces();
     connected_.begin(bodies.count());
     const auto root = [this](int b) { return connected_.root(b); };
     const auto join = [&](int a, int b) {

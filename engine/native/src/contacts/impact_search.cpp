@@ -34,7 +34,7 @@ double CandidateSearch::meeting(const OpenPair& open, const Cast& cast, const St
                at_second = motion.moved(open.second, cast.velocity);
     const Mover first = at.mover(open.pair.first, at_first, cast.velocity),
                 second = at.mover(open.pair.second, at_second, cast.velocity);
-    const double time = time_of_impact(first, second, motion.model().options.time_step, edges.slop(at, open));
+    const double time = time_of_impact(first, second, motion.options().time_step, edges.slop(at, open));
     if (time < 0.0 || edges.is_internal_edge(at, first, open.first, second, open, cast, time) ||
         edges.is_internal_edge(at, second, open.second, first, open, cast, time))
         return -1.0;
@@ -47,7 +47,7 @@ CandidateSearch::Found CandidateSearch::find_impacts(const Cast& cast, const std
     const std::vector<Vec6>& velocity = cast.velocity;
     const bool late = cast.when != Cast::When::ahead;
     meetings_.clear();
-    if (motion.model().bodies.swings && !open_.pairs.empty()) edges.index(step(motion, points));
+    if (motion.bodies().swings && !open_.pairs.empty()) edges.index(step(motion, points));
     open_.drop_met(most_met);
     asked_.resize(open_.pairs.size() + 1);
     std::size_t count = 0;
@@ -62,11 +62,7 @@ CandidateSearch::Found CandidateSearch::find_impacts(const Cast& cast, const std
         count += !open.has_met() && !passes(open, motion, points, velocity);
     }
     for (std::size_t at = 0; at < count; ++at) {
-        if (at + ahead < count) {
-            const OpenPair& later = open_.pairs[asked_[at + ahead]];
-            for (const int body : {later.first, later.second})
-                prefetch(motion.poses[body]), prefetch(motion.dv_ext[body]);
-        }
+        if (at + ahead < count) prefetch_bodies(open_.pairs[asked_[at + ahead]], motion.poses, motion.dv_ext);
         if ((at + 1) % pairs_a_look == 0) Watch::look();
         if (const double time = meeting(open_.pairs[asked_[at]], cast, motion, points); !(time < 0.0))
             meetings_.push_back({asked_[at], time});
@@ -77,8 +73,7 @@ CandidateSearch::Found CandidateSearch::find_impacts(const Cast& cast, const std
         if (at + ahead < meetings_.size()) {
             const OpenPair& later = open_.pairs[meetings_[at + ahead].open];
             prefetch(detection.pose(later.pair.first)), prefetch(detection.pose(later.pair.second));
-            for (const int body : {later.first, later.second})
-                prefetch(motion.poses[body]), prefetch(velocity[body]);
+            prefetch_bodies(later, motion.poses, velocity);
         }
         const auto& [k, time] = meetings_[at];
         OpenPair& open = open_.pairs[k];
@@ -97,13 +92,12 @@ CandidateSearch::Found CandidateSearch::find_impacts(const Cast& cast, const std
 bool CandidateSearch::add_toi_point_at_start(const OpenPair& open, double time,
                                              const std::vector<Vec6>& velocity, bool keeps_rebounds,
                                              const StepMotion& motion, ContactPoints& points) {
-    const ContactBodies& bodies = motion.model().bodies;
-    bool elsewhere = !(bodies.moves(open.first) && bodies.moves(open.second));
+    bool elsewhere = !(motion.bodies().moves(open.first) && motion.bodies().moves(open.second));
     for (const int collider : {open.pair.first, open.pair.second}) {
         const Collider::View own = detection.collider(collider);
         const bool flat = own.shape.kind == ShapeKind::plane;
         if (!flat && own.shape.kind != ShapeKind::sphere) return false;
-        if (!keeps_rebounds && motion.model().surfaces[own.body].restitution > 0.0) return false;
+        if (!keeps_rebounds && motion.surfaces()[own.body].restitution > 0.0) return false;
         if (flat && angular(velocity[own.body]) == Vec3{}) elsewhere = false;
     }
     if (elsewhere) return false;
@@ -114,7 +108,7 @@ bool CandidateSearch::add_toi_point_at_start(const OpenPair& open, double time,
     const Contact& contact = scratch_.front();
     add_point(motion.model(), points, contact, motion.poses[a], motion.poses[b], time);
     const double closing = relative_velocity(points.all.back(), contact.point.normal, velocity);
-    const bool stops = contact.point.gap + motion.model().options.time_step * closing < 0.0;
+    const bool stops = contact.point.gap + motion.options().time_step * closing < 0.0;
     if (stops) points.all.back().at_start = true;
     else points.all.pop_back();
     return stops;
@@ -124,7 +118,6 @@ bool CandidateSearch::add_toi_point_at_start(const OpenPair& open, double time,
 bool CandidateSearch::add_toi_points(const OpenPair& open, double time, const std::vector<Vec6>& velocity,
                                      bool leaves_rebounds, const StepMotion& motion, ContactPoints& points,
                                      bool& left_out) {
-    const ContactBodies& bodies = motion.model().bodies;
     const SearchedStep at = step(motion, points);
     const int a = open.first, b = open.second;
     const Pose begun_first = motion.moved(a, velocity), begun_second = motion.moved(b, velocity),
@@ -132,7 +125,7 @@ bool CandidateSearch::add_toi_points(const OpenPair& open, double time, const st
                second = at.mover(open.pair.second, begun_second, velocity).body_at(time);
     const Vec3 led = (begun_first.position - motion.poses[a].position) -
                      (begun_second.position - motion.poses[b].position);
-    const double radius = std::max(bodies.radius[a], bodies.radius[b]);
+    const double radius = std::max(motion.bodies().radius[a], motion.bodies().radius[b]);
     scratch_.clear();
     detection.collide_pair(open.pair, first, second,
                            std::max(margins_.reach()[a] + margins_.reach()[b], 2.0 * closed * radius),
@@ -140,7 +133,7 @@ bool CandidateSearch::add_toi_points(const OpenPair& open, double time, const st
     bool met = false;
     for (const Contact& contact : scratch_) {
         if (is_turned_through(detection, contact, first, second, velocity, motion.dv_ext,
-                              motion.model().options.time_step))
+                              motion.options().time_step))
             continue;
         StepContact& point = add_point(motion.model(), points, contact, first, second, time);
         const double closing = -relative_velocity(point, contact.point.normal, velocity);
@@ -149,8 +142,7 @@ bool CandidateSearch::add_toi_points(const OpenPair& open, double time, const st
             std::max({std::abs(relative_velocity(point, contact.point.normal, motion.dv_ext)),
                       std::abs(dot(contact.point.normal, linear(motion.dv_ext[contact.first]))),
                       std::abs(dot(contact.point.normal, linear(motion.dv_ext[contact.second])))});
-        if (leaves_rebounds && motion.model().surfaces.pair(contact).restitution > 0.0 &&
-            closing > 4.0 * push) {
+        if (leaves_rebounds && motion.surfaces().pair(contact).restitution > 0.0 && closing > 4.0 * push) {
             left_out = true;
             points.all.pop_back();
             continue;
@@ -166,18 +158,14 @@ bool CandidateSearch::add_toi_points(const OpenPair& open, double time, const st
 
 void CandidateSearch::move_impacts_to_start(std::size_t from, const std::vector<Vec6>& velocity,
                                             const StepMotion& motion, ContactPoints& points) {
-    const ContactBodies& bodies = motion.model().bodies;
-    const double h = motion.model().options.time_step;
+    const ContactBodies& bodies = motion.bodies();
+    const double h = motion.options().time_step;
     const auto is_there = [](const StepContact& point) { return point.at_start || point.toi < 0.0; };
     if (std::all_of(points.all.begin() + static_cast<std::ptrdiff_t>(from), points.all.end(), is_there))
         return;
     const LargeArray<StepContact>& found = points.take_from(from);
     for (std::size_t k = 0; k < found.size();) {
-        if (k + ahead < found.size()) {
-            const Contact& later = found[k + ahead].contact;
-            for (const int body : {later.first, later.second})
-                prefetch(motion.poses[body]), prefetch(velocity[body]);
-        }
+        if (k + ahead < found.size()) prefetch_bodies(found[k + ahead].contact, motion.poses, velocity);
         const Contact meeting = found[k].contact;
         const double toi = found[k].toi;
         std::size_t end = k;
@@ -208,7 +196,7 @@ void CandidateSearch::move_impacts_to_start(std::size_t from, const std::vector<
             const Pose &one = motion.poses[contact.first], &two = motion.poses[contact.second];
             if (is_turned_through(detection, contact, one, two, velocity, motion.dv_ext, h)) continue;
             add_point(motion.model(), points, contact, one, two, toi);
-            if (motion.model().surfaces.pair(contact).restitution > 0.0)
+            if (motion.surfaces().pair(contact).restitution > 0.0)
                 put_on_mover(points.all.back(), bodies.moves(contact.first), bodies.moves(contact.second));
             stops = stops || contact.point.gap + h * relative_velocity(points.all.back(),
                                                                        contact.point.normal, velocity) <

@@ -31,8 +31,7 @@ void find_kinetic_energy(const MixedSystem& system, const std::vector<Vec6>& vel
     for (const RowBlock& block : system.rows) {
         if (block.rotor < 0) continue;
         const double speed = row_velocity(block, block.rotor, velocity);
-        energy[islands.of_body[std::max(block.first, block.second)]] +=
-            0.5 * speed * speed / block.softness[block.rotor];
+        energy[islands.of(block)] += 0.5 * speed * speed / block.softness[block.rotor];
     }
 }
 
@@ -123,7 +122,7 @@ void ImpactSolver::share_impact(MixedSystem& hit, std::size_t joints, const Cont
 void ImpactSolver::solve_rows(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
                               const IslandRules& rules, const StepMotion& motion, ContactCounters& counters,
                               SolveQuality& quality) {
-    const ContactOptions& options = motion.model().options;
+    const ContactOptions& options = motion.options();
     const std::vector<FrictionPoint>& fresh = work_.first_friction = friction;
     FrictionReport report = solve_islands(hit, friction, solver_, options, rules, counters);
     if (report.converged && is_broken(hit, joints)) {
@@ -191,9 +190,8 @@ bool ImpactSolver::stop_is_hit(const MixedSystem& system, const ContactBodies& b
     };
     std::vector<char>& touched = filled(work_.touched, islands.count);
     for (const StepContact& point : points.all) touched[own(point)] = 1;
-    return std::any_of(system.rows.begin(), system.rows.end(), [&](const RowBlock& block) {
-        return is_hit(block) && touched[islands.of_body[std::max(block.first, block.second)]];
-    });
+    return std::any_of(system.rows.begin(), system.rows.end(),
+                       [&](const RowBlock& block) { return is_hit(block) && touched[islands.of(block)]; });
 }
 
 /// Leaves out points that close where nothing is approached and no stop is hit: what goes on elsewhere is nothing to their
@@ -203,9 +201,6 @@ void ImpactSolver::take_part(MixedSystem& system, const ContactModel& model, con
     const Islands& islands = connected(system, model.bodies, points);
     const auto own = [&](const StepContact& point) {
         return islands.of_body[model.bodies.solver_body(point.contact)];
-    };
-    const auto island = [&](const RowBlock& block) {
-        return islands.of_body[std::max(block.first, block.second)];
     };
     std::vector<std::size_t>& hit_points = work_.hit_points;
     const auto is_met =
@@ -218,12 +213,12 @@ void ImpactSolver::take_part(MixedSystem& system, const ContactModel& model, con
     for (const std::size_t k : hit_points)
         if (is_met(points.all[k])) taking_part[own(points.all[k])] = 1;
     for (const RowBlock& block : system.rows)
-        if (is_hit(block) && touched[island(block)]) taking_part[island(block)] = 1;
+        if (is_hit(block) && touched[islands.of(block)]) taking_part[islands.of(block)] = 1;
     std::erase_if(hit_points, [&](std::size_t k) { return !taking_part[own(points.all[k])]; });
     joints_hit_.clear();
     std::vector<RowBlock>& rows = work_.hit.rows;
     for (RowBlock& given : system.rows) {
-        if (!taking_part[island(given)]) continue;
+        if (!taking_part[islands.of(given)]) continue;
         given.stop.answered = is_hit(given);
         given.stop.limit_reached = rounds_ > most_rounds(points.all.size());
         joints_hit_.push_back(static_cast<std::size_t>(&given - system.rows.data()));
@@ -252,8 +247,7 @@ bool ImpactSolver::is_impact(const StepContact& point) const noexcept {
 SolveQuality ImpactSolver::solve(MixedSystem& system, const OpenPairs& open, std::size_t few_enough,
                                  StepMotion& motion, ContactPoints& points, std::vector<Vec6>& impulses,
                                  ContactCounters& counters) {
-    const ContactOptions& options = motion.model().options;
-    const ContactSurfaces& surfaces = motion.model().surfaces;
+    const ContactOptions& options = motion.options();
     ++counters.impacts;
     ++rounds_;
     SolveQuality quality;
@@ -288,8 +282,8 @@ SolveQuality ImpactSolver::solve(MixedSystem& system, const OpenPairs& open, std
             friction.push_back({static_cast<int>(hit.rows.size()), point.friction, 0.0, -1.0});
             friction.back().anisotropic = points.extras(point).is_anisotropic();
             const double slip = point.bounce > 0.0 && is_impact(point)
-                                    ? std::max(surfaces[point.contact.first].tangential_restitution,
-                                               surfaces[point.contact.second].tangential_restitution)
+                                    ? std::max(motion.surfaces()[point.contact.first].tangential_restitution,
+                                               motion.surfaces()[point.contact.second].tangential_restitution)
                                     : 0.0;
             for (int i = 1; i < 3 && slip > 0.0; ++i)
                 block.right[i] -= returned[j][i - 1] =
@@ -307,15 +301,12 @@ SolveQuality ImpactSolver::solve(MixedSystem& system, const OpenPairs& open, std
     solve_rows(hit, joints, friction, rules, motion, counters, quality);
 
     const Islands& islands = connected_.find(hit);
-    const auto island = [&islands](const RowBlock& block) {
-        return islands.of_body[std::max(block.first, block.second)];
-    };
     find_kinetic_energy(hit, before, islands, work.limit);
     find_kinetic_energy(hit, hit.velocity, islands, work.energy);
     std::vector<double>& share = filled(work.share, islands.count, 1.0);  // of Newton's law, the rest plastic
     std::vector<char>& rises = filled(work.rises, islands.count);
     for (int k = 0; k < islands.count; ++k) rises[k] = work.energy[k] > work.limit[k] * (1.0 + gain);
-    for (const std::size_t k : pushed) rises[island(hit.rows[k])] = 0;
+    for (const std::size_t k : pushed) rises[islands.of(hit.rows[k])] = 0;
     MixedSystem& plastic = work.plastic;
     if (std::find(rises.begin(), rises.end(), 1) != rises.end()) {
         plastic = work.start, work.plastic_friction = work.fresh;
@@ -332,7 +323,7 @@ SolveQuality ImpactSolver::solve(MixedSystem& system, const OpenPairs& open, std
     impulses.resize(system.rows.size());
     for (std::size_t j = 0; j < joints; ++j) {
         const RowBlock& block = hit.rows[j];
-        const double s = share[island(block)];
+        const double s = share[islands.of(block)];
         for (int i = 0; i < block.size; ++i) {
             const double other = s < 1.0 ? plastic.rows[j].multiplier[i] : block.multiplier[i];
             impulses[joints_hit_[j]][i] += other + s * (block.multiplier[i] - other);
@@ -341,7 +332,7 @@ SolveQuality ImpactSolver::solve(MixedSystem& system, const OpenPairs& open, std
     for (std::size_t j = 0; j < hit_points.size(); ++j) {
         StepContact& point = points.all[hit_points[j]];
         const RowBlock& block = hit.rows[joints + j];
-        const double s = share[island(block)];
+        const double s = share[islands.of(block)];
         double normal = block.multiplier[0];
         Vec3 impulse = impulse_of(block);
         if (s < 1.0) {
@@ -357,15 +348,15 @@ SolveQuality ImpactSolver::solve(MixedSystem& system, const OpenPairs& open, std
 
 bool ImpactSolver::measure(const StepMotion& motion, const std::vector<double>& reach,
                            ContactPoints& points) {
-    const double h = motion.model().options.time_step;
+    const double h = motion.options().time_step;
     needed_ = false;
     for (StepContact& point : points.all) {
         const Contact& contact = point.contact;
         const double gap = contact.point.gap;
         motion.measure(point);
-        const double psi = motion.model().surfaces.pair(contact).restitution, speed = -point.approach;
+        const double psi = motion.surfaces().pair(contact).restitution, speed = -point.approach;
         point.bounce = -1.0;
-        if (motion.model().bodies.is_closed(contact)) {
+        if (motion.bodies().is_closed(contact)) {
             point.bounce = speed > 0.0 ? psi : 0.0;
         } else if (plastic_too_ && point.impact > 0.0) {  // an impact of this step has brought them together
             point.bounce = 0.0;

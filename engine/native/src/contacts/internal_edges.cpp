@@ -36,7 +36,7 @@ bool meets_side_face(const Mover& one, const Mover& other, double time, Vec3 n) 
 /// How deep a closed point is at the start of the step, and what the velocity then adds to it before that is answered, m.
 /// When a solve has answered it, as much as iterations that count as settled may have left, or as the depth.
 double depth_at_toi(const SearchedStep& step, const StepContact& point, bool late) {
-    const ContactOptions& options = step.motion.model().options;
+    const ContactOptions& options = step.motion.options();
     const double h = options.time_step, depth = std::max(0.0, -point.contact.point.gap);
     const double sinking =
         std::max(0.0, -h * relative_velocity(point, point.contact.point.normal, step.motion.velocity));
@@ -75,36 +75,33 @@ void InternalEdges::predict_sinking(const SearchedStep& step, const std::vector<
         if (point.toi >= 0.0) continue;
         const Contact& contact = point.contact;
         const double closing = -relative_velocity(point, contact.point.normal, velocity);
-        const double sinking =
-            step.motion.model().options.time_step * closing - std::max(0.0, contact.point.gap);
+        const double sinking = step.motion.options().time_step * closing - std::max(0.0, contact.point.gap);
         for (const int b : {contact.first, contact.second})
             predicted_sinking_[b] = std::max(predicted_sinking_[b], sinking);
     }
 }
 
 void InternalEdges::index(const SearchedStep& step) {
-    points_of_.find(step.points.all, step.motion.model().bodies);
+    points_of_.find(step.points.all, step.motion.bodies());
 }
 
 double InternalEdges::slop(const SearchedStep& step, const OpenPair& open) const noexcept {
-    const ContactBodies& bodies = step.motion.model().bodies;
     const int a = open.first, b = open.second;
     const bool sides = have_sides(step.detection.collider(open.pair.first).shape,
                                   step.detection.collider(open.pair.second).shape);
-    return closed * std::max(bodies.radius[a], bodies.radius[b]) +
+    return closed * std::max(step.motion.bodies().radius[a], step.motion.bodies().radius[b]) +
            (sides ? 2.0 * std::max(predicted_sinking_[a], predicted_sinking_[b]) : 0.0);
 }
 
 bool InternalEdges::is_internal_edge(const SearchedStep& step, const Mover& moving, int body,
                                      const Mover& other, const OpenPair& open, const Cast& cast, double time,
                                      Vec3 facing) const {
-    const ContactOptions& options = step.motion.model().options;
+    const ContactOptions& options = step.motion.options();
     const bool iterating = cast.when == Cast::When::iterating, late = cast.when != Cast::When::ahead;
     if (!have_sides(moving.shape, other.shape)) return false;
     const double h = options.time_step, slop = this->slop(step, open), least = share * slop;
     const bool by_pgs = options.solver == SolverKind::iterative;
-    if (!step.motion.model().bodies.moves(body) || !(iterating || by_pgs || depth_[body] > least))
-        return false;
+    if (!step.motion.bodies().moves(body) || !(iterating || by_pgs || depth_[body] > least)) return false;
     const std::span<const int> own = points_of_[body];
     for (std::size_t at = 0; at < own.size();) {
         const std::uint64_t pair = pair_of(step.points.all[own[at]].contact);
@@ -177,7 +174,7 @@ bool InternalEdges::occludes(const SearchedStep& step, const OpenPair& before, d
     const Vec3 n = (before.first == body ? 1.0 : -1.0) * normal(one, two, earlier);
     const Vec3 side = (after.first == body ? 1.0 : -1.0) * normal(three, four, later);
     if (dot(n, side) > same_direction_cosine) return false;
-    const double h = step.motion.model().options.time_step, slop = this->slop(step, after),
+    const double h = step.motion.options().time_step, slop = this->slop(step, after),
                  level = height(held, earlier, n);
     if (!(level + height(other, earlier, -n) > -2.0 * (slop + this->slop(step, before)))) return false;
     const Mover& holder = before.first == body ? two : one;
@@ -192,12 +189,11 @@ bool InternalEdges::occludes(const SearchedStep& step, const OpenPair& before, d
 
 void InternalEdges::remove_occluded(const SearchedStep& step, const LargeArray<OpenPair>& pairs,
                                     const std::vector<Vec6>& velocity, std::vector<Meeting>& meetings) {
-    const ContactBodies& bodies = step.motion.model().bodies;
-    if (!bodies.swings || meetings.size() < 2) return;
+    if (!step.motion.bodies().swings || meetings.size() < 2) return;
     meetings_of_.clear();
     for (std::size_t at = 0; at < meetings.size(); ++at)
         for (const int b : {pairs[meetings[at].open].first, pairs[meetings[at].open].second})
-            if (bodies.moves(b)) meetings_of_.push_back({b, meetings[at].time, at});
+            if (step.motion.bodies().moves(b)) meetings_of_.push_back({b, meetings[at].time, at});
     std::sort(meetings_of_.begin(), meetings_of_.end(), [](const MeetingOf& a, const MeetingOf& b) {
         return a.body != b.body ? a.body < b.body : a.time != b.time ? a.time < b.time : a.at < b.at;
     });
@@ -211,7 +207,7 @@ void InternalEdges::remove_occluded(const SearchedStep& step, const LargeArray<O
                 const int body = meetings_of_[from].body;
                 const OpenPair &one = pairs[earlier.open], &other = pairs[later.open];
                 if (occludes(step, one, earlier.time, other, later.time, body, velocity)) later.time = -1.0;
-                else if (later.time - earlier.time < simultaneous * step.motion.model().options.time_step &&
+                else if (later.time - earlier.time < simultaneous * step.motion.options().time_step &&
                          occludes(step, other, later.time, one, earlier.time, body, velocity))
                     earlier.time = -1.0;
             }
@@ -232,7 +228,7 @@ bool InternalEdges::is_grazing(const SearchedStep& step, const StepContact& poin
     const int a = contact.first, b = contact.second;
     const Mover first = step.mover(open.pair.first, step.motion.poses[a], step.motion.velocity),
                 second = step.mover(open.pair.second, step.motion.poses[b], step.motion.velocity);
-    return time_of_impact(first, second, step.motion.model().options.time_step, slop(step, open)) < 0.0 ||
+    return time_of_impact(first, second, step.motion.options().time_step, slop(step, open)) < 0.0 ||
            is_internal_edge(step, first, a, second, open, cast, 0.0, contact.point.normal) ||
            is_internal_edge(step, second, b, first, open, cast, 0.0, contact.point.normal);
 }

@@ -1,7 +1,9 @@
 // Which bodies are connected by rows.
 #pragma once
 
+#include <algorithm>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "contacts/pivot_system.hpp"
@@ -16,6 +18,7 @@ struct Islands {
         int first, second;
         bool operator==(const Tie&) const = default;
     };
+    int of(const RowBlock& block) const noexcept { return of_body[std::max(block.first, block.second)]; }
     std::vector<int> of_body;
     int count = 0;
 };
@@ -37,6 +40,7 @@ public:
         const Islands::Tie own{first, second};
         if (ties_.empty() || ties_.back() != own) ties_.push_back(own);  // of a pair's points one says all
     }
+    void tie(std::pair<int, int> bodies) { tie(bodies.first, bodies.second); }
     /// A tie per block of rows, and one for each body beyond its first two: one of the first two always moves by itself.
     void tie(const RowBlock& block);
     const Islands& find();

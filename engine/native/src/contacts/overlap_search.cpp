@@ -87,11 +87,7 @@ double OverlapSearch::look(const StepEnd& at, double margin, const std::vector<c
             most_compression = std::max(most_compression, cache[end].compression);
             overlapped = overlapped || cache[end].contact.point.gap < -rounding;
         }
-        if (from + ahead < cache.size()) {
-            const Contact& later = cache[from + ahead].contact;
-            for (const int body : {later.first, later.second})
-                prefetch(at.poses[body]), prefetch(at.begun[body]);
-        }
+        if (from + ahead < cache.size()) prefetch_bodies(cache[from + ahead].contact, at.poses, at.begun);
         if (!is_among(reconsidered, a, b)) continue;
         const auto is_still = [&] { return !overlapped && way(a, at) + way(b, at) < 0.1 * rounding; };
         if (margin == 0.0 && is_still()) continue;

@@ -1,6 +1,7 @@
 #include "contacts/position_projection.hpp"
 
 #include <algorithm>
+#include <tuple>
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/tolerances.hpp"
@@ -168,9 +169,7 @@ double PositionProjector::separation_speed(const PenetrationRecord& record, cons
 /// their bodies would break, joints and the ground are added.
 void PositionProjector::note_projected(const StepEnd& end, const ExternalDrive& drive) {
     for (const CachedContact& cached : end.cache.points)
-        if (cached.pushes())
-            pushed_.tie(model_->bodies.solver_index[cached.contact.first],
-                        model_->bodies.solver_index[cached.contact.second]);
+        if (cached.pushes()) pushed_.tie(model_->bodies.solver_pair(cached.contact));
     for (const RowBlock& block : system_.rows) pushed_.tie(block);
     projection_.velocity = system_.velocity;
     projection_.islands = pushed_.find();
@@ -184,8 +183,7 @@ void PositionProjector::note_projected(const StepEnd& end, const ExternalDrive& 
     projection_.overlap.assign(projection_.islands.count, 0.0);
     projection_.overlap_before.assign(projection_.islands.count, 0.0);
     const auto island = [this](const Contact& contact) {
-        return projection_.islands.of_body[std::max(model_->bodies.solver_index[contact.first],
-                                                    model_->bodies.solver_index[contact.second])];
+        return projection_.islands.of_body[model_->bodies.solver_body(contact)];
     };
     for (const CachedContact& cached : end.cache.points) {
         const int k = island(cached.contact);
@@ -208,8 +206,7 @@ bool PositionProjector::project_directly(const DepthOfPair& given, bool again, C
     for (const PenetrationRecord& record : search_.records) {
         answered_.push_back(!(separation_speed(record, given, again) > 0.0));
         RowBlock block;
-        block.first = model_->bodies.solver_index[record.contact.first];
-        block.second = model_->bodies.solver_index[record.contact.second];
+        std::tie(block.first, block.second) = model_->bodies.solver_pair(record.contact);
         block.size = 1;
         const Vec3 normal = record.contact.point.normal;
         if (block.first >= 0) block.first_jacobian[0] = contact_row(normal, record.first_arm);
@@ -245,8 +242,7 @@ bool PositionProjector::project_by_pgs(const PgsSolver& beside, const DepthOfPai
     for (std::size_t k = 0; k < search_.records.size(); ++k) {
         const PenetrationRecord& record = search_.records[k];
         PgsContact row;
-        row.first = model_->bodies.solver_index[record.contact.first];
-        row.second = model_->bodies.solver_index[record.contact.second];
+        std::tie(row.first, row.second) = model_->bodies.solver_pair(record.contact);
         row.normal = record.contact.point.normal;
         row.first_arm = record.first_arm;
         row.second_arm = record.second_arm;
@@ -261,9 +257,7 @@ bool PositionProjector::project_by_pgs(const PgsSolver& beside, const DepthOfPai
     pgs_.write(projection);
     for (std::size_t k = 0; k < search_.records.size(); ++k) {
         const Contact& contact = search_.records[k].contact;
-        if (pgs_.impulse(static_cast<int>(k))[0] != 0.0)
-            pushed_.tie(model_->bodies.solver_index[contact.first],
-                        model_->bodies.solver_index[contact.second]);
+        if (pgs_.impulse(static_cast<int>(k))[0] != 0.0) pushed_.tie(model_->bodies.solver_pair(contact));
     }
     return true;
 }

@@ -9,8 +9,8 @@ namespace spook {
 const FrictionReport& RestingSolver::solve(MixedSystem& system, std::size_t joints, const IslandRules& rules,
                                            bool again, const StepMotion& motion, ContactPoints& points,
                                            ContactCounters& counters) {
-    const ContactBodies& bodies = motion.model().bodies;
-    const ContactOptions& options = motion.model().options;
+    const ContactBodies& bodies = motion.bodies();
+    const ContactOptions& options = motion.options();
     islands_.floor = options.floor;
     islands_.refinements = options.refinements;
     const ContactRows rows{motion, points};
@@ -66,7 +66,7 @@ SolveQuality RestingSolver::deliver(MixedSystem& system, std::size_t joints, con
     cache.clear();
     for (std::size_t k = 0; k < points.all.size(); ++k) {
         StepContact& point = points.all[k];
-        const Vec3 along = store_solution(step.motion.model().bodies, system.rows[joints + k], points, point);
+        const Vec3 along = store_solution(step.motion.bodies(), system.rows[joints + k], points, point);
         CachedContact& cached = cache_contact(rows, system, point, point.normal, along, cache);
         counters.stopped += step.motion.is_stopped(point, point.normal);
         std::copy_n(points.extras(point).turning, 3, cached.turning);

@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "contacts/contact_points.hpp"
-#include "contacts/energy_limit.hpp"
 #include "contacts/solve_islands.hpp"
 #include "contacts/solve_quality.hpp"
 #include "contacts/step_motion.hpp"

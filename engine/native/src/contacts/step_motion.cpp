@@ -96,16 +96,6 @@ Pose StepMotion::moved(int b, const std::vector<Vec6>& along) const {
     return pose;
 }
 
-void StepMotion::measure(StepContact& point) const {
-    point.approach = relative_velocity(point, point.contact.point.normal, velocity);
-    point.dv_ext = relative_velocity(point, point.contact.point.normal, dv_ext);
-}
-
-double StepMotion::time_left(const StepContact& point) const noexcept {
-    const double h = model_->options.time_step;
-    return point.event ? std::max(h - point.toi, 1e-3 * h) : h;
-}
-
 double StepMotion::surface_speed(const StepContact& point, Vec3 direction) const noexcept {
     const ContactSurfaces& surfaces = model_->surfaces;
     if (!surfaces.conveys) return 0.0;

@@ -1,6 +1,7 @@
 // Bodies on their way through a step: where they begin it and how fast, and which part of its forces has acted on each.
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <vector>
 
@@ -22,6 +23,9 @@ struct StepMotion {
     void predict(const std::vector<Vec6>& free_velocity);
 
     const ContactModel& model() const noexcept { return *model_; }
+    const ContactBodies& bodies() const noexcept { return model_->bodies; }
+    const ContactSurfaces& surfaces() const noexcept { return model_->surfaces; }
+    const ContactOptions& options() const noexcept { return model_->options; }
     bool is_free(std::size_t b) const noexcept { return !supported[b] && !model_->bodies.jointed[b]; }
     /// Whether a body that is supported, or jointed, moves along the forces.
     bool moves_along_forces(int body) const;
@@ -45,9 +49,15 @@ struct StepMotion {
     /// Where a body begins its way of this step. An event's bodies have gone part of it with another velocity.
     Pose moved(int body, const std::vector<Vec6>& along) const;
     /// Approach and push, from the current velocities.
-    void measure(StepContact& point) const;
+    void measure(StepContact& point) const {
+        point.approach = relative_velocity(point, point.contact.point.normal, velocity);
+        point.dv_ext = relative_velocity(point, point.contact.point.normal, dv_ext);
+    }
     /// What is left of the step after a point's event, s.
-    double time_left(const StepContact& point) const noexcept;
+    double time_left(const StepContact& point) const noexcept {
+        const double h = model_->options.time_step;
+        return point.event ? std::max(h - point.toi, 1e-3 * h) : h;
+    }
     /// How fast the surfaces move along themselves, the first against the second, along `direction`, m/s.
     double surface_speed(const StepContact& point, Vec3 direction) const noexcept;
     /// Whether a point that is to rebound was stopped instead, faster than a fall in a step.

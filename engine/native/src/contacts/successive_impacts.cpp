@@ -14,11 +14,10 @@ void SuccessiveImpacts::begin(const ContactModel& model) {
 
 /// How far a body has come since the step began, at a time from when on nothing has hit it.
 Vec6 SuccessiveImpacts::path_until(const StepMotion& motion, std::size_t body, double time) const {
-    const ContactBodies& bodies = motion.model().bodies;
-    if (!bodies.moves(body)) return sum(Vec6{}, motion.drive.prescribed()[body], time);
+    if (!motion.bodies().moves(body)) return sum(Vec6{}, motion.drive.prescribed()[body], time);
     const double on = time - clock_[body];
     const Vec6 way = sum(path_[body], motion.velocity[body], on);
-    return motion.supported[body] || bodies.jointed[body] ? way : sum(way, motion.dv_ext[body], on);
+    return motion.supported[body] || motion.bodies().jointed[body] ? way : sum(way, motion.dv_ext[body], on);
 }
 
 /// The gap of a point at that time, with both bodies on their ways.
@@ -36,19 +35,18 @@ double SuccessiveImpacts::last_impact_time(const StepContact& point) const noexc
 
 /// When a point that is approached closes, s. Forces are part of the ways: what they slow closes later.
 double SuccessiveImpacts::closing_time(const StepMotion& motion, const StepContact& point) const {
-    const ContactOptions& options = motion.model().options;
     const double from = last_impact_time(point), gap = std::max(0.0, gap_at(motion, point, from));
     if (gap == 0.0) return from;
-    const double speed = (gap - gap_at(motion, point, from + options.time_step)) / options.time_step;
+    const double speed =
+        (gap - gap_at(motion, point, from + motion.options().time_step)) / motion.options().time_step;
     return from + gap / (speed > 0.0 ? speed : -point.approach);
 }
 
 void SuccessiveImpacts::move_to_last_impact(const StepMotion& motion, StepContact& point) const {
-    const ContactBodies& bodies = motion.model().bodies;
     for (const int body : {point.contact.first, point.contact.second})
-        if (bodies.moves(body) && motion.event_time[body] < 0.0) return;
+        if (motion.bodies().moves(body) && motion.event_time[body] < 0.0) return;
     const double time = last_impact_time(point), gap = gap_at(motion, point, time);
-    if (point.toi < 0.0 && bodies.is_closed(point.contact, gap)) return;
+    if (point.toi < 0.0 && motion.bodies().is_closed(point.contact, gap)) return;
     point.event = true;
     point.toi = time;
     point.contact.point.gap = std::max(0.0, gap);
@@ -58,13 +56,13 @@ void SuccessiveImpacts::move_to_last_impact(const StepMotion& motion, StepContac
 /// until then is lost on the way back.
 void SuccessiveImpacts::apply_forces_before(std::size_t b, double part, StepMotion& motion,
                                             MixedSystem& system) {
-    const ContactBodies& bodies = motion.model().bodies;
     if (motion.supported[b] || !(part > motion.toi_fraction[b])) return;
     const Vec6 more = sum(Vec6{}, motion.whole_dv_ext[b], part - motion.toi_fraction[b]);
     motion.apply_forces_until(b, part);
-    const Mat6& mass = system.mass[bodies.solver_index[b]];
+    const Mat6& mass = system.mass[motion.bodies().solver_index[b]];
     for (int i = 0; i < 6; ++i)
-        for (int j = 0; j < 6; ++j) system.momentum[bodies.solver_index[b]][i] += mass[6 * i + j] * more[j];
+        for (int j = 0; j < 6; ++j)
+            system.momentum[motion.bodies().solver_index[b]][i] += mass[6 * i + j] * more[j];
 }
 
 bool SuccessiveImpacts::come_in_order(const ContactModel& model, const StepContact& point) const {
@@ -79,9 +77,9 @@ bool SuccessiveImpacts::come_in_order(const ContactModel& model, const StepConta
 /// alone touches when the next impact comes. Then there is nothing that all of them could take part in.
 void SuccessiveImpacts::find_orderly(const Islands& islands, const StepMotion& motion,
                                      const ContactPoints& points) {
-    const ContactBodies& bodies = motion.model().bodies;
+    const ContactBodies& bodies = motion.bodies();
     orderly_.assign(islands.count, 1);
-    if (motion.model().options.impacts == ImpactOrder::successive) return;
+    if (motion.options().impacts == ImpactOrder::successive) return;
     pairs_.assign(islands.count, 0);
     const auto island = [&](std::size_t b) {
         return bodies.moves(b) ? islands.of_body[bodies.solver_index[b]] : -1;
@@ -99,7 +97,7 @@ void SuccessiveImpacts::find_orderly(const Islands& islands, const StepMotion& m
             continue;
         const std::uint64_t pair = pair_of(point.contact) + 1;
         const bool another = pairs_[own] != 0 && pairs_[own] != pair;
-        if (another || !(motion.model().surfaces.pair(point.contact).restitution > 0.0)) orderly_[own] = 0;
+        if (another || !(motion.surfaces().pair(point.contact).restitution > 0.0)) orderly_[own] = 0;
         pairs_[own] = pair;
     }
     for (std::size_t b = 0; b < bodies.count(); ++b)
@@ -110,14 +108,11 @@ void SuccessiveImpacts::find_orderly(const Islands& islands, const StepMotion& m
 
 void SuccessiveImpacts::find_earliest(MixedSystem& system, const OpenPairs& open_pairs, StepMotion& motion,
                                       ContactPoints& points, std::vector<std::size_t>& hit_points) {
-    const ContactBodies& bodies = motion.model().bodies;
-    const ContactOptions& options = motion.model().options;
-    const ContactSurfaces& surfaces = motion.model().surfaces;
+    const ContactBodies& bodies = motion.bodies();
     connected_.begin(system, system.rows.size());
     points.tie(bodies, connected_);
     for (const OpenPair& open : open_pairs.pairs)
-        if (!open.has_met())
-            connected_.tie(bodies.solver_index[open.first], bodies.solver_index[open.second]);
+        if (!open.has_met()) connected_.tie(bodies.solver_pair(open));
     const Islands& islands = connected_.find();
     const auto is_impact = [](const StepContact& point) {
         return point.bounce >= 0.0 && point.approach < -point.rounding;
@@ -153,12 +148,14 @@ void SuccessiveImpacts::find_earliest(MixedSystem& system, const OpenPairs& open
     for (std::size_t b = 0; b < bodies.count(); ++b) {
         const int own = island(b);
         if (own < 0 || first_[own] == unbounded || !orderly_[own]) continue;
-        if (const double time = std::min(first_[own], options.time_step); hit_[b] && time > clock_[b]) {
+        if (const double time = std::min(first_[own], motion.options().time_step);
+            hit_[b] && time > clock_[b]) {
             path_[b] = path_until(motion, b, time);
             clock_[b] = time;
             if (balls_[own])
-                apply_forces_before(b, part_of_forces(time / options.time_step, surfaces.rebounds), motion,
-                                    system);
+                apply_forces_before(
+                    b, part_of_forces(time / motion.options().time_step, motion.surfaces().rebounds), motion,
+                    system);
         }
         if (!balls_[own] || motion.moves_along_forces(static_cast<int>(b))) continue;
         motion.event_time[b] = clock_[b];
@@ -170,7 +167,7 @@ void SuccessiveImpacts::find_earliest(MixedSystem& system, const OpenPairs& open
         StepContact& point = points.all[k];
         point.approach = relative_velocity(point, point.contact.point.normal, motion.velocity);
         if (point.event && come_in_order(motion.model(), point))
-            point.bounce = surfaces.pair(point.contact).restitution;
+            point.bounce = motion.surfaces().pair(point.contact).restitution;
     }
 }
 

@@ -90,8 +90,7 @@ void SupportedBodies::book(const MixedSystem& system, const Islands& islands, co
         if (impulse_dv_[b] == Vec6{}) continue;
         const Vec3 momentum = system.mass[bodies.solver_index[b]][0] * linear(impulse_dv_[b]);
         for (CachedContact& cached : cache) {
-            const int first = bodies.solver_index[cached.contact.first],
-                      second = bodies.solver_index[cached.contact.second];
+            const auto [first, second] = bodies.solver_pair(cached.contact);
             if (std::min(first, second) >= 0 || !bodies.is_closed(cached.contact)) continue;
             if (islands.of_body[std::max(first, second)] != islands.of_body[bodies.solver_index[b]]) continue;
             cached.impulse += first >= 0 ? -momentum : momentum;

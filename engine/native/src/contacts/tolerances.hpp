@@ -56,19 +56,17 @@ namespace tolerances::impact_solver {
 inline constexpr int simultaneous_rounds = 20;  // of impacts that follow from impacts in one step
 inline constexpr double gain = 1e-14;           // rise of kinetic energy that is rounding, relative
 inline constexpr double impact_compliance =
-    1e-3;  // of a point's own inverse inertia: what it gives way while an impact is shared
-inline constexpr int determined = 3;  // points of a pair whose normal impulses its motion fixes
-inline constexpr int most_again =
-    8;  // solves until the give is gone: each leaves about impact_compliance of it
-inline constexpr double left = 1e-16;      // of the fastest row: a give that is rounding
-inline constexpr double broken = 1e-6;     // of the fastest row: what a row may be short of
+    1e-3;                               // of a point's own inverse inertia: what it gives in a shared impact
+inline constexpr int determined = 3;    // points of a pair whose normal impulses its motion fixes
+inline constexpr int most_again = 8;    // solves until the give is gone: each leaves about that of it
+inline constexpr double left = 1e-16;   // of the fastest row: a give that is rounding
+inline constexpr double broken = 1e-6;  // of the fastest row: what a row may be short of
 inline constexpr double tolerated = 1e-9;  // of the fastest row: a give that need not be told
 }  // namespace tolerances::impact_solver
 
 // Read by several parts
-inline constexpr std::size_t few_rows = 24;  // blocks: so many are solved directly at little cost
-inline constexpr std::size_t few_jointed =
-    64;  // the same of joints and contacts that iterations leave unsettled
+inline constexpr std::size_t few_rows = 24;     // blocks: so many are solved directly at little cost
+inline constexpr std::size_t few_jointed = 64;  // the same where joints are left unsettled
 
 // contact_judge.cpp
 namespace tolerances::contact_judge {
@@ -77,23 +75,19 @@ inline constexpr double sunk = 0.02;  // of the smaller body's radius: an overla
 
 // impact_events.cpp
 namespace tolerances::impact_events {
-inline constexpr std::size_t event_bodies =
-    8;  // a larger island is not moved to the time of one impact in it
+inline constexpr std::size_t event_bodies = 8;  // larger islands keep to the step's start
 }
 
 // contact_pgs.cpp
 namespace tolerances::contact_pgs {
 inline constexpr double too_much = 1e6;  // times the energy there is
-inline constexpr double focus =
-    0.5;  // of the residual allowed: contacts that change less are unfinished alone then
+inline constexpr double focus = 0.5;     // of the residual allowed: what changes more goes on
 }  // namespace tolerances::contact_pgs
 
 // contact_stage.cpp
 namespace tolerances::contact_stage {
-inline constexpr std::size_t not_too_large =
-    500;  // row blocks: so many are solved directly where iterations ran away
-inline constexpr int late_rounds =
-    64;  // of solves that set others in motion towards a third: each finds pairs anew
+inline constexpr std::size_t not_too_large = 500;  // row blocks: solved directly after a run-away
+inline constexpr int late_rounds = 64;             // of solves: each sets others in motion
 }  // namespace tolerances::contact_stage
 
 // contact_turning.cpp
@@ -111,11 +105,10 @@ inline constexpr double falling = 0.1;    // of the residual before: worth anoth
 inline constexpr double loosest = 1e-6;   // the same, after 25 rounds
 inline constexpr double direction_hysteresis =
     0.01;  // of a stuck point at the disc's edge to leave the direction it was turned to
-inline constexpr std::size_t few_blocks =
-    24;                                 // up to so many pivoting shares redundant loads evenly at little cost
-inline constexpr int plain_rounds = 3;  // most systems settle within these
-inline constexpr double poor = 1e-4;    // a residual, of the speeds: beyond it another way is tried
-inline constexpr double fair = 1e-9;    // one that is an answer
+inline constexpr std::size_t few_blocks = 24;  // pivoting shares their loads evenly at little cost
+inline constexpr int plain_rounds = 3;         // most systems settle within these
+inline constexpr double poor = 1e-4;           // a residual, of the speeds: beyond it another way is tried
+inline constexpr double fair = 1e-9;           // one that is an answer
 inline constexpr double near = 1e-6,
                         redundant_near =
                             3e-5;  // residuals, of the speeds: answers; the second where points are redundant
@@ -142,12 +135,9 @@ inline constexpr double same_face_cosine = 0.9;  // cosine of normals: what both
 inline constexpr std::size_t max_earlier = 8;    // of the meetings of a body, that may occlude later ones
 inline constexpr double simultaneous = 0.05;     // of a step: which of two meetings comes first is not known
 inline constexpr double same_direction_cosine = 1.0 - 1e-12;  // the same of one face met twice
-inline constexpr double free_fall_allowance =
-    3.0;  // of a fall in a step: what sinks before iterations hold it
-inline constexpr double residual_motion =
-    10.0;  // of that overlap: what they leave of motion where all is at rest
-inline constexpr double side_cosine =
-    0.5;  // cosine of the normal of a meeting: no more of it is along what holds
+inline constexpr double free_fall_allowance = 3.0;  // of a fall in a step, before iterations hold it
+inline constexpr double residual_motion = 10.0;     // of that overlap: what they leave of motion at rest
+inline constexpr double side_cosine = 0.5;          // of the normal of a meeting with what holds
 }  // namespace tolerances::internal_edges
 
 // overlap_search.cpp
@@ -173,11 +163,10 @@ inline constexpr int late_rounds = 3;            // of iterations for contacts f
 inline constexpr double skip_cost = 1.0 / 16.0;  // of what iterating a contact costs: to see that it is cold
 inline constexpr double residual_cost = 0.5;     // the same: to see how far off it is
 inline constexpr std::size_t bodies_ahead = 6, contacts_ahead = 12;  // asked for while others are updated
-inline constexpr double few_off =
-    1.0 / 16.0;                           // of the contacts are further off than the next iterations care for
-inline constexpr double nearly = 0.9;     // of what is allowed: then they care for what is that far off
-inline constexpr double few_left = 0.75;  // of the contacts in the list: a shorter one is made
-inline constexpr int plain_iterations = 2;  // the last ones, which are not over-relaxed
+inline constexpr double few_off = 1.0 / 16.0;  // of contacts that are further off than is cared for
+inline constexpr double nearly = 0.9;          // of what is allowed: then they care for what is that far off
+inline constexpr double few_left = 0.75;       // of the contacts in the list: a shorter one is made
+inline constexpr int plain_iterations = 2;     // the last ones, which are not over-relaxed
 }  // namespace tolerances::pgs_solver
 
 // pivot_solver.cpp
@@ -194,25 +183,22 @@ inline constexpr std::size_t most_kept_rows = 256;  // blocks: larger systems ha
 
 // position_projection.cpp
 namespace tolerances::position_projection {
-inline constexpr double contact_compliance_share =
-    1e-3;  // what a contact of jointed bodies yields, of 1/m of all that moves with them
-inline constexpr double joint_compliance_share = 1e-6;  // and a joint, of its row's own inertia
-inline constexpr double joint_share = 1e-3;             // and of what the contacts do
+inline constexpr double contact_compliance_share = 1e-3;  // of 1/m of all that is jointed to it
+inline constexpr double joint_compliance_share = 1e-6;    // and a joint, of its row's own inertia
+inline constexpr double joint_share = 1e-3;               // and of what the contacts do
 inline constexpr double min_joint_compliance =
-    1e-12;  // of its row's own inertia: repeated joints share a load by it
-inline constexpr double parted =
-    0.01;  // of the slack: what a projection leaves is rounding, and is not parted again
+    1e-12;                                       // of its row's own inertia: repeated joints share by it
+inline constexpr double parted = 0.01;           // of the slack: what a projection leaves is rounding
 inline constexpr double over_relaxation = 1.25;  // of PGS that separates balls, not boxes
 inline constexpr double same_place = 0.1;        // of the larger body's radius: one point, seen again
 }  // namespace tolerances::position_projection
 
 // reduced_contacts.cpp
 namespace tolerances::reduced_contacts {
-inline constexpr double exact = 1e-14;  // a residual, of the speeds in the system: rounding
-inline constexpr double good = 1e-11;   // one that is an answer
-inline constexpr int rounds = 3;        // of iterations and Newton's method
-inline constexpr double held =
-    1e-10;  // of what a row moves without joints: joints hold it, and no impulse there does anything
+inline constexpr double exact = 1e-14;            // a residual, of the speeds in the system: rounding
+inline constexpr double good = 1e-11;             // one that is an answer
+inline constexpr int rounds = 3;                  // of iterations and Newton's method
+inline constexpr double held = 1e-10;             // of what a row moves without joints: joints hold it
 inline constexpr int passes = 3;                  // measured anew with the true equations
 inline constexpr double floor_of_pivots = 1e-12;  // of the largest: smaller ones are redundant rows
 inline constexpr int refinements_of_floored = 2;  // what the factor lacks there is found against the matrix
@@ -222,21 +208,17 @@ inline constexpr int refinements_of_floored = 2;  // what the factor lacks there
 namespace tolerances::reduced_newton {
 inline constexpr int polish_steps = 24;  // of Newton, at most
 inline constexpr int patience = 8;       // steps without half the best residual: those that end do so sooner
-inline constexpr double relief =
-    1e-9;  // of a row's own entry of W, in Newton's matrix only: redundant points
+inline constexpr double relief = 1e-9;   // of a row's own entry of W, in Newton's matrix only
 }  // namespace tolerances::reduced_newton
 
 // solve_by_pgs.cpp
 namespace tolerances::solve_by_pgs {
-inline constexpr int most_turns =
-    16;  // times the work of `iterations`, where a step would be unsettled otherwise
-inline constexpr int joint_turns =
-    4;  // the same where a joint is furthest off: all of them are updated each time
+inline constexpr int most_turns = 16;              // times `iterations`, where a step would be unsettled
+inline constexpr int joint_turns = 4;              // the same where a joint is furthest off
 inline constexpr int warm_start_iterations = 100;  // at most, before points found late are solved for
 inline constexpr double warm_started = 1e-6;       // of the speeds: what changes less is
-inline constexpr std::size_t few_points =
-    100;                               // points of an island: so many are solved for again at less cost
-inline constexpr int many_rounds = 8;  //   unless that has been done so often
+inline constexpr std::size_t few_points = 100;     // of an island: solved for again at less cost
+inline constexpr int many_rounds = 8;              //   unless that has been done so often
 }  // namespace tolerances::solve_by_pgs
 
 // supported_bodies.cpp

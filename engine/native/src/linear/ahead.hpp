@@ -15,4 +15,10 @@ template <class T> void prefetch(const T& what) noexcept {
     for (std::size_t byte = 0; byte < sizeof(what); byte += 64) __builtin_prefetch(at + byte);
 }
 
+/// The same of the bodies of such a pair, in arrays of all bodies.
+template <class Pair, class... Arrays>
+void prefetch_bodies(const Pair& later, const Arrays&... arrays) noexcept {
+    for (const int body : {later.first, later.second}) (prefetch(arrays[body]), ...);
+}
+
 }  // namespace spook

@@ -20,6 +20,10 @@ class BlockLdlt {
 public:
     struct Counters {  // exact, equal on every machine
         std::uint64_t factorisations = 0, block_operations = 0, floored_pivots = 0, solves = 0;
+        void add(const Counters& more) noexcept {
+            factorisations += more.factorisations, block_operations += more.block_operations;
+            floored_pivots += more.floored_pivots, solves += more.solves;
+        }
     };
 
     /// sizes[i] in 1 … 6; edges are the non-zero blocks off the diagonal, first < second, each pair once;

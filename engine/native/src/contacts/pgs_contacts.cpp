@@ -1,8 +1,14 @@
-// What iterations read, laid out as they read it: bodies in a line each, contacts one behind the other.
+#include "contacts/pgs_contacts.hpp"
+
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "contacts/contact_geometry.hpp"
-#include "contacts/pgs_solver.hpp"
+#include "contacts/disc.hpp"
+
+#define SPOOK_ISA single
+#include "contacts/pgs_contact.inl"
 
 namespace spook {
 
@@ -17,9 +23,34 @@ PgsInertia inverse_inertia(const Mat6& mass) noexcept {
     return {s * A, s * B, s * C, s * D, s * E, s * F};
 }
 
+Vec3 add_turn(const Vec6& v, Vec3 arm) noexcept { return linear(v) + cross(angular(v), arm); }
+
+/// Friction whose two directions differ in scale, solved exactly.
+struct AnisotropicDisc {
+    const double* own;
+    double operator()(double step, double b1, double b2, double s1, double s2, double bound, double& d1,
+                      double& d2) const {
+        double z1 = b1 - step * s1, z2 = b2 - step * s2;
+        least_on_disc(own, b1, b2, s1, s2, bound, z1, z2);
+        d1 = z1 - b1, d2 = z2 - b2;
+        return length(d1, d2) / step;
+    }
+};
+
+/// Each direction by itself.
+struct Square {
+    const double* own;
+    double operator()(double, double b1, double b2, double s1, double s2, double bound, double& d1,
+                      double& d2) const {
+        d1 = std::clamp(b1 - s1 / own[0], -bound, bound) - b1;
+        d2 = std::clamp(b2 - (s2 + own[1] * d1) / own[2], -bound, bound) - b2;
+        return larger(std::abs(d1) * own[0], std::abs(d2) * own[2]);
+    }
+};
+
 }  // namespace
 
-void PgsSolver::start(MixedSystem& system, FrictionModel model) {
+void PgsContacts::begin(MixedSystem& system, FrictionModel model) {
     bodies_ = static_cast<int>(system.mass.size());
     inertia_.resize(bodies_ + 1);
     round_ = true;
@@ -35,11 +66,11 @@ void PgsSolver::start(MixedSystem& system, FrictionModel model) {
         body(b).round = inertia_[b].xx;
     }
     relaxation_ = 1.0;
-    begin(system, model);
+    take_momenta(system, model);
 }
 
-void PgsSolver::start_beside(const PgsSolver& other, MixedSystem& system, FrictionModel model,
-                             double relaxation) {
+void PgsContacts::begin_beside(const PgsContacts& other, MixedSystem& system, FrictionModel model,
+                               double relaxation) {
     relaxation_ = relaxation;
     bodies_ = other.bodies_;
     round_ = other.round_;
@@ -50,17 +81,16 @@ void PgsSolver::start_beside(const PgsSolver& other, MixedSystem& system, Fricti
         body(b).inverse_mass = other.body(b).inverse_mass;
         body(b).round = other.body(b).round;
     }
-    begin(system, model);
+    take_momenta(system, model);
 }
 
-Vec3 PgsSolver::turned(int b, Vec3 moment) const noexcept {
+Vec3 PgsContacts::turned(int b, Vec3 moment) const noexcept {
     return round_ ? body(b).round * moment : inertia_[b].turn(moment);
 }
 
-void PgsSolver::begin(MixedSystem& system, FrictionModel model) {
+void PgsContacts::take_momenta(MixedSystem& system, FrictionModel model) {
     model_ = model;
-    joint_count_ = static_cast<int>(system.rows.size());
-    for (int b = 0; b < bodies_ && joint_count_ == 0; ++b) {
+    for (int b = 0; b < bodies_ && system.rows.empty(); ++b) {
         const Vec6& p = system.momentum[b];
         const Vec3 v = body(b).inverse_mass * linear(p), w = turned(b, angular(p));
         body(b).velocity = {v.x, v.y, v.z, w.x, w.y, w.z};
@@ -70,46 +100,10 @@ void PgsSolver::begin(MixedSystem& system, FrictionModel model) {
     slips_.clear();
     extras_.clear();
     boxes_.clear();
-    place_.clear();
-    added_ = 0;
-    sets_.begin(static_cast<std::size_t>(bodies_) + 1);
-    active_.assign(bodies_ + 1, 0);
-    limit_reached_.assign(bodies_ + 1, 0);
-    last_change_.assign(bodies_ + 1, 0.0);
-    now_.change.assign(bodies_ + 1, 0.0);
-    now_.moved.clear();
-    now_.moved.reserve(bodies_);
-    now_.none.first = now_.none.second = bodies_;
-    bodies_of_.clear();
-    roots_.clear();
-    known_.assign(bodies_ + 1, 0);
-    scheduled_ = listed_ = sized_ = 0;
-    order_.clear();
-    level_end_.clear();
-    started_ = joined_ = false;
-    done_ = 0.0;
-    active_bodies_.assign(bodies_ + 1, 0);
-    touched_.assign(bodies_ + 1, 0);
-    all_touched_ = true;
-    for (int k = 0; k < joint_count_; ++k) {
-        const RowBlock& rows = system.rows[k];
-        int anchor = std::max(rows.first, rows.second);
-        for (const FurtherBody& other : rows.further) {
-            if (anchor < 0) anchor = other.body;
-            else if (other.body >= 0) join(anchor, other.body);
-        }
-        link(anchor, anchor == rows.first ? rows.second : rows.first);
-    }
+    none_.first = none_.second = bodies_;
 }
 
-int PgsSolver::add(const PgsContact& given) {
-    const int contact = added_++;
-    if (bodies_of_.size() == static_cast<std::size_t>(joint_count_) + static_cast<std::size_t>(contact)) {
-        link(given.first, given.second);
-        place_.push_back(contact);
-        contacts_.emplace_back();
-    }
-    const int place = place_[contact];
+void PgsContacts::put(const PgsContact& given, int place) {
     PackedContact& c = contacts_[place];
     c.first = given.first >= 0 ? given.first : bodies_;
     c.second = given.second >= 0 ? given.second : bodies_;
@@ -131,19 +125,10 @@ int PgsSolver::add(const PgsContact& given) {
     if (given.friction > 0.0 || given.softness != 0.0 || !slips_.empty() || model_ != FrictionModel::cone)
         add_slip(given, place);
     if (c.impulse[0] != 0.0 || c.impulse[1] != 0.0 || c.impulse[2] != 0.0) push(c, impulse);
-    activate(c.first, c.second);
-    touch(c.first);
-    touch(c.second);
-    return contact;
-}
-
-void PgsSolver::arrange() {
-    if (scheduled_ < bodies_of_.size()) schedule();
-    contacts_.resize(place_.size());
 }
 
 /// What else a contact has, and for the others that they have none of it.
-void PgsSolver::add_slip(const PgsContact& given, int place) {
+void PgsContacts::add_slip(const PgsContact& given, int place) {
     const PackedContact& c = contacts_[place];
     slips_.resize(contacts_.size());
     PackedFriction& slip = slips_[place];
@@ -193,23 +178,59 @@ void PgsSolver::add_slip(const PgsContact& given, int place) {
     boxes_[place] = box;
 }
 
-void PgsSolver::push(const PackedContact& c, Vec3 impulse) noexcept {
-    PgsBody &one = body(c.first), &two = body(c.second);
-    Vec6 &v = one.velocity, &w = two.velocity;
-    const Vec3 turn = turned(c.first, cross(c.first_arm, impulse)),
-               back = turned(c.second, cross(c.second_arm, impulse));
-    v[0] += one.inverse_mass * impulse.x;
-    v[1] += one.inverse_mass * impulse.y;
-    v[2] += one.inverse_mass * impulse.z;
-    v[3] += turn.x;
-    v[4] += turn.y;
-    v[5] += turn.z;
-    w[0] -= two.inverse_mass * impulse.x;
-    w[1] -= two.inverse_mass * impulse.y;
-    w[2] -= two.inverse_mass * impulse.z;
-    w[3] -= back.x;
-    w[4] -= back.y;
-    w[5] -= back.z;
+void PgsContacts::push(const PackedContact& c, Vec3 impulse) noexcept {
+    const auto act = [this](int at, Vec3 arm, Vec3 pushed) {
+        const Vec3 moved = body(at).inverse_mass * pushed, turn = turned(at, cross(arm, pushed));
+        const double change[6] = {moved.x, moved.y, moved.z, turn.x, turn.y, turn.z};
+        for (int i = 0; i < 6; ++i) body(at).velocity[i] += change[i];
+    };
+    act(c.first, c.first_arm, impulse);
+    act(c.second, c.second_arm, -impulse);
+}
+
+double PgsContacts::update(std::size_t place) noexcept {
+    const auto by = [&](const auto& law, bool box) {
+        return single::solve_contact<double>(
+            single::Single{contacts_[place], slips_.empty() ? no_slip_ : slips_[place],
+                           extras_.empty() ? nullptr : &extras_[place], joints_.bodies().data(),
+                           round_ ? nullptr : inertia_.data(), bodies_},
+            law, box);
+    };
+    if (boxes_.empty()) return by(single::Disc{}, false);
+    const Box& box = boxes_[place];
+    if (model_ != FrictionModel::cone) return by(Square{box.own}, model_ == FrictionModel::box);
+    return box.anisotropic ? by(AnisotropicDisc{box.own}, false) : by(single::Disc{}, false);
+}
+
+void PgsContacts::relax_no_more() {
+    if (std::exchange(relaxation_, 1.0) == 1.0) return;
+    for (PackedContact& c : contacts_) c.own_inverse = c.own > 0.0 ? 1.0 / c.own : 0.0;
+}
+
+double PgsContacts::residual(std::size_t k) const noexcept {
+    const PackedContact& c = contacts_[k];
+    const PackedExtras& extras = extras_.empty() ? no_extras_ : extras_[k];
+    const Vec3 u = add_turn(velocity(c.first), c.first_arm) - add_turn(velocity(c.second), c.second_arm);
+    const double w = dot(c.normal, u) + extras.softness * c.impulse[0] - c.right;
+    const double residual = w > 0.0 ? std::min(w, c.own * c.impulse[0]) : -w;
+    const PackedFriction& slip = slips_.empty() ? no_slip_ : slips_[k];
+    if (!(slip.friction > 0.0)) return residual;
+    const Vec3 across = extras_.empty() ? cross(c.normal, slip.tangent) : extras.across;
+    const double b1 = c.impulse[1], b2 = c.impulse[2];
+    const double s1 = dot(slip.tangent, u) + extras.slip_softness * b1 - extras.right_along;
+    const double s2 = dot(across, u) + extras.slip_softness * b2 - extras.right_across;
+    const double bound = slip.friction * (model_ == FrictionModel::box ? extras.normal_before : c.impulse[0]);
+    double z1 = b1 - slip.step * s1, z2 = b2 - slip.step * s2;
+    bool sticks = true;
+    if (model_ == FrictionModel::cone) {
+        const double reach = length(z1, z2);
+        sticks = reach <= bound;
+        if (!sticks) z1 *= bound / reach, z2 *= bound / reach;
+    } else {
+        sticks = std::abs(z1) <= bound && std::abs(z2) <= bound;
+        z1 = std::clamp(z1, -bound, bound), z2 = std::clamp(z2, -bound, bound);
+    }
+    return std::max(residual, sticks ? length(s1, s2) : length(b1 - z1, b2 - z2) / slip.step);
 }
 
 }  // namespace spook
