@@ -49,7 +49,8 @@ void PgsSolver::begin(const MixedSystem& system) {
 
 int PgsSolver::add(const PgsContact& given) {
     const int contact = added_++;
-    if (schedule_.items.size() == static_cast<std::size_t>(schedule_.joints + contact)) {
+    if (schedule_.items.size() ==
+        static_cast<std::size_t>(schedule_.joints) + static_cast<std::size_t>(contact)) {
         announce(given.first, given.second);
         schedule_.place.push_back(contact);
         contacts_.resize(contacts_.size() + 1);
