@@ -413,7 +413,7 @@ def test_a_dull_ball_comes_up_again_as_restitution_says(late: float) -> None:
 def test_a_slope_is_felt_that_unbalances_impulses_by_what_the_core_calls_balanced() -> None:
     """A step from velocities that stay: friction is the last step's, 2/7 of the pull; the rest of the pull is missing."""
     low, high = band("rolling_beats", "gentlest")
-    (pushes,) = re.findall(r"pushes = (\S+);", (CONTACTS / "friction_direct.cpp").read_text())
+    (pushes,) = re.findall(r"pushes = (\S+);", (CONTACTS / "contact_judge.cpp").read_text())
     assert float(pushes) == rolling_beats.SAME
     for slope, felt in ((0.999 * low, False), (high, True)):
         pull, load = math.sin(slope), math.cos(slope)

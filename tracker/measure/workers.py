@@ -95,13 +95,13 @@ def answers(
                 found = worker.look()
                 if found is None:
                     continue
-                piece, (answer,) = worker.piece, found
+                (answer,) = found
+                yield worker.piece, answer  # kept before the next is begun, whatever interrupts that
                 if left and not isinstance(answer, Lost):
                     worker.give(next_for(worker))
                 else:
                     crew.remove(worker)
                     worker.end()
-                yield piece, answer
     finally:
         for worker in crew:
             left_behind.end_group(worker.process.pid or 0)
