@@ -29,10 +29,6 @@ from spook_tracker.tracker.measure.timing import stage_seconds
 
 LIMIT = 60.0  # s of a run
 ROUNDS = 5
-FEWEST_ROUNDS, ROUNDS_BUDGET = (
-    3,
-    0.3,
-)  # s for all: longer ways are steadier, and a median of three forgets one
 SHORTEST = 4e-3  # s of a run: a clock and a call are a thousandth of it
 FEWEST_STEPS, MOST_STEPS = 20, 20_000
 COMPARED = 20  # steps after which the answers of both ways are laid beside each other
@@ -84,14 +80,10 @@ def leaving_out(test: ScalarTest, simulate: Simulate) -> LeavingOut | None:
     steps = _steps(example, simulate)
     ways: list[tuple[str, ...]] = [(), *((option,) for option in added), *([every] if len(every) > 1 else [])]
     runs = [example_run(example, steps, way) for way in ways]
-    whole: list[list[float]] = []
-    while len(whole) < ROUNDS and (
-        len(whole) < FEWEST_ROUNDS or sum(map(sum, whole)) * (1.0 + 1.0 / len(whole)) <= ROUNDS_BUDGET
-    ):
-        taken = [one for run in runs if (one := _once(run, simulate)) is not None]
-        if len(taken) < len(runs):
-            return None
-        whole.append(taken)
+    rounds = [[_once(run, simulate) for run in runs] for _ in range(ROUNDS)]
+    whole = [[one for one in taken if one is not None] for taken in rounds]
+    if any(len(taken) < len(runs) for taken in whole):
+        return None
     saved = {
         stage: max(0.0, float(np.median([taken[i] - taken[0] for taken in whole]))) / steps
         for i, stage in enumerate(added.values(), 1)
