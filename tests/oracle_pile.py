@@ -1,6 +1,6 @@
 """The pile of spheres by another law of contact: springs, dashpots and dragged friction in small steps, in NumPy.
 
-Nothing of the engine is in it but the scene. Contacts are soft (weights sink in by millimetres each) and blows lose nearly
+Nothing of the engine is in it but the scene. Contacts are soft (weights sink in by millimetres) and blows lose nearly
 all they have; friction drags at `DRAG` times the speed up to Coulomb's bound. Other stiffnesses give the same loads
 within what other starts do (`tests/test_scalar_tests_pile_limits.py`), which is what makes them a reference.
 """
@@ -12,9 +12,9 @@ from scipy.spatial import cKDTree
 
 from spook_tracker.scalar_tests import pile
 
-STEP = 2e-3  # s
-STIFFNESS = 5e3  # N/m
-DRAG = 50.0  # N s/m
+STEP = 1e-3  # s
+STIFFNESS = 2e4  # N/m
+DRAG = 100.0  # N s/m
 DAMPED = 0.9  # of the critical damping
 SKIN = 0.1  # m: pairs nearer than this beyond touching are looked at until a body has gone half of it
 ASIDE = 0.005  # m: how far another start is from the pile's own, and none overlaps yet

@@ -7,10 +7,13 @@ import subprocess
 from collections.abc import Mapping
 from pathlib import Path
 
+import pytest
+
 EXAMPLE = Path(__file__).resolve().parents[1] / "examples" / "pebble"
 AUTHOR = ("-c", "user.name=Ada Example", "-c", "user.email=ada@example.org")
 GRAVITY = "velocities[p] += time_step * gravity[p % 3];"
 BUILD = "mkdir -p build && c++ -O1 -shared -fPIC -o build/libpebble.so src/pebble.cpp"
+needs_compiler = pytest.mark.skipif(shutil.which("c++") is None, reason="no C++ compiler here")
 SETTINGS = f"""engine = "tracking.adapter"
 catalogue = "tracking.questions"
 database = "sqlite:///history.db"

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 yaml = pytest.importorskip("yaml", reason="PyYAML is not installed here")
-from tests.team_repository import BUILD, GRAVITY, git  # noqa: E402
+from tests.team_repository import BUILD, GRAVITY, git, needs_compiler  # noqa: E402
 from tests.workflow_service import Service  # noqa: E402 (needs yaml)
 
 ROOT = Path(__file__).resolve().parents[1]
@@ -102,7 +102,7 @@ class Team:
         return {name: len(lzma.decompress(content).splitlines()) for name, content in shown.items()}
 
 
-@pytest.mark.skipif(shutil.which("c++") is None, reason="no C++ compiler here")
+@needs_compiler
 def test_first_night_regression_pull_requests_and_recovery(tmp_path: Path) -> None:
     team = Team(tmp_path)
 
@@ -162,7 +162,7 @@ def test_first_night_regression_pull_requests_and_recovery(tmp_path: Path) -> No
     assert len(git(team.origin, "log", "--format=%h", "tracker-history").splitlines()) == 3
 
 
-@pytest.mark.skipif(shutil.which("c++") is None, reason="no C++ compiler here")
+@needs_compiler
 def test_the_composite_action_measures_a_night_and_a_change(tmp_path: Path) -> None:
     """Nothing says how commits are built: a change is compared with the history, which the action is given."""
     team = Team(tmp_path, "[build]")

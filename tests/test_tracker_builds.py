@@ -14,9 +14,8 @@ from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.measure.build_settings import Build, build_of
 from spook_tracker.tracker.measure.builds import team_repository
 from spook_tracker.tracker.measure.commits import CommitError
-from tests.team_repository import GRAVITY, SETTINGS, Pebble
+from tests.team_repository import GRAVITY, SETTINGS, Pebble, needs_compiler
 
-needs_compiler = pytest.mark.skipif(shutil.which("c++") is None, reason="no C++ compiler here")
 WRONG = GRAVITY.replace("time_step", "1.01 * time_step")
 
 

@@ -46,9 +46,15 @@ def sends(signal: str, to: str) -> str:
     "to", ["kill(os.getppid()", "killpg(0"], ids=["to the one that decides", "to its group"]
 )
 @pytest.mark.parametrize("signal", ["SIGTERM", "SIGINT", "SIGHUP", "SIGKILL", "SIGPIPE", "SIGUSR1"])
-def test_a_signal_that_an_engine_sends_is_no_green(signal: str, to: str) -> None:
-    """Its value is bad: whether it ends the one that decides, or all is measured, there is nothing to be green about."""
-    code, said = ended(sends(signal, to) + BAD)
+def test_a_signal_that_an_engine_sends_is_no_green_unless_all_was_measured(signal: str, to: str) -> None:
+    code, said = ended(sends(signal, to) + TOY)
+
+    assert (code == 0) == (runs() == 1), said
+
+
+@pytest.mark.parametrize("signal", ["SIGTERM", "SIGPIPE"])
+def test_a_signal_makes_no_bad_value_good(signal: str) -> None:
+    code, said = ended(sends(signal, "kill(os.getppid()") + BAD)
 
     assert code != 0, said
 

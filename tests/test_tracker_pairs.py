@@ -5,7 +5,6 @@ from __future__ import annotations
 import itertools
 import math
 import random
-import shutil
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -24,7 +23,7 @@ from spook_tracker.tracker.library import History, record
 from spook_tracker.tracker.measure.commits import CommitError
 from spook_tracker.tracker.pairs import compare_by_pairs
 from tests.run_documents import definition, engine, run, sample
-from tests.team_repository import GRAVITY, SETTINGS, Pebble, git
+from tests.team_repository import GRAVITY, SETTINGS, Pebble, git, needs_compiler
 
 VALUE, RUNG = "pendulum/plain/length_deviation/h=0.0166667", "pendulum/plain/ladder:error/h=0.01"
 RUN_TIME = "pendulum/plain/ladder:error:run-time"
@@ -204,9 +203,6 @@ def test_a_limit_that_is_loosened_is_not_taken_for_better() -> None:
 def test_one_engine_on_both_sides_is_refused() -> None:
     with pytest.raises(TrackerError, match="both sides answer as commit aaaaaaaaaaaa"):
         compared(Side(BASE), Side(BASE))
-
-
-needs_compiler = pytest.mark.skipif(shutil.which("c++") is None, reason="no C++ compiler here")
 
 
 @pytest.fixture
