@@ -179,7 +179,7 @@ NOT_ASKED = (
     "| engine | where it was looked for | what happens |",
     "|---|---|---|",
     "| Simbody | `opensim` 4.6, PyPI | inside OpenSim (280 MB): swings a pendulum in joint coordinates and lets a ball lie on a half space, with "
-    "integrators that choose their steps or keep to one; boxes touch as meshes on an elastic foundation alone; no adapter yet |",
+    "integrators that choose their steps or keep to one; no adapter yet |",
     "| Brax | `brax` 0.14.2, PyPI | installs; its positional, spring and generalized pipelines let a ball rest once JAX has compiled them; says itself that they are not maintained, and names MJX, which is asked |",
     "| JaxSim | `jaxsim` 0.9.0, PyPI | installs and imports; no adapter yet |",
     "| Havok | `@babylonjs/havok` 1.3, npm | its build for the web can be had, not tried; the native library is its maker's to license |",
