@@ -126,6 +126,51 @@ def until(condition, limit: float = SOON) -> bool:
     return False
 
 
+def what_is_open(piece: str) -> tuple[set[tuple[int, int]], int]:
+    """The files behind this process' descriptors, and its parent."""
+    found = set()
+    for place in Path("/dev/fd").iterdir():
+        with contextlib.suppress(OSError):  # the one that lists them
+            told = os.fstat(int(place.name))
+            found.add((told.st_dev, told.st_ino))
+    return found, os.getppid()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux forks ahead")
+@pytest.mark.filterwarnings(
+    "ignore:.*multi-threaded:DeprecationWarning"
+)  # those of pytest's workers; a run has none
+def test_a_worker_forked_ahead_works_as_a_new_one_and_has_nothing_of_ours_open(tmp_path: Path) -> None:
+    with (tmp_path / "ours").open("w") as ours:
+        told = os.fstat(ours.fileno())
+        crew.fork_ahead()
+        (spare,) = crew._ahead
+        found = dict(crew.answers(what_is_open, ["a"], 1, crew.Limits()))
+        again = dict(crew.answers(what_is_open, ["a"], 1, crew.Limits()))
+
+    opened, parent = found["a"]
+    assert (told.st_dev, told.st_ino) not in opened
+    assert len(opened) <= len(again["a"][0]), "no more than a new program has"
+    assert parent == os.getpid()
+    assert not crew._ahead
+    with pytest.raises(ValueError, match="closed"):
+        spare.process.is_alive()  # it was used, and ended
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only Linux forks ahead")
+@pytest.mark.filterwarnings("ignore:.*multi-threaded:DeprecationWarning")
+@pytest.mark.parametrize(
+    ("piece", "outcome"), [("hang", "timed_out"), ("die", "crashed"), ("hog", "crashed")]
+)
+def test_a_worker_forked_ahead_is_watched_as_any_other(piece: str, outcome: str) -> None:
+    crew.fork_ahead()
+
+    found = told([piece, "a"], workers=1, seconds=1.0)
+
+    assert isinstance(lost := found[piece], crew.Lost)
+    assert (lost.outcome, found["a"]) == (outcome, "A")
+
+
 def test_leaving_early_ends_the_workers():
     told(["a"])
     before = children(os.getpid())  # the one that Python keeps to count what processes share

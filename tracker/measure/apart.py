@@ -27,7 +27,7 @@ import spook_tracker.tracker.measure.left_behind as left_behind
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.json_form import decode, encode
 from spook_tracker.tracker.document.run_document import RunDocument, keeps_limit
-from spook_tracker.tracker.measure.bounds import START_LIMIT
+from spook_tracker.tracker.measure.bounds import PROCESS, START_LIMIT
 from spook_tracker.tracker.measure.questions import EngineUnavailable, Questions, RunError
 from spook_tracker.tracker.measure.request import Interrupted, Progress, Request, Watch
 
@@ -245,9 +245,12 @@ def serve() -> None:
     os.dup2(2, 1)  # whatever an engine prints is no news
     signal.signal(signal.SIGINT, signal.default_int_handler)  # the parent may have been started deaf to it
     what, source, request, more = pickle.loads(base64.b64decode(order.readline()))
-    from spook_tracker.tracker.measure import again
+    from spook_tracker.tracker.measure import again, workers
     from spook_tracker.tracker.measure import run as here
     from spook_tracker.tracker.measure.fitting import written
+
+    if what == "run" and request.workers and request.executor == PROCESS:
+        workers.fork_ahead()  # nothing that is asked for is imported yet
 
     def tell(news: News) -> None:
         if isinstance(news, Done):

@@ -84,7 +84,7 @@ def answers(
             wanted = workers if time.monotonic() >= since + WORTH else 1
             while left and len(crew) < wanted:
                 piece = next_for(None)
-                crew.append(_Worker(perform, limits))
+                crew.append(_Worker(_ahead.pop() if _ahead else _Process(), perform, limits))
                 crew[-1].give(piece)
             moments = [worker.deadline for worker in crew]
             soonest = (
@@ -110,22 +110,32 @@ def answers(
             worker.end()
 
 
+class _Process:
+    """A process and our ends of its pipes: it is told what to do, and then piece by piece."""
+
+    def __init__(self, *, forked: bool = False) -> None:
+        context = get_context("fork") if forked else get_context("spawn")
+        self.pipe, theirs = context.Pipe()
+        end, self.lifeline = context.Pipe(duplex=False)
+        self.place = context.RawValue("i", NOWHERE)
+        arguments = (theirs, end, os.getpid(), self.place)
+        self.process = context.Process(target=_serve, args=arguments, daemon=True)
+        self.process.start()
+        theirs.close()
+        end.close()
+
+
 class _Worker(Generic[Piece, Answer]):
     """The supervisor's end of one process."""
 
     piece: Piece
 
-    def __init__(self, perform: Callable[[Piece], Answer], limits: Limits) -> None:
-        context = get_context("spawn")
+    def __init__(self, begun: _Process, perform: Callable[[Piece], Answer], limits: Limits) -> None:
+        self.process, self.pipe = begun.process, begun.pipe
+        self.lifeline, self.place = begun.lifeline, begun.place
         self.limits = limits
-        self.pipe, theirs = context.Pipe()
-        end, self.lifeline = context.Pipe(duplex=False)
-        self.place = context.RawValue("i", NOWHERE)
-        arguments = (perform, theirs, end, limits.memory, os.getpid(), self.place)
-        self.process = context.Process(target=_serve, args=arguments, daemon=True)
-        self.process.start()
-        theirs.close()
-        end.close()
+        with suppress(OSError):  # it is dead already, which the first look will find
+            self.pipe.send((perform, limits.memory))
         self.deadline = time.monotonic() + START_LIMIT
         self.begun = math.inf  # when it began its first piece
 
@@ -165,6 +175,16 @@ class _Worker(Generic[Piece, Answer]):
         self.lifeline.close()
 
 
+_ahead: list[_Process] = []  # forked before there was work for them
+
+
+def fork_ahead() -> None:
+    """Fork the first worker of this process' next `answers`, where that is safe: before anything but our own modules is
+    imported. Those it need not import once more; engines and questions it imports itself, as a spawned one does."""
+    if sys.platform == "linux":
+        _ahead.append(_Process(forked=True))
+
+
 class Place(Protocol):
     """A number in memory that a worker and its supervisor share."""
 
@@ -180,21 +200,20 @@ def at(place: int) -> None:
         _place.value = place
 
 
-def _serve(
-    perform: Callable[[Piece], Answer],
-    pipe: Connection,
-    lifeline: Connection,
-    memory: int,
-    parent: int,
-    place: Place,
-) -> None:
-    """The life of a worker: a piece, its answer, the next piece."""
+def _serve(pipe: Connection, lifeline: Connection, parent: int, place: Place) -> None:
+    """The life of a worker: what is to be done with pieces; then a piece, its answer, the next piece."""
     global _place
     _place = place
+    _ahead.clear()
+    _close_all_but({pipe.fileno(), lifeline.fileno()})
     _alone()
     _never_outlive(lifeline, parent)
     warnings.simplefilter("ignore")  # what a worker has to say, it says in samples
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the supervisor decides what an interruption means
+    try:
+        perform, memory = pipe.recv()
+    except (EOFError, OSError):
+        return  # there was no work
     _bound_memory(memory)
     while True:
         try:
@@ -202,13 +221,26 @@ def _serve(
         except (EOFError, OSError):
             return
         pipe.send(("begun", None))
-        try:
-            answer: tuple[str, Answer | Lost | Exception] = ("answer", perform(piece))
-        except MemoryError:
-            answer = ("answer", Lost("crashed", "the piece of work ran out of memory", place.value))
-        except Exception as error:
-            answer = ("raised", error)
-        pipe.send(answer)
+        pipe.send(_answer(perform, piece, place))
+
+
+def _answer(
+    perform: Callable[[Piece], Answer], piece: Piece, place: Place
+) -> tuple[str, Answer | Lost | Exception]:
+    try:
+        return "answer", perform(piece)
+    except MemoryError:
+        return "answer", Lost("crashed", "the piece of work ran out of memory", place.value)
+    except Exception as error:
+        return "raised", error
+
+
+def _close_all_but(ours: set[int]) -> None:
+    """What a new program would not have, a forked one must not keep: the channel that tells a run, others' lifelines."""
+    for number in map(int, os.listdir("/dev/fd")) if os.name == "posix" else ():  # noqa: PTH208 - numbers, not paths
+        with suppress(OSError):
+            if number not in ours and not os.get_inheritable(number):
+                os.close(number)
 
 
 def _alone() -> None:
