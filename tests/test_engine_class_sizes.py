@@ -15,14 +15,6 @@ LARGER = {  # members and methods of those that are over: lower a number that ha
     "contacts/ConeFour": (37, 4),
 }
 MOST_BRANCHES = 25
-LONGER = {  # cyclomatic numbers of functions that are over: as above
-    "contacts/candidate_search.cpp CandidateSearch::look_at": 28,
-    "contacts/impact_events.cpp ImpactEvents::find": 41,
-    "contacts/impact_solver.cpp ImpactSolver::solve": 29,
-    "contacts/internal_edges.cpp InternalEdges::is_internal_edge": 27,
-    "contacts/solve_by_pgs.cpp ContactStage::solve_by_pgs": 35,
-    "contacts/successive_impacts.cpp SuccessiveImpacts::find_earliest": 32,
-}
 OPENS = re.compile(r"\b(class|struct)\s+(?:alignas\([^)]*\)\s*)?([\w:]+)(?:\s+final)?(?:\s*:\s*[^{;]*)?\s*$")
 NO_MEMBER = re.compile(
     r"^(?:using|friend|enum|static_assert|template\s*<[^>]*>\s*(?:struct|class)|typedef|static constexpr)\b"
@@ -112,14 +104,12 @@ def branches(name: str, text: str) -> dict[str, int]:
 
 
 def test_no_function_has_more_branches_than_one_can_follow() -> None:
-    over = {
+    assert not {
         function: number
         for source in sorted(SOURCES.glob("*/*.[ch]pp"))
         for function, number in branches(str(source.relative_to(SOURCES)), source.read_text()).items()
         if number > MOST_BRANCHES
     }
-
-    assert over == LONGER
 
 
 def test_which_branches_are_counted() -> None:

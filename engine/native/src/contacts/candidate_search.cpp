@@ -15,7 +15,6 @@ namespace spook {
 namespace {
 
 bool by_key(const Contact& a, const Contact& b) noexcept { return a.key < b.key; }
-bool round_or_plane(const Primitive& shape) noexcept { return !shape.faceted(); }
 
 }  // namespace
 
@@ -86,8 +85,6 @@ void CandidateSearch::widen(const Cast& cast, std::vector<char>& changed, StepMo
 
 void CandidateSearch::look_at(const std::vector<IndexPair>& near, StepMotion& motion, ContactPoints& points,
                               Cast::When when) {
-    const ContactBodies& bodies = motion.bodies();
-    const double h = motion.options().time_step;
     known_.clear();
     open_.bodies.clear();
     const std::size_t before = points.all.size();
@@ -95,46 +92,13 @@ void CandidateSearch::look_at(const std::vector<IndexPair>& near, StepMotion& mo
     for (const StepContact& point : points.all) known_.push_back(pair_of(point.contact));
     std::sort(known_.begin(), known_.end());
     for (std::size_t k = 0; k < near.size(); ++k) {
-        const IndexPair& pair = near[k];
         if (k + ahead < near.size()) {
             prefetch(detection.pose(near[k + ahead].first));
             prefetch(detection.pose(near[k + ahead].second));
         }
         if ((k + 1) % pairs_a_look == 0) Watch::look();
-        if (std::binary_search(known_.begin(), known_.end(), pair_of(pair))) continue;
-        const Collider::View first = detection.collider(pair.first), second = detection.collider(pair.second);
-        const double reach = margins_.search()[first.body] + margins_.search()[second.body];
-        const OpenPair open = opened(pair, separation(first.shape, detection.pose(pair.first), second.shape,
-                                                      detection.pose(pair.second), reach));
-        if (open.apart.gap > reach && first.shape.faceted() && second.shape.faceted()) continue;
-        const double size = std::max(bodies.radius[first.body], bodies.radius[second.body]);
-        if (round_or_plane(first.shape) && round_or_plane(second.shape) && open.apart.gap > 1e-6 * size) {
-            if (open.apart.gap <= reach)
-                open_.pairs.push_back(open);  // clearly apart: no need for its points
-            continue;
-        }
-        scratch_.clear();
-        detection.collide_pair(pair, reach, scratch_);
-        const bool touching = std::any_of(scratch_.begin(), scratch_.end(),
-                                          [&](const Contact& c) { return bodies.is_closed(c); });
-        // Any two shapes apart give a point, if they are near enough to meet; but not solids corner to corner, nor
-        // where a triangle's neighbour comes first.
-        const bool solids = (first.shape.faceted() && second.shape.faceted()) ||
-                            first.shape.kind == ShapeKind::triangle ||
-                            second.shape.kind == ShapeKind::triangle;
-        if (!touching) {
-            if (!scratch_.empty() || solids) open_.pairs.push_back(open);
-            continue;
-        }
-        for (std::size_t i = 1; i < scratch_.size(); ++i)  // a few, nearly always in order
-            for (std::size_t at = i; at > 0 && by_key(scratch_[at], scratch_[at - 1]); --at)
-                std::swap(scratch_[at], scratch_[at - 1]);
-        for (const Contact& contact : scratch_) {
-            const Pose &one = motion.poses[contact.first], &two = motion.poses[contact.second];
-            if (reachable(motion, contact) &&
-                !is_turned_through(detection, contact, one, two, motion.velocity, motion.dv_ext, h))
-                add_point(motion.model(), points, contact, one, two, -1.0);
-        }
+        if (!std::binary_search(known_.begin(), known_.end(), pair_of(near[k])))
+            look_at(near[k], motion, points);
     }
     edges.note_depths(step(motion, points), before);
     if (skip_grazing(before, motion, points, when))
@@ -142,7 +106,43 @@ void CandidateSearch::look_at(const std::vector<IndexPair>& near, StepMotion& mo
     for (std::size_t k = before; k < points.all.size(); ++k) {
         if (k + ahead < points.all.size())
             prefetch_bodies(points.all[k + ahead].contact, motion.velocity, motion.dv_ext);
-        motion.supported.note(points.all[k], bodies, motion.velocity, motion.dv_ext);
+        motion.supported.note(points.all[k], motion.bodies(), motion.velocity, motion.dv_ext);
+    }
+}
+
+/// Gives a pair that touches its points; one that is apart, and near enough to meet, is open.
+void CandidateSearch::look_at(const IndexPair& pair, const StepMotion& motion, ContactPoints& points) {
+    const ContactBodies& bodies = motion.bodies();
+    const Collider::View first = detection.collider(pair.first), second = detection.collider(pair.second);
+    const double reach = margins_.search()[first.body] + margins_.search()[second.body];
+    const OpenPair open = opened(pair, separation(first.shape, detection.pose(pair.first), second.shape,
+                                                  detection.pose(pair.second), reach));
+    const bool solids = first.shape.faceted() && second.shape.faceted();
+    if (open.apart.gap > reach && solids) return;
+    const double size = std::max(bodies.radius[first.body], bodies.radius[second.body]);
+    if (!first.shape.faceted() && !second.shape.faceted() && open.apart.gap > 1e-6 * size) {
+        if (open.apart.gap <= reach) open_.pairs.push_back(open);  // clearly apart: no need for its points
+        return;
+    }
+    scratch_.clear();
+    detection.collide_pair(pair, reach, scratch_);
+    if (std::none_of(scratch_.begin(), scratch_.end(),
+                     [&](const Contact& contact) { return bodies.is_closed(contact); })) {
+        // Any two shapes apart give a point, if they are near enough to meet; but not solids corner to corner, nor
+        // where a triangle's neighbour comes first.
+        const auto is_triangle = [](const Primitive& shape) { return shape.kind == ShapeKind::triangle; };
+        if (!scratch_.empty() || solids || is_triangle(first.shape) || is_triangle(second.shape))
+            open_.pairs.push_back(open);
+        return;
+    }
+    for (std::size_t i = 1; i < scratch_.size(); ++i)  // a few, nearly always in order
+        for (std::size_t at = i; at > 0 && by_key(scratch_[at], scratch_[at - 1]); --at)
+            std::swap(scratch_[at], scratch_[at - 1]);
+    for (const Contact& contact : scratch_) {
+        const Pose &one = motion.poses[contact.first], &two = motion.poses[contact.second];
+        if (reachable(motion, contact) && !is_turned_through(detection, contact, one, two, motion.velocity,
+                                                             motion.dv_ext, motion.options().time_step))
+            add_point(motion.model(), points, contact, one, two, -1.0);
     }
 }
 

@@ -53,6 +53,7 @@ public:
 private:
     void look_at(const std::vector<IndexPair>& near, StepMotion& motion, ContactPoints& points,
                  Cast::When when);
+    void look_at(const IndexPair& pair, const StepMotion& motion, ContactPoints& points);
     bool reachable(const StepMotion& motion, const Contact& contact) const;
     StepContact& add_point(const ContactModel& model, ContactPoints& points, const Contact& contact,
                            const Pose& first, const Pose& second, double toi);

@@ -1,13 +1,11 @@
 #include "contacts/contact_pgs.hpp"
 
 #include <algorithm>
-#include <tuple>
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/contact_rows.hpp"
 #include "contacts/tolerances.hpp"
 #include "linear/ahead.hpp"
-#include "linear/regularisation.hpp"
 
 namespace spook {
 
@@ -16,53 +14,23 @@ using namespace tolerances::contact_pgs;
 void ContactPgs::hand_over(const StepMotion& motion, ContactPoints& points) {
     const ContactBodies& bodies = motion.bodies();
     const ContactRows rows{motion, points};
-    const double h = motion.options().time_step;
     std::size_t next = solver_.count();
     for (std::size_t k = next; k < points.all.size(); ++k)
         solver_.announce(bodies.solver_index[points.all[k].contact.first],
                          bodies.solver_index[points.all[k].contact.second]);
     solver_.arrange();
     for (; next < points.all.size(); ++next) {
-        StepContact& point = points.all[next];
         if (next + ahead < points.all.size())
             prefetch_bodies(points.all[next + ahead].contact, motion.velocity, motion.dv_ext);
-        const PairMaterial material = motion.surfaces().pair(point.contact);
-        const ContactExtras& extras = points.extras(point);
-        PgsContact row;
-        std::tie(row.first, row.second) = bodies.solver_pair(point.contact);
-        row.normal = point.contact.point.normal;
-        row.tangent = extras.axis_scale[0] * point.tangent;
-        row.across = extras.axis_scale[1] * cross(row.normal, point.tangent);
-        row.anisotropic = extras.is_anisotropic();
-        row.first_arm = point.first_arm;
-        row.second_arm = point.second_arm;
-        row.softness = regularise(material.compliance, material.damping, h).softness;
-        row.slip_softness = material.slip_compliance / h;
-        row.friction = point.friction;
-        row.normal_before = point.before;
-        row.impulse[0] = point.solved ? point.normal : std::max(0.0, point.before);
-        for (int i = 0; i < 2; ++i) row.impulse[i + 1] = point.tangents[i] / extras.axis_scale[i];
-        if (motion.surfaces().conveys || row.first < 0 || row.second < 0) {
-            const Vec3 directions[3] = {row.normal, row.tangent, row.across};
-            for (int i = 0; i < 3; ++i)
-                row.right[i] = -relative_velocity(point, directions[i], motion.drive.prescribed());
-            for (int i = 1; i < 3; ++i) row.right[i] -= motion.surface_speed(point, directions[i]);
-        }
-        row.right[0] += rows.resting_right(point);
-        solver_.add(row);
+        solver_.add(rows.resting(points.all[next]));
     }
 }
 
 void ContactPgs::take_in(std::size_t known, const ContactCache& cache, const StepMotion& motion,
                          ContactPoints& points) {
-    for (std::size_t k = known; k < points.all.size(); ++k) {
-        StepContact& point = points.all[k];
-        const CachedContact* const old = cache.find(point.contact.key);
-        if (old == nullptr) continue;
-        point.before = std::max(0.0, old->normal);
-        point.compression_before = old->compression;
-        std::copy_n(old->tangent, 2, point.tangents);
-    }
+    for (std::size_t k = known; k < points.all.size(); ++k)
+        if (const CachedContact* const old = cache.find(points.all[k].contact.key))
+            points.remember(points.all[k], *old, false);
     hand_over(motion, points);
 }
 

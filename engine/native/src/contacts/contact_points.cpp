@@ -59,14 +59,17 @@ void ContactPoints::order(const ContactCache& before, bool resists_turning) {
     for (StepContact& point : all) {
         while (old < cached.size() && cached[old].contact.key < point.contact.key) ++old;
         if (old == cached.size() || cached[old].contact.key != point.contact.key) continue;
-        // What carries nothing may be rounded below it.
-        point.before = std::max(0.0, cached[old].normal);
-        point.compression_before = cached[old].compression;
-        if (point.solved) continue;
-        std::copy_n(cached[old].tangent, 2, point.tangents);
-        if (resists_turning) std::copy_n(cached[old].turning, 3, own_extras(point).turning);
+        remember(point, cached[old], resists_turning);
     }
     ordered = all.size();
+}
+
+void ContactPoints::remember(StepContact& point, const CachedContact& before, bool resists_turning) {
+    point.before = std::max(0.0, before.normal);  // what carries nothing may be rounded below it
+    point.compression_before = before.compression;
+    if (point.solved) return;
+    std::copy_n(before.tangent, 2, point.tangents);
+    if (resists_turning) std::copy_n(before.turning, 3, own_extras(point).turning);
 }
 
 }  // namespace spook

@@ -26,6 +26,8 @@ struct ContactPoints {
     }
     /// Sorts them by key and finds each one's predecessor in the step before.
     void order(const ContactCache& before, bool resists_turning);
+    /// What a point did in the step before, as where the solve starts.
+    void remember(StepContact& point, const CachedContact& before, bool resists_turning);
 
     /// Tells what they connect.
     void tie(const ContactBodies& bodies, IslandFinder& finder) const {

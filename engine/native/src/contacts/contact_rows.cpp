@@ -1,10 +1,10 @@
 #include "contacts/contact_rows.hpp"
 
 #include <algorithm>
+#include <tuple>
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/solve_quality.hpp"
-#include "linear/regularisation.hpp"
 
 namespace spook {
 
@@ -30,22 +30,38 @@ double compression(const ContactRows& rows, const MixedSystem& system, const Ste
 
 }  // namespace
 
-RowBlock ContactRows::row_block(const StepContact& point, int rows) const {
-    const Contact& contact = point.contact;
+PgsContact ContactRows::packed(const StepContact& point) const {
+    const ContactExtras& extras = points.extras(point);
+    PgsContact packed;
+    std::tie(packed.first, packed.second) = motion.bodies().solver_pair(point.contact);
+    packed.normal = point.contact.point.normal;
+    packed.tangent = extras.axis_scale[0] * point.tangent;
+    packed.across = extras.axis_scale[1] * cross(packed.normal, point.tangent);
+    packed.anisotropic = extras.is_anisotropic();
+    packed.first_arm = point.first_arm;
+    packed.second_arm = point.second_arm;
+    packed.friction = point.friction;
+    packed.normal_before = point.before;
+    const Vec3 directions[3] = {packed.normal, packed.tangent, packed.across};
+    for (int i = 0; i < 3; ++i) {
+        packed.right[i] =
+            motion.drive.any() ? -relative_velocity(point, directions[i], motion.drive.prescribed()) : -0.0;
+        if (i > 0) packed.right[i] -= motion.surface_speed(point, directions[i]);
+    }
+    return packed;
+}
+
+RowBlock ContactRows::row_block(const StepContact& point, const PgsContact& packed, int rows) const {
     RowBlock block;
     block.is_contact = true;
-    block.first = motion.bodies().solver_index[contact.first];
-    block.second = motion.bodies().solver_index[contact.second];
+    block.first = packed.first;
+    block.second = packed.second;
     block.size = std::min(rows, 3);
-    const double* const axis_scale = points.extras(point).axis_scale;
-    const Vec3 directions[3] = {contact.point.normal, axis_scale[0] * point.tangent,
-                                axis_scale[1] * cross(contact.point.normal, point.tangent)};
+    const Vec3 directions[3] = {packed.normal, packed.tangent, packed.across};
     for (int i = 0; i < block.size; ++i) {
-        if (block.first >= 0) block.first_jacobian[i] = contact_row(directions[i], point.first_arm);
-        if (block.second >= 0) block.second_jacobian[i] = contact_row(-directions[i], point.second_arm);
-        block.right[i] =
-            motion.drive.any() ? -relative_velocity(point, directions[i], motion.drive.prescribed()) : -0.0;
-        if (i > 0) block.right[i] -= motion.surface_speed(point, directions[i]);
+        if (block.first >= 0) block.first_jacobian[i] = contact_row(directions[i], packed.first_arm);
+        if (block.second >= 0) block.second_jacobian[i] = contact_row(-directions[i], packed.second_arm);
+        block.right[i] = packed.right[i];
     }
     block.lower[0] = 0.0;
     if (rows == 6) add_turning(point, block);
@@ -87,7 +103,8 @@ void ContactRows::add_friction(const StepContact& point, int block,
     if (material.torsional > 0.0) friction.push_back({block, material.torsional / scale, 0.0, normal, 5, 1});
 }
 
-double ContactRows::resting_right(StepContact& point) const {
+/// What the normal's row at rest asks for, m/s.
+double ContactRows::resting_right(StepContact& point, const Regularisation& row) const {
     const ContactBodies& bodies = motion.bodies();
     const double h = motion.options().time_step, gap = bodies.gap(point.contact);
     motion.measure(point);
@@ -95,11 +112,11 @@ double ContactRows::resting_right(StepContact& point) const {
     if (point.event)  // another point of a pair that meets may still be open
         return -(touching ? 0.0 : gap / motion.time_left(point));
     if (!touching) return -gap / h;
-    const PairMaterial material = motion.surfaces().pair(point.contact);
-    const Regularisation row = regularise(material.compliance, material.damping, h);
     const double depth = -row.violation_gain * std::max(gap, -elastic_depth(bodies, point));
     // A rigid contact that opens is not pushed after its own speed.
-    return material.compliance > 0.0 ? depth + row.upsilon * point.resting_approach() : depth;
+    return motion.surfaces().pair(point.contact).compliance > 0.0
+               ? depth + row.upsilon * point.resting_approach()
+               : depth;
 }
 
 /// Whether a point is likely to push: what a solver starts from.
@@ -111,23 +128,33 @@ bool ContactRows::is_pressed(const StepContact& point) const noexcept {
                                    gap + h * (point.resting_approach() + point.dv_ext) < 0.0));
 }
 
-RowBlock ContactRows::resting(StepContact& point) const {
+PgsContact ContactRows::resting(StepContact& point) const {
     const double h = motion.options().time_step;
     const PairMaterial material = motion.surfaces().pair(point.contact);
-    const bool turning = material.resists_turning();
-    RowBlock block = row_block(point, turning ? 6 : point.friction > 0.0 ? 3 : 1);
-    if (turning && !(point.friction > 0.0))
-        for (int i = 1; i <= 2; ++i) block.lower[i] = block.upper[i] = 0.0;
-    block.right[0] += resting_right(point);
-    block.softness[0] = regularise(material.compliance, material.damping, h).softness;
+    const Regularisation row = regularise(material.compliance, material.damping, h);
+    const double* const axis_scale = points.extras(point).axis_scale;
+    PgsContact packed = this->packed(point);
+    packed.right[0] += resting_right(point, row);
+    packed.softness = row.softness;
+    packed.slip_softness = material.slip_compliance / h;
+    packed.impulse[0] = point.solved ? point.normal : std::max(0.0, point.before);
+    for (int i = 0; i < 2; ++i) packed.impulse[i + 1] = point.tangents[i] / axis_scale[i];
+    return packed;
+}
+
+RowBlock ContactRows::resting_block(StepContact& point) const {
+    const PgsContact packed = resting(point);
+    const bool turning = motion.surfaces().pair(point.contact).resists_turning(), rubs = point.friction > 0.0;
+    RowBlock block = row_block(point, packed, turning ? 6 : rubs ? 3 : 1);
+    block.softness[0] = packed.softness;
     block.state[0] = is_pressed(point) ? RowState::free : RowState::at_lower;
-    block.multiplier[0] = point.solved ? point.normal : std::max(0.0, point.before);
-    const ContactExtras& extras = points.extras(point);
-    if (point.friction > 0.0) {
-        block.softness[1] = block.softness[2] = material.slip_compliance / h;
-        for (int i = 1; i <= 2; ++i) block.multiplier[i] = point.tangents[i - 1] / extras.axis_scale[i - 1];
+    block.multiplier[0] = packed.impulse[0];
+    for (int i = 1; i <= 2 && rubs; ++i) {
+        block.softness[i] = packed.slip_softness;
+        block.multiplier[i] = packed.impulse[i];
     }
-    for (int i = 3; i < block.size; ++i) block.multiplier[i] = extras.turning[i - 3];
+    for (int i = 1; i <= 2 && turning && !rubs; ++i) block.lower[i] = block.upper[i] = 0.0;
+    for (int i = 3; i < block.size; ++i) block.multiplier[i] = points.extras(point).turning[i - 3];
     return block;
 }
 

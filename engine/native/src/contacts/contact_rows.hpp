@@ -5,7 +5,9 @@
 
 #include "contacts/contact_points.hpp"
 #include "contacts/friction_point.hpp"
+#include "contacts/pgs_contacts.hpp"
 #include "contacts/step_motion.hpp"
+#include "linear/regularisation.hpp"
 
 namespace spook {
 
@@ -14,16 +16,19 @@ struct ContactRows {
     const StepMotion& motion;
     const ContactPoints& points;
 
+    /// What every solver is told of a point: directions, arms, and what bodies and surfaces that are moved ask for.
+    PgsContact packed(const StepContact& point) const;
+    /// The same of a point at rest, which it measures: with its gap, what gives way, and where the solve starts.
+    PgsContact resting(StepContact& point) const;
     /// The first `rows` of normal, tangents and turning: 1, 3 or 6.
-    RowBlock row_block(const StepContact& point, int rows) const;
-    /// The resting row of a point, which it measures; the tangents' bounds are left to the friction law.
-    RowBlock resting(StepContact& point) const;
-    /// What the normal's resting row adds to the right side of the bodies that do not move by themselves, m/s.
-    double resting_right(StepContact& point) const;
+    RowBlock row_block(const StepContact& point, const PgsContact& packed, int rows) const;
+    /// Those of a point at rest; the tangents' bounds are left to the friction law.
+    RowBlock resting_block(StepContact& point) const;
     /// The rows of a block that friction bounds.
     void add_friction(const StepContact& point, int block, std::vector<FrictionPoint>& friction) const;
 
 private:
+    double resting_right(StepContact& point, const Regularisation& row) const;
     void add_turning(const StepContact& point, RowBlock& block) const;
     bool is_pressed(const StepContact& point) const noexcept;
 };

@@ -192,6 +192,8 @@ private:
         bool left_out = false;   // some impact that rebounds was
     };
     bool find_more(bool over, PgsLook& look);
+    bool iterate(MixedSystem& system, PgsLook& look, FrictionReport& report);
+    bool find_left_out();
 
     State state_;
     std::shared_ptr<ContactModel> model_;

@@ -18,16 +18,27 @@ public:
     void find(const CandidateSearch& search, StepMotion& motion, ContactPoints& points);
 
 private:
-    /// By an island's first body.
-    struct Arrays {
-        std::vector<std::size_t> members;
-        std::vector<std::uint64_t> impact_pair;  // the pair of the island's impact, plus one
-        std::vector<char> plain, bouncy;
-        std::vector<double> when, speed;
-        std::vector<std::size_t> moving_along, may_move_along;  // how many move along the forces, and may
+    struct Island {
+        std::size_t members = 0;
+        std::uint64_t impact_pair = 0;                     // the pair of its impact, plus one
+        double time = -1.0;                                // when that is, s
+        double fastest = 0.0;                              // of its bodies, m/s
+        bool plain = true;                                 // nothing else goes on in it
+        bool rebounds = false;                             // some impact in it has a restitution
+        bool held = false;                                 // not all in it is free
+        std::size_t moving_along = 0, may_move_along = 0;  // how many move along the forces, and may
     };
-    DisjointSets connected_;  // bodies, by contacts and joints
-    Arrays arrays_;
+    Island& of(const ContactBodies& bodies, int body) {
+        return islands_[bodies.moves(body) ? connected_.root(body) : body];
+    }
+    void connect(const ContactBodies& bodies, const ContactPoints& points);
+    void look_at_bodies(const StepMotion& motion);
+    void look_at(const StepContact& point, const std::vector<double>& reach, const StepMotion& motion);
+    void look_at(const OpenPairs& open, const StepMotion& motion);
+    bool is_event(const Island& island) const noexcept;
+
+    DisjointSets connected_;       // bodies, by contacts and joints
+    std::vector<Island> islands_;  // by their first body, and what does not move by itself
 };
 
 }  // namespace spook

@@ -244,105 +244,115 @@ bool ImpactSolver::is_impact(const StepContact& point) const noexcept {
     return answered && point.approach < -point.rounding;
 }
 
+/// Rows of the points that take part, behind those of joints.
+void ImpactSolver::add_points(const StepMotion& motion, const ContactPoints& points) {
+    MixedSystem& hit = work_.hit;
+    const ContactRows rows{motion, points};
+    std::vector<Vec6>& before = work_.before = hit.momentum;
+    for (std::size_t b = 0; b < before.size(); ++b) solve_six(factor_six(hit.mass[b]), before[b]);
+    work_.friction.clear(), work_.pushed.clear();
+    work_.returned.assign(work_.hit_points.size(), {});
+    for (std::size_t j = 0; j < work_.hit_points.size(); ++j) {
+        const StepContact& point = points.all[work_.hit_points[j]];
+        RowBlock block = rows.row_block(point, rows.packed(point), point.friction > 0.0 ? 3 : 1);
+        if (std::any_of(block.right.begin(), block.right.begin() + block.size,
+                        [](double r) { return r != 0.0; }))
+            work_.pushed.push_back(hit.rows.size());
+        block.right[0] += std::max(0.0, -point.bounce * point.approach);
+        block.state[0] = point.approach < 0.0 ? RowState::free : RowState::at_lower;
+        if (block.size == 3) {
+            work_.friction.push_back({static_cast<int>(hit.rows.size()), point.friction, 0.0, -1.0});
+            work_.friction.back().anisotropic = points.extras(point).is_anisotropic();
+            const double slip = point.bounce > 0.0 && is_impact(point)
+                                    ? std::max(motion.surfaces()[point.contact.first].tangential_restitution,
+                                               motion.surfaces()[point.contact.second].tangential_restitution)
+                                    : 0.0;
+            for (int i = 1; i < 3 && slip > 0.0; ++i)
+                block.right[i] -= work_.returned[j][i - 1] =
+                    slip * (row_velocity(block, i, before) - block.right[i]);
+        }
+        hit.rows.push_back(block);
+    }
+}
+
+/// Gives islands whose energy rises a part of the plastic impact. `solve` solves that.
+template <class Solve> void ImpactSolver::keep_energy(std::size_t joints, const Solve& solve) {
+    Arrays& work = work_;
+    const Islands& islands = connected_.find(work.hit);
+    find_kinetic_energy(work.hit, work.before, islands, work.limit);
+    find_kinetic_energy(work.hit, work.hit.velocity, islands, work.energy);
+    work.share.assign(islands.count, 1.0);
+    std::vector<char>& rises = filled(work.rises, islands.count);
+    for (int k = 0; k < islands.count; ++k) rises[k] = work.energy[k] > work.limit[k] * (1.0 + gain);
+    for (const std::size_t k : work.pushed) rises[islands.of(work.hit.rows[k])] = 0;
+    if (std::find(rises.begin(), rises.end(), 1) == rises.end()) return;
+    MixedSystem& plastic = work.plastic;
+    plastic = work.start, work.plastic_friction = work.fresh;
+    for (std::size_t k = 0; k < joints; ++k)
+        if (RowBlock& block = plastic.rows[k]; block.stop.row >= 0) block.right[block.stop.row] = 0.0;
+    for (std::size_t k = joints; k < plastic.rows.size(); ++k) {
+        plastic.rows[k].right[0] = 0.0;
+        for (int i = 1; i < 3; ++i) plastic.rows[k].right[i] += work.returned[k - joints][i - 1];
+    }
+    solve(plastic, work.plastic_friction);
+    blend(work, islands);
+}
+
+/// Adds what the impact did to joints and points.
+void ImpactSolver::deliver(std::size_t joints, std::vector<Vec6>& impulses, ContactPoints& points) const {
+    const Islands& islands = connected_.islands();
+    for (std::size_t k = 0; k < work_.hit.rows.size(); ++k) {
+        const RowBlock& block = work_.hit.rows[k];
+        const double s = work_.share[islands.of(block)];
+        const RowBlock& soft = s < 1.0 ? work_.plastic.rows[k] : block;
+        const auto blended = [&](int i) {
+            return soft.multiplier[i] + s * (block.multiplier[i] - soft.multiplier[i]);
+        };
+        if (k < joints) {
+            for (int i = 0; i < block.size; ++i) impulses[joints_hit_[k]][i] += blended(i);
+            continue;
+        }
+        StepContact& point = points.all[work_.hit_points[k - joints]];
+        point.impact += blended(0);
+        points.own_extras(point).impact_impulse +=
+            s < 1.0 ? (1.0 - s) * impulse_of(soft) + s * impulse_of(block) : impulse_of(block);
+    }
+}
+
 SolveQuality ImpactSolver::solve(MixedSystem& system, const OpenPairs& open, std::size_t few_enough,
                                  StepMotion& motion, ContactPoints& points, std::vector<Vec6>& impulses,
                                  ContactCounters& counters) {
     const ContactOptions& options = motion.options();
     ++counters.impacts;
     ++rounds_;
-    SolveQuality quality;
     const bool in_order = order_.possible() && rounds_ <= most_rounds(points.all.size());
-    Arrays& work = work_;
-    std::vector<std::size_t>& hit_points = filled(work.hit_points, 0);
+    std::vector<std::size_t>& hit_points = filled(work_.hit_points, 0);
     if (in_order) order_.find_earliest(system, open, motion, points, hit_points);
     for (std::size_t k = 0; !in_order && k < points.all.size(); ++k)
         if (points.all[k].bounce >= 0.0) hit_points.push_back(k);
-    MixedSystem& hit = work.hit;
+    MixedSystem& hit = work_.hit;
     hit.mass = system.mass;
     hit.momentum = system.momentum;
     hit.rows.clear(), hit.velocity.clear();
     take_part(system, motion.model(), points);
     const std::size_t joints = hit.rows.size();
-    const ContactRows rows{motion, points};
-    std::vector<FrictionPoint>& friction = filled(work.friction, 0);
-    std::vector<std::size_t>& pushed = filled(work.pushed, 0);
-    std::vector<Vec6>& before = work.before = hit.momentum;
-    for (std::size_t b = 0; b < before.size(); ++b) solve_six(factor_six(hit.mass[b]), before[b]);
-    auto& returned = work.returned;
-    returned.assign(hit_points.size(), {});
-    for (std::size_t j = 0; j < hit_points.size(); ++j) {
-        const StepContact& point = points.all[hit_points[j]];
-        RowBlock block = rows.row_block(point, point.friction > 0.0 ? 3 : 1);
-        if (std::any_of(block.right.begin(), block.right.begin() + block.size,
-                        [](double r) { return r != 0.0; }))
-            pushed.push_back(hit.rows.size());
-        block.right[0] += std::max(0.0, -point.bounce * point.approach);
-        block.state[0] = point.approach < 0.0 ? RowState::free : RowState::at_lower;
-        if (block.size == 3) {
-            friction.push_back({static_cast<int>(hit.rows.size()), point.friction, 0.0, -1.0});
-            friction.back().anisotropic = points.extras(point).is_anisotropic();
-            const double slip = point.bounce > 0.0 && is_impact(point)
-                                    ? std::max(motion.surfaces()[point.contact.first].tangential_restitution,
-                                               motion.surfaces()[point.contact.second].tangential_restitution)
-                                    : 0.0;
-            for (int i = 1; i < 3 && slip > 0.0; ++i)
-                block.right[i] -= returned[j][i - 1] =
-                    slip * (row_velocity(block, i, before) - block.right[i]);
-        }
-        hit.rows.push_back(block);
-    }
+    add_points(motion, points);
+    share_impact(hit, joints, points);
+    work_.start = hit, work_.fresh = work_.friction;
     // No step before has anything to say about an impact: the box takes this one's own normal impulses.
     const bool box = options.friction == FrictionModel::box;
     const IslandRules rules{.friction = box ? FrictionModel::scaled_box : options.friction,
                             .enough = options.residual_tolerance,
                             .few_enough = few_enough};
-    share_impact(hit, joints, points);
-    work.start = hit, work.fresh = friction;
-    solve_rows(hit, joints, friction, rules, motion, counters, quality);
-
-    const Islands& islands = connected_.find(hit);
-    find_kinetic_energy(hit, before, islands, work.limit);
-    find_kinetic_energy(hit, hit.velocity, islands, work.energy);
-    std::vector<double>& share = filled(work.share, islands.count, 1.0);  // of Newton's law, the rest plastic
-    std::vector<char>& rises = filled(work.rises, islands.count);
-    for (int k = 0; k < islands.count; ++k) rises[k] = work.energy[k] > work.limit[k] * (1.0 + gain);
-    for (const std::size_t k : pushed) rises[islands.of(hit.rows[k])] = 0;
-    MixedSystem& plastic = work.plastic;
-    if (std::find(rises.begin(), rises.end(), 1) != rises.end()) {
-        plastic = work.start, work.plastic_friction = work.fresh;
-        for (std::size_t k = 0; k < joints; ++k)
-            if (RowBlock& block = plastic.rows[k]; block.stop.row >= 0) block.right[block.stop.row] = 0.0;
-        for (std::size_t k = joints; k < plastic.rows.size(); ++k) {
-            plastic.rows[k].right[0] = 0.0;
-            for (int i = 1; i < 3; ++i) plastic.rows[k].right[i] += returned[k - joints][i - 1];
-        }
-        solve_rows(plastic, joints, work.plastic_friction, rules, motion, counters, quality);
-        blend(work, islands);
-    }
+    SolveQuality quality;
+    const auto solve = [&](MixedSystem& rows, std::vector<FrictionPoint>& friction) {
+        solve_rows(rows, joints, friction, rules, motion, counters, quality);
+    };
+    solve(hit, work_.friction);
+    keep_energy(joints, solve);
     system.velocity = hit.velocity;
     impulses.resize(system.rows.size());
-    for (std::size_t j = 0; j < joints; ++j) {
-        const RowBlock& block = hit.rows[j];
-        const double s = share[islands.of(block)];
-        for (int i = 0; i < block.size; ++i) {
-            const double other = s < 1.0 ? plastic.rows[j].multiplier[i] : block.multiplier[i];
-            impulses[joints_hit_[j]][i] += other + s * (block.multiplier[i] - other);
-        }
-    }
-    for (std::size_t j = 0; j < hit_points.size(); ++j) {
-        StepContact& point = points.all[hit_points[j]];
-        const RowBlock& block = hit.rows[joints + j];
-        const double s = share[islands.of(block)];
-        double normal = block.multiplier[0];
-        Vec3 impulse = impulse_of(block);
-        if (s < 1.0) {
-            const RowBlock& soft = plastic.rows[joints + j];
-            normal = soft.multiplier[0] + s * (normal - soft.multiplier[0]);
-            impulse = (1.0 - s) * impulse_of(soft) + s * impulse;
-        }
-        point.impact += normal;
-        points.own_extras(point).impact_impulse += impulse;
-    }
+    deliver(joints, impulses, points);
     return quality;
 }
 

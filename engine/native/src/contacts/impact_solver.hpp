@@ -58,6 +58,9 @@ private:
                              const ContactPoints& points);
     void take_part(MixedSystem& system, const ContactModel& model, const ContactPoints& points);
     void share_impact(MixedSystem& hit, std::size_t joints, const ContactPoints& points);
+    void add_points(const StepMotion& motion, const ContactPoints& points);
+    template <class Solve> void keep_energy(std::size_t joints, const Solve& solve);
+    void deliver(std::size_t joints, std::vector<Vec6>& impulses, ContactPoints& points) const;
     void solve_rows(MixedSystem& hit, std::size_t joints, std::vector<FrictionPoint>& friction,
                     const IslandRules& rules, const StepMotion& motion, ContactCounters& counters,
                     SolveQuality& quality);

@@ -11,7 +11,6 @@
 #include "contacts/internal_edges.hpp"
 
 #include <algorithm>
-#include <span>
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/tolerances.hpp"
@@ -93,59 +92,75 @@ double InternalEdges::slop(const SearchedStep& step, const OpenPair& open) const
            (sides ? 2.0 * std::max(predicted_sinking_[a], predicted_sinking_[b]) : 0.0);
 }
 
+InternalEdges::Support InternalEdges::next_support(const SearchedStep& step, int body,
+                                                   std::span<const int>& points, const Cast& cast) {
+    Support found{.pair = pair_of(step.points.all[points.front()].contact)};
+    for (; !points.empty() && pair_of(step.points.all[points.front()].contact) == found.pair;
+         points = points.subspan(1)) {
+        const StepContact& point = step.points.all[points.front()];
+        if (point.toi >= 0.0) continue;
+        const bool first = point.contact.first == body;
+        const double depth = depth_at_toi(step, point, cast.when != Cast::When::ahead);
+        if (depth > found.depth) {
+            const Vec6& holder = cast.velocity[first ? point.contact.second : point.contact.first];
+            found.depth = depth;
+            found.normal = (first ? 1.0 : -1.0) * point.contact.point.normal;
+            found.velocity =
+                linear(holder) + cross(angular(holder), first ? point.second_arm : point.first_arm);
+        }
+        found.begun = std::max(found.begun, -point.contact.point.gap);
+        found.sinking = std::max(found.sinking, depth_at_toi(step, point, false));
+    }
+    return found;
+}
+
+/// How deep a body will be in what holds it when it meets the other, m: iterations leave it falling on the way there.
+double InternalEdges::fallen_depth(const SearchedStep& step, const Support& support, const Mover& moving,
+                                   int body, const Mover& other, Cast::When when, double time,
+                                   double slop) const {
+    const ContactOptions& options = step.motion.options();
+    const double h = options.time_step, left = h * options.unsettled_residual;
+    const bool iterating = when == Cast::When::iterating;
+    if (!iterating && options.solver != SolverKind::iterative) return support.depth;
+    const Vec3 n = support.normal;
+    const double now = height(moving, 0.0, n), top = height(other, 0.0, -n);
+    double falls = 0.0;
+    for (const double part : {time, h}) {  // against what holds it, and against the other
+        const double rises = std::max(part * dot(n, support.velocity), top - height(other, part, -n));
+        falls = std::max(falls, now + rises - height(moving, part, n));
+    }
+    double most = residual_motion * slop;
+    if (iterating)
+        most =
+            std::max(support.begun, left + h * free_fall_allowance * norm(linear(step.motion.dv_ext[body])) +
+                                        support.sinking);
+    else if (falls > most && meets_side_face(moving, other, time, n)) most = left;
+    const double depth = std::max(support.depth, support.begun + std::min(falls, most));
+    return iterating ? depth + slop : depth;  // it met the other with as much
+}
+
 bool InternalEdges::is_internal_edge(const SearchedStep& step, const Mover& moving, int body,
                                      const Mover& other, const OpenPair& open, const Cast& cast, double time,
                                      Vec3 facing) const {
     const ContactOptions& options = step.motion.options();
-    const bool iterating = cast.when == Cast::When::iterating, late = cast.when != Cast::When::ahead;
-    if (!have_sides(moving.shape, other.shape)) return false;
-    const double h = options.time_step, slop = this->slop(step, open), least = share * slop;
-    const bool by_pgs = options.solver == SolverKind::iterative;
-    if (!step.motion.bodies().moves(body) || !(iterating || by_pgs || depth_[body] > least)) return false;
-    const std::span<const int> own = points_of_[body];
-    for (std::size_t at = 0; at < own.size();) {
-        const std::uint64_t pair = pair_of(step.points.all[own[at]].contact);
-        Vec3 n, support_velocity;  // what holds it goes itself, m/s
-        double depth = -unbounded, begun = 0.0, sinking = 0.0;
-        for (; at < own.size() && pair_of(step.points.all[own[at]].contact) == pair; ++at) {
-            const StepContact& point = step.points.all[own[at]];
-            if (point.toi >= 0.0) continue;
-            const double gap = point.contact.point.gap, side = point.contact.first == body ? 1.0 : -1.0;
-            const double deep = depth_at_toi(step, point, late);
-            if (deep > depth) {
-                const int holder = point.contact.first == body ? point.contact.second : point.contact.first;
-                const Vec3 arm = point.contact.first == body ? point.second_arm : point.first_arm;
-                depth = deep, n = side * point.contact.point.normal;
-                support_velocity = linear(cast.velocity[holder]) + cross(angular(cast.velocity[holder]), arm);
-            }
-            begun = std::max(begun, -gap);
-            sinking = std::max(sinking, depth_at_toi(step, point, false));
-        }
-        if (depth == -unbounded || pair == pair_of(open.pair) || std::abs(dot(n, facing)) > same_face_cosine)
+    if (!have_sides(moving.shape, other.shape) || !step.motion.bodies().moves(body)) return false;
+    const double slop = this->slop(step, open), least = share * slop;
+    if (cast.when != Cast::When::iterating && options.solver != SolverKind::iterative &&
+        !(depth_[body] > least))
+        return false;
+    for (std::span<const int> own = points_of_[body]; !own.empty();) {
+        const Support support = next_support(step, body, own, cast);
+        const Vec3 n = support.normal;
+        if (support.depth == -unbounded || support.pair == pair_of(open.pair) ||
+            std::abs(dot(n, facing)) > same_face_cosine)
             continue;
-        if (iterating || by_pgs) {
-            const double now = height(moving, 0.0, n), top = height(other, 0.0, -n);
-            double falls = 0.0;
-            for (const double part : {time, h}) {  // against what holds it, and against the other
-                const double rises = std::max(part * dot(n, support_velocity), top - height(other, part, -n));
-                falls = std::max(falls, now + rises - height(moving, part, n));
-            }
-            const double left = h * options.unsettled_residual;
-            double most = residual_motion * slop;
-            if (iterating)
-                most = std::max(
-                    begun, left + h * free_fall_allowance * norm(linear(step.motion.dv_ext[body])) + sinking);
-            else if (falls > most && meets_side_face(moving, other, time, n)) most = left;
-            falls = std::min(falls, most);
-            depth = std::max(depth, begun + falls);
-            if (iterating) depth += slop;  // it met the other with as much
-        }
+        const double depth = fallen_depth(step, support, moving, body, other, cast.when, time, slop);
         if (!(depth > least)) continue;
         Pose out = moving.body;
         out.position += depth * n;
         const Mover lifted{moving.shape, moving.part, out, moving.velocity, moving.spin};
         const double above = height(lifted, 0.0, n) + height(other, 0.0, -n);
-        if (above > -least && time_of_impact(lifted, other, h, slop) < 0.0) return true;
+        if (above > -least && time_of_impact(lifted, other, options.time_step, slop) < 0.0) return true;
     }
     return false;
 }

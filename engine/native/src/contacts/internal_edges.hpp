@@ -1,6 +1,8 @@
 // Internal edges: sides of what holds a body, and of what it meets first, that it does not meet.
 #pragma once
 
+#include <cstdint>
+#include <span>
 #include <vector>
 
 #include "collision/detection.hpp"
@@ -68,6 +70,19 @@ private:
         double time;
         std::size_t at;
     };
+    /// What holds a body: the points of one pair that are closed where the step begins.
+    struct Support {
+        std::uint64_t pair = 0;
+        Vec3 normal{}, velocity{};  // out of it, of its deepest point; it goes itself, m/s
+        double depth = -unbounded;  // there, when the body meets the next part, m
+        double begun = 0.0;         // the largest where the step begins, m
+        double sinking = 0.0;       // the same with what the velocity then adds
+    };
+    /// That of the first of a body's points, which are left behind.
+    static Support next_support(const SearchedStep& step, int body, std::span<const int>& points,
+                                const Cast& cast);
+    double fallen_depth(const SearchedStep& step, const Support& support, const Mover& moving, int body,
+                        const Mover& other, Cast::When when, double time, double slop) const;
     bool occludes(const SearchedStep& step, const OpenPair& before, double earlier, const OpenPair& after,
                   double later, int body, const std::vector<Vec6>& velocity) const;
 

@@ -167,7 +167,7 @@ void PgsContacts::add_slip(const PgsContact& given, int place) {
     if (plain && !boxed && extras_.empty()) return;
     if (extras_.empty())
         for (std::size_t k = 0; k < slips_.size(); ++k)
-            extras_.push_back({.across = cross(contacts_[k].normal, slips_[k].tangent)});
+            extras_.emplace_back().across = cross(contacts_[k].normal, slips_[k].tangent);
     extras_.resize(contacts_.size());
     extras_[place] = {
         given.across,        given.right[1],

@@ -18,7 +18,7 @@ const FrictionReport& RestingSolver::solve(MixedSystem& system, std::size_t join
     friction_.clear();
     answered_.assign(joints, 1);
     for (StepContact& point : points.all) {
-        system.rows.push_back(rows.resting(point));
+        system.rows.push_back(rows.resting_block(point));
         answered_.push_back(point.answered);
         if (system.rows.back().size > 1)
             rows.add_friction(point, static_cast<int>(system.rows.size()) - 1, friction_);

@@ -57,6 +57,32 @@ bool ContactStage::warm_start_by_pgs(MixedSystem& system, std::size_t known, int
     return true;
 }
 
+/// Iterates until the step is settled, or long enough. Whether the iterations run away.
+bool ContactStage::iterate(MixedSystem& system, PgsLook& look, FrictionReport& report) {
+    double last = unbounded;
+    for (int turn = 0; turn < most_turns || pgs_.solver().work() < most_turns * model_->options.iterations;
+         ++turn) {
+        report = pgs_.run(model_->options, [&](bool over) { return find_more(over, look); });
+        state_.counters.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
+        if (!report.finite) return true;
+        const bool joint_is_worst = pgs_.judge(system, motion_, points_, quality_);
+        if (quality_.body < 0 || report.converged) break;
+        const bool grows = quality_.residual > std::exchange(last, quality_.residual) && system.rows.empty();
+        if (grows && pgs_.runs_away(system, motion_, points_)) return true;
+        if (turn + 1 >= joint_turns && joint_is_worst) break;
+    }
+    pgs_.solver().write(system);
+    return false;
+}
+
+/// What was left out by velocities on the way is looked for with those of the solve.
+bool ContactStage::find_left_out() {
+    for (std::size_t b = 0; b < model_->bodies.count(); ++b)
+        if (model_->bodies.moves(b)) next_[b] = pgs_.solver().velocity(model_->bodies.solver_index[b]);
+    changed_.assign(model_->bodies.count(), 1);
+    return find_impacts({next_, Cast::When::solved}, impacts_.plastic_too()).left_out;
+}
+
 ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
     pgs_.start(system, model_->options.friction);
     next_.clear();
@@ -66,49 +92,25 @@ ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
     FrictionReport report;
     quality_ = {};
     for (bool again = true; again;) {
-        again = false;
-        double last = unbounded;
-        for (int turn = 0;
-             turn < most_turns || pgs_.solver().work() < most_turns * model_->options.iterations; ++turn) {
-            report = pgs_.run(model_->options, [&](bool over) { return find_more(over, look); });
-            state_.counters.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
-            bool joint_is_worst = false;
-            if (report.finite) joint_is_worst = pgs_.judge(system, motion_, points_, quality_);
-            if ((report.finite && quality_.body < 0) || report.converged) break;
-            const bool grows =
-                quality_.residual > std::exchange(last, quality_.residual) && system.rows.empty();
-            if (!report.finite || (grows && pgs_.runs_away(system, motion_, points_))) {
-                points_.all.resize(begun);  // what was met on that way is not
-                search_.find_open(motion_, points_, Cast::When::solved);
-                ran_away_ = true;
-                return {{}, true};
-            }
-            if (turn + 1 >= joint_turns && joint_is_worst) break;
+        if (iterate(system, look, report)) {
+            points_.all.resize(begun);  // what was met on that way is not
+            search_.find_open(motion_, points_, Cast::When::solved);
+            ran_away_ = true;
+            return {{}, true};
         }
-        pgs_.solver().write(system);
-        if (!report.finite) break;
-        if (!look.left_out) {
-            if (needs_impact_first(system, begun, false)) return {};
-            break;
-        }
-        look.left_out = false;  // it was one by velocities on the way
-        for (std::size_t b = 0; b < model_->bodies.count(); ++b)
-            if (model_->bodies.moves(b)) next_[b] = pgs_.solver().velocity(model_->bodies.solver_index[b]);
-        changed_.assign(model_->bodies.count(), 1);
         const std::size_t known = points_.all.size();
-        const bool left_out = find_impacts({next_, Cast::When::solved}, impacts_.plastic_too()).left_out;
-        if (needs_impact_first(system, begun, left_out)) return {};
-        again = points_.all.size() > known;
+        again = std::exchange(look.left_out, false);
+        if (needs_impact_first(system, begun, again && find_left_out())) return {};
+        again = again && points_.all.size() > known;
         if (!again) break;
         state_.counters.contacts += points_.all.size() - known;
         pgs_.take_in(known, state_.cache, motion_, points_);
     }
-    if (report.finite && passes_other_ends(system, system.rows.size(), model_->options.time_step))
+    if (passes_other_ends(system, system.rows.size(), model_->options.time_step))
         return {{.ends_passed = true}};
     const std::size_t blocks = system.rows.size() + points_.all.size();
-    const bool unsettled = quality_.body >= 0;
-    const bool unfinished = report.finite && !report.converged && !system.rows.empty() &&
-                            blocks <= (unsettled ? few_jointed : few_rows);
+    const bool unfinished =
+        !report.converged && !system.rows.empty() && blocks <= (quality_.body >= 0 ? few_jointed : few_rows);
     state_.by_rows = state_.by_rows || unfinished;
     if (unfinished) return {{}, true};
     state_.counters.unsettled += !report.converged;
@@ -121,9 +123,9 @@ ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
             has_rows_[model_->bodies.solver_index[b]] = 1;
     pgs_.deliver(system, !report.converged, motion_, points_, energy_, has_rows_, state_.cache.points,
                  state_.counters);
-    if (report.finite) correct_events(system);
+    correct_events(system);
     pgs_.order(state_.cache.points);
-    return {{.finite = report.finite}};
+    return {};
 }
 
 }  // namespace spook

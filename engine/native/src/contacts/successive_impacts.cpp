@@ -6,6 +6,14 @@
 
 namespace spook {
 
+namespace {
+
+bool is_approached(const StepContact& point) noexcept {
+    return point.bounce >= 0.0 && point.approach < -point.rounding;
+}
+
+}  // namespace
+
 void SuccessiveImpacts::begin(const ContactModel& model) {
     if (!model.surfaces.rebounds && model.options.impacts != ImpactOrder::successive) return;
     const std::size_t bodies = model.bodies.count();
@@ -73,94 +81,105 @@ bool SuccessiveImpacts::come_in_order(const ContactModel& model, const StepConta
     return true;
 }
 
+const Islands& SuccessiveImpacts::connected(const MixedSystem& system, const OpenPairs& open_pairs,
+                                            const ContactBodies& bodies, const ContactPoints& points) {
+    connected_.begin(system, system.rows.size());
+    points.tie(bodies, connected_);
+    for (const OpenPair& open : open_pairs.pairs)
+        if (!open.has_met()) connected_.tie(bodies.solver_pair(open));
+    return connected_.find();
+}
+
+/// The island of a body, −1 for what does not move by itself and what is connected to nothing.
+int SuccessiveImpacts::island(const ContactBodies& bodies, std::size_t body) const noexcept {
+    return bodies.moves(body) ? connected_.islands().of_body[bodies.solver_index[body]] : -1;
+}
+
+/// When each point that is approached closes, and the first of each island.
+void SuccessiveImpacts::find_closing(const StepMotion& motion, const ContactPoints& points) {
+    const Islands& islands = connected_.islands();
+    first_.assign(islands.count, unbounded), closing_.assign(points.all.size(), unbounded);
+    for (std::size_t k = 0; k < points.all.size(); ++k) {
+        if (!is_approached(points.all[k])) continue;
+        closing_[k] = closing_time(motion, points.all[k]);
+        double& earliest = first_[islands.of_body[motion.bodies().solver_body(points.all[k].contact)]];
+        earliest = std::min(earliest, closing_[k]);
+    }
+}
+
+/// Whether a point is closed when the first impact of its island comes.
+bool SuccessiveImpacts::closes_then(const StepMotion& motion, const ContactPoints& points,
+                                    std::size_t k) const {
+    const StepContact& point = points.all[k];
+    const double now = first_[connected_.islands().of_body[motion.bodies().solver_body(point.contact)]];
+    return !(closing_[k] > now) || motion.bodies().is_closed(point.contact, gap_at(motion, point, now));
+}
+
 /// Which islands meet one impact after the other: all, where impacts are successive; else those of free balls of which one pair
 /// alone touches when the next impact comes. Then there is nothing that all of them could take part in.
-void SuccessiveImpacts::find_orderly(const Islands& islands, const StepMotion& motion,
-                                     const ContactPoints& points) {
+void SuccessiveImpacts::find_orderly(const StepMotion& motion, const ContactPoints& points) {
     const ContactBodies& bodies = motion.bodies();
+    const Islands& islands = connected_.islands();
     orderly_.assign(islands.count, 1);
     if (motion.options().impacts == ImpactOrder::successive) return;
     pairs_.assign(islands.count, 0);
-    const auto island = [&](std::size_t b) {
-        return bodies.moves(b) ? islands.of_body[bodies.solver_index[b]] : -1;
-    };
     for (std::size_t b = 0; b < bodies.count(); ++b)
-        if (island(b) >= 0)
-            orderly_[island(b)] =
-                orderly_[island(b)] && bodies.ball[b] && motion.is_free(b) && in_order_[b] >= 0;
+        if (const int own = island(bodies, b); own >= 0)
+            orderly_[own] = orderly_[own] && bodies.ball[b] && motion.is_free(b) && in_order_[b] >= 0;
     for (std::size_t k = 0; k < points.all.size(); ++k) {
         const StepContact& point = points.all[k];
         const int own = islands.of_body[bodies.solver_body(point.contact)];
-        const double now = first_[own];
-        if (now == unbounded ||
-            (closing_[k] > now && !bodies.is_closed(point.contact, gap_at(motion, point, now))))
-            continue;
+        if (first_[own] == unbounded || !closes_then(motion, points, k)) continue;
         const std::uint64_t pair = pair_of(point.contact) + 1;
         const bool another = pairs_[own] != 0 && pairs_[own] != pair;
         if (another || !(motion.surfaces().pair(point.contact).restitution > 0.0)) orderly_[own] = 0;
         pairs_[own] = pair;
     }
     for (std::size_t b = 0; b < bodies.count(); ++b)
-        if (island(b) >= 0 && first_[island(b)] < unbounded)
-            in_order_[b] =
-                orderly_[island(b)] ? 1 : -1;  // where they are is not followed after another impact
+        if (const int own = island(bodies, b); own >= 0 && first_[own] < unbounded)
+            in_order_[b] = orderly_[own] ? 1 : -1;  // where they are is not followed after another impact
 }
 
-void SuccessiveImpacts::find_earliest(MixedSystem& system, const OpenPairs& open_pairs, StepMotion& motion,
-                                      ContactPoints& points, std::vector<std::size_t>& hit_points) {
+/// Follows the bodies of orderly islands to their first impact. Free balls are moved there.
+void SuccessiveImpacts::advance(MixedSystem& system, StepMotion& motion) {
     const ContactBodies& bodies = motion.bodies();
-    connected_.begin(system, system.rows.size());
-    points.tie(bodies, connected_);
-    for (const OpenPair& open : open_pairs.pairs)
-        if (!open.has_met()) connected_.tie(bodies.solver_pair(open));
-    const Islands& islands = connected_.find();
-    const auto is_impact = [](const StepContact& point) {
-        return point.bounce >= 0.0 && point.approach < -point.rounding;
-    };
-    first_.assign(islands.count, unbounded), closing_.assign(points.all.size(), unbounded);
-    for (std::size_t k = 0; k < points.all.size(); ++k) {
-        if (!is_impact(points.all[k])) continue;
-        closing_[k] = closing_time(motion, points.all[k]);
-        double& earliest = first_[islands.of_body[bodies.solver_body(points.all[k].contact)]];
-        earliest = std::min(earliest, closing_[k]);
-    }
-    find_orderly(islands, motion, points);
-    hit_.assign(bodies.count(), 0), balls_.assign(islands.count, 1);
-    for (std::size_t k = 0; k < points.all.size(); ++k) {
-        const StepContact& point = points.all[k];
-        const int own = islands.of_body[bodies.solver_body(point.contact)];
-        const double now = first_[own];
-        if (!orderly_[own]) {
-            if (point.bounce >= 0.0) hit_points.push_back(k);
-            continue;
-        }
-        if (!is_impact(point) ||
-            (closing_[k] > now && !bodies.is_closed(point.contact, gap_at(motion, point, now))))
-            continue;
-        hit_points.push_back(k);
-        hit_[point.contact.first] = hit_[point.contact.second] = 1;
-    }
-    const auto island = [&](std::size_t b) {
-        return bodies.moves(b) ? islands.of_body[bodies.solver_index[b]] : -1;
-    };
+    balls_.assign(connected_.islands().count, 1);
     for (std::size_t b = 0; b < bodies.count(); ++b)
-        if (island(b) >= 0) balls_[island(b)] = balls_[island(b)] && bodies.ball[b] && !bodies.jointed[b];
+        if (const int own = island(bodies, b); own >= 0)
+            balls_[own] = balls_[own] && bodies.ball[b] && !bodies.jointed[b];
+    const double h = motion.options().time_step;
     for (std::size_t b = 0; b < bodies.count(); ++b) {
-        const int own = island(b);
+        const int own = island(bodies, b);
         if (own < 0 || first_[own] == unbounded || !orderly_[own]) continue;
-        if (const double time = std::min(first_[own], motion.options().time_step);
-            hit_[b] && time > clock_[b]) {
+        if (const double time = std::min(first_[own], h); hit_[b] && time > clock_[b]) {
             path_[b] = path_until(motion, b, time);
             clock_[b] = time;
             if (balls_[own])
-                apply_forces_before(
-                    b, part_of_forces(time / motion.options().time_step, motion.surfaces().rebounds), motion,
-                    system);
+                apply_forces_before(b, part_of_forces(time / h, motion.surfaces().rebounds), motion, system);
         }
         if (!balls_[own] || motion.moves_along_forces(static_cast<int>(b))) continue;
         motion.event_time[b] = clock_[b];
         if (clock_[b] > 0.0) motion.predicted[b] = sum(Vec6{}, path_[b], 1.0 / clock_[b]);
     }
+}
+
+void SuccessiveImpacts::find_earliest(MixedSystem& system, const OpenPairs& open_pairs, StepMotion& motion,
+                                      ContactPoints& points, std::vector<std::size_t>& hit_points) {
+    const ContactBodies& bodies = motion.bodies();
+    const Islands& islands = connected(system, open_pairs, bodies, points);
+    find_closing(motion, points);
+    find_orderly(motion, points);
+    hit_.assign(bodies.count(), 0);
+    for (std::size_t k = 0; k < points.all.size(); ++k) {
+        const StepContact& point = points.all[k];
+        if (!orderly_[islands.of_body[bodies.solver_body(point.contact)]]) {
+            if (point.bounce >= 0.0) hit_points.push_back(k);
+        } else if (is_approached(point) && closes_then(motion, points, k)) {
+            hit_points.push_back(k);
+            hit_[point.contact.first] = hit_[point.contact.second] = 1;
+        }
+    }
+    advance(system, motion);
     for (StepContact& point : points.all)
         if (come_in_order(motion.model(), point)) move_to_last_impact(motion, point);
     for (const std::size_t k : hit_points) {

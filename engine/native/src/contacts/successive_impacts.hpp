@@ -33,7 +33,13 @@ private:
     double last_impact_time(const StepContact& point) const noexcept;
     double closing_time(const StepMotion& motion, const StepContact& point) const;
     void apply_forces_before(std::size_t body, double part, StepMotion& motion, MixedSystem& system);
-    void find_orderly(const Islands& islands, const StepMotion& motion, const ContactPoints& points);
+    const Islands& connected(const MixedSystem& system, const OpenPairs& open_pairs,
+                             const ContactBodies& bodies, const ContactPoints& points);
+    int island(const ContactBodies& bodies, std::size_t body) const noexcept;
+    void find_closing(const StepMotion& motion, const ContactPoints& points);
+    bool closes_then(const StepMotion& motion, const ContactPoints& points, std::size_t k) const;
+    void find_orderly(const StepMotion& motion, const ContactPoints& points);
+    void advance(MixedSystem& system, StepMotion& motion);
 
     std::vector<double> clock_;          // by body: up to when its way in the step is known, s
     std::vector<Vec6> path_;             // and that way, m and rad

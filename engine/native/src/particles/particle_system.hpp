@@ -32,7 +32,6 @@ public:
     const StageList& stages() const noexcept { return stages_; }
 
     ParticleSolver solver() const noexcept { return parts_.solver; }
-    const std::vector<int>& node_of_body() const noexcept { return nodes_.of_body; }
 
     // --- what run_loop asks for ---
     void advance(std::int64_t steps);

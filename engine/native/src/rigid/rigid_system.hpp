@@ -72,7 +72,6 @@ public:
     RigidSolver solver() const noexcept { return model_.solver; }
     void count(RunReport& report, std::int64_t steps) const;
     using Unsettled = spook::Unsettled;
-    const Unsettled& unsettled() const noexcept { return live_.unsettled; }
     std::vector<double> final_state();
     /// The same without a solve: velocities are NaN.
     std::vector<double> places() const { return readings_.states(false); }
