@@ -81,7 +81,7 @@ extern "C" double rods(long count, long steps) {
             b.v += light * (push.y - later.y) - H * G;
             b.w += half / INERTIA * (b.s * push.x - b.c * push.y);
             if (k + 1 < n) b.w -= (arm[k + 1].x * later.y - arm[k + 1].y * later.x) / INERTIA;
-            const double sine = H * b.w, cosine = std::sqrt(1.0 - sine * sine), c = b.c;  // the variational turn
+            const double sine = std::sin(H * b.w), cosine = std::cos(H * b.w), c = b.c;
             b.x += H * b.u;
             b.y += H * b.v;
             b.c = c * cosine - b.s * sine;
