@@ -10,6 +10,7 @@ from spook_tracker.engine import PLAIN, simulate
 from spook_tracker.scalar_tests.case import Configuration, Ladder, Simulate
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.document.order import in_range, observed_order
+from spook_tracker.tracker.measure.remembered import of_test
 
 BAND = 0.1
 LADDERS = [
@@ -18,6 +19,7 @@ LADDERS = [
     for ladder in test.ladders
     for configuration in ladder.configurations
 ]
+TEST_OF = {id(ladder): name for name, ladder, _ in LADDERS}
 ORDERED = [entry for entry in LADDERS if entry[2].expected_order is not None]
 ORDERS = {(name, ladder.name, c.name): c.expected_order for name, ladder, c in LADDERS}
 
@@ -29,6 +31,7 @@ class Rung:
 
     def __init__(self, ladder: Ladder, h: float, configuration: Configuration) -> None:
         self.steps: list[int] = []
+        self.engine = of_test(TEST_OF[id(ladder)], simulate, scenes=True)  # two ladders may read one run
         self.error: float | Exception
         try:
             self.error = ladder.error(self._counting, h, configuration.method)
@@ -36,7 +39,7 @@ class Rung:
             self.error = lost
 
     def _counting(self, scene: Any, **options: Any) -> Any:
-        result = simulate(scene, **options)
+        result = self.engine(scene, **options)
         self.steps.append(result.steps if result.completed else -1)
         return result
 
