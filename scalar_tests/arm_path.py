@@ -259,11 +259,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(np.abs(strays(simulate, time_step, method)).max())
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same half second with nothing observed."""
-    return simulate(led(), time_step=time_step, duration=DURATION, method=method)
-
-
 def draw(simulate: Simulate) -> Drawing:
     """Every joint's distance from the path at 1/60 s."""
     off = strays(simulate, TIME_STEP)
@@ -409,7 +404,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.02,
             target_seconds=0.01,
         ),

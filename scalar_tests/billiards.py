@@ -13,7 +13,6 @@ from spook_tracker.engine import (
     Method,
     Plane,
     Position,
-    Result,
     RigidBody,
     Scene,
     SimulationFailed,
@@ -101,11 +100,6 @@ def shot_errors(
         float(np.linalg.norm(result["v"][2] - other)),
         float(np.linalg.norm(rolls)),
     )
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """A cue ball with back spin after a full hit, with nothing observed."""
-    return simulate(table(-1.0, 0.0), time_step=time_step, duration=DURATION, method=method)
 
 
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
@@ -361,7 +355,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-3,
             target_seconds=0.003,
         ),

@@ -12,7 +12,6 @@ from spook_tracker.engine import (
     Method,
     Plane,
     Position,
-    Result,
     RigidBody,
     Scene,
     Sphere,
@@ -83,12 +82,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return abs(height_error(simulate, MIDDLE, time_step, method))
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same flight with nothing observed."""
-    lasts = round(flight(MIDDLE)[1] / time_step) * time_step
-    return simulate(scene(MIDDLE), time_step=time_step, duration=lasts, method=method)
-
-
 def comes_back(simulate: Simulate, height: float) -> bool:
     """Whether the second bounce of a drop from so high [m] is right."""
     return abs(height_error(simulate, MIDDLE, TIME_STEP, height=height)) <= RIGHT
@@ -156,7 +149,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-2,
             target_seconds=0.01,
         ),

@@ -17,7 +17,6 @@ from spook_tracker.engine import (
     Minimum,
     Plane,
     Position,
-    Result,
     RigidBody,
     Scene,
     Sphere,
@@ -178,11 +177,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(np.sqrt(np.mean(np.square(worst))))
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same bounces with nothing observed."""
-    return simulate(scene(), time_step=time_step, duration=0.95 * STOP, method=method)
-
-
 def fastest_impact(simulate: Simulate) -> BreakPoint:
     """Highest speed [m/s] at which the ball does not pass a plate of PLATE [m], at h = 1/60 s."""
 
@@ -340,7 +334,6 @@ TEST = ScalarTest(
                 Configuration(name="half-step", method=Method(half_step_velocities=True), expected_order=2.0),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.05,
             target_seconds=0.01,
         ),

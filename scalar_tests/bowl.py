@@ -15,7 +15,6 @@ from spook_tracker.engine import (
     Maximum,
     Method,
     Position,
-    Result,
     RigidBody,
     Scene,
     Sphere,
@@ -221,11 +220,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(np.abs(result["x"][:, 0] - rolled(result.sample_times["x"])).max())
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same with nothing observed."""
-    return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
-
-
 def draw(simulate: Simulate) -> Drawing:
     """Place of the ball, over five and over thirty-one facets."""
     curves, lasts = [], []
@@ -362,7 +356,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-2,
             target_seconds=0.05,
         ),

@@ -21,7 +21,6 @@ from spook_tracker.engine import (
     Motor,
     Particle,
     Position,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -181,11 +180,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return -0.5 - float(result["x"][2]) - 0.5 * SLIPS * DURATION**2
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same with nothing observed."""
-    return simulate(bollard(), time_step=time_step, duration=DURATION, method=method)
-
-
 def draw(simulate: Simulate) -> Drawing:
     """Pull behind over pull before while the wire slips, against the angle round the bar."""
     turns = [0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5]
@@ -342,7 +336,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-2,
             target_seconds=0.01,
         ),

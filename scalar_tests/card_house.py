@@ -17,7 +17,6 @@ from spook_tracker.engine import (
     MaximumAbsolute,
     Method,
     Position,
-    Result,
     RigidBody,
     Scene,
 )
@@ -121,11 +120,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     observe = {"left": Final(quantity=ContactForce("left 0", other="table"))}
     result = simulate(scene(), time_step=time_step, duration=DURATION, method=method, observe=observe)
     return float(result["left"][2]) / (cards.CARD * cards.GRAVITY + load(STOREYS)) - 1.0
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same with nothing observed."""
-    return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
 
 
 def draw(simulate: Simulate) -> Drawing:
@@ -252,7 +246,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-9,
             target_seconds=0.1,
         ),

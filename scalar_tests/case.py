@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 from spook_tracker.engine.method import PLAIN, Method
 from spook_tracker.engine.observe import Observable
@@ -235,12 +235,42 @@ class Configuration:
     time_steps: tuple[float, ...] = ()  # s, coarse to fine; none: those of the ladder
 
 
+class _Simulated(BaseException):
+    """Carries a simulation out of what asked for it."""
+
+    def __init__(self, result: Result) -> None:
+        self.result = result
+
+
+@dataclass(frozen=True, slots=True)
+class Unobserved:
+    """The simulation that an error is read off, with nothing observed: the first one that it asks for."""
+
+    error: Callable[[Simulate, float, Method], float]
+
+    def __call__(self, simulate: Simulate, time_step: float, method: Method) -> Result:
+        def bare(scene: Scene, *, observe: Mapping[str, Observable] | None = None, **how: Any) -> Result:
+            raise _Simulated(simulate(scene, **how))
+
+        try:
+            self.error(bare, time_step, method)
+        except _Simulated as simulated:
+            return simulated.result
+        raise ValueError("this error simulates nothing, so there is nothing to time: give its ladder a `run`")
+
+
+def _of_the_error(simulate: Simulate, time_step: float, method: Method) -> Result:
+    """Stands for `Unobserved(error)` where a ladder names no other run."""
+    raise NotImplementedError
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ladder:
     """Error against run time: time steps from coarse to fine, run in each configuration.
 
-    `error(simulate, time_step, method)` measures; `run(simulate, time_step, method)` does the same simulation
-    with nothing observed, to be timed.
+    `error(simulate, time_step, method)` measures; `run(simulate, time_step, method)` is what is timed, the same
+    simulation with nothing observed. It is found by itself, and given where the error works long before it simulates,
+    or shared: ladders with equal runs share their times.
     """
 
     name: str
@@ -249,12 +279,16 @@ class Ladder:
     time_steps: tuple[float, ...]  # s, coarse to fine
     configurations: tuple[Configuration, ...]
     error: Callable[[Simulate, float, Method], float]
-    run: Callable[[Simulate, float, Method], Result]
+    run: Callable[[Simulate, float, Method], Result] = _of_the_error
     target_error: float | None = None  # for "time to reach a given error", in `unit`
     target_seconds: float | None = None  # for "error reached in a given time", s
     time_tolerance: float = (
         0.0  # relative: a change of run time below is not told; 0 leaves it to the noise, 1 % at least
     )
+
+    def __post_init__(self) -> None:
+        if self.run is _of_the_error:
+            object.__setattr__(self, "run", Unobserved(self.error))
 
     def steps_of(self, configuration: Configuration) -> tuple[float, ...]:
         """Time steps [s] of one configuration, coarse to fine."""

@@ -14,7 +14,6 @@ from spook_tracker.engine import (
     Final,
     Method,
     Position,
-    Result,
     Trace,
     Velocity,
 )
@@ -137,11 +136,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(result["x"][0]) - 0.5 * climbing() * DURATION**2
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same climb with nothing observed."""
-    return simulate(scene(-SLOPE, torque=TORQUE), time_step=time_step, duration=DURATION, method=method)
-
-
 def draw(simulate: Simulate) -> Drawing:
     """Acceleration against the torque."""
     torques = tuple(SLIPS * k / 10.0 for k in range(2, 15))
@@ -256,7 +250,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.01,
             target_seconds=0.05,
         ),

@@ -16,7 +16,6 @@ from spook_tracker.engine import (
     Method,
     Plane,
     Position,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -101,11 +100,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     result = simulate(scene(), time_step=time_step, duration=0.5, method=method, observe=observe)
     way = float(result["x"][0]) * math.cos(AWAY) + float(result["x"][1]) * math.sin(AWAY)
     return (BELT * 0.5 - way) - LAG
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same ride with nothing observed."""
-    return simulate(scene(), time_step=time_step, duration=0.5, method=method)
 
 
 def climbs(simulate: Simulate, slope: float) -> bool:
@@ -255,7 +249,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.01,
             target_seconds=0.01,
         ),

@@ -18,7 +18,6 @@ from spook_tracker.engine import (
     Final,
     Hinge,
     Method,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -248,11 +247,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(result["w"][2]) - linear(0.1)
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same with nothing observed."""
-    return simulate(scene(SPEED, leans=False), time_step=time_step, duration=0.1, method=method)
-
-
 def draw(simulate: Simulate) -> Drawing:
     """Yaw rate per steering angle against the speed, of three vehicles."""
     curves, off = [], 0.0
@@ -390,7 +384,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-3,
             target_seconds=0.1,
         ),

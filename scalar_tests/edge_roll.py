@@ -10,7 +10,6 @@ from spook_tracker.engine import (
     Box,
     Final,
     Method,
-    Result,
     RigidBody,
     Scene,
     Sphere,
@@ -112,11 +111,6 @@ def _measure(simulate: Simulate) -> dict[str, float]:
         "fast_speed_error": max((abs(speed) for speed, _ in fast)),
         "fast_spin_error": max((abs(spin) for _, spin in fast)),
     }
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """A smooth ball that slides off slowly, with nothing observed."""
-    return simulate(scene(SLOW, False), time_step=time_step, duration=DURATION, method=method)
 
 
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
@@ -265,7 +259,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-3,
             target_seconds=0.01,
         ),

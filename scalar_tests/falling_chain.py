@@ -23,7 +23,6 @@ from spook_tracker.engine import (
     Penetration,
     Plane,
     Position,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -224,11 +223,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return measure(simulate, chain(FEW), time_step, method)["momentum_error"]
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same fall with nothing observed."""
-    return simulate(chain(FEW), time_step=time_step, duration=DURATION, method=method)
-
-
 def draw(simulate: Simulate) -> Drawing:
     """Energy of both, over that at the start."""
     curves, gains = [], []
@@ -352,7 +346,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
             ),  # rounding
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-9,
             target_seconds=0.1,
         ),

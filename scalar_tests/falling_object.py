@@ -13,7 +13,6 @@ from spook_tracker.engine import (
     Method,
     Particle,
     Position,
-    Result,
     Scene,
     Trace,
     Velocity,
@@ -85,11 +84,6 @@ def half_step_errors(simulate: Simulate) -> dict[str, float]:
 def position_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Depth minus ½ g t² at 20 s [m]."""
     return fall(simulate, time_step, method)[0] - float(fallen(DURATION))
-
-
-def run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same fall with nothing observed."""
-    return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
 
 
 def keeps_limit(simulate: Simulate, time_step: float) -> bool:
@@ -350,7 +344,6 @@ TEST = ScalarTest(
                 Configuration(name="half-step", method=HALF_STEP, expected_order=None),
             ),
             error=position_error,
-            run=run,
             target_error=1.0,
             target_seconds=1e-3,
         ),

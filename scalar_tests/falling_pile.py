@@ -18,7 +18,6 @@ from spook_tracker.engine import (
     Method,
     Penetration,
     Plane,
-    Result,
     RigidBody,
     Scene,
     Sphere,
@@ -140,11 +139,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
         observe={"depth": Maximum(quantity=Penetration())},
     )
     return float(result["depth"].max())
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same with nothing observed."""
-    return simulate(scene(TALLEST, 0.0), time_step=time_step, duration=LADDER_DURATION, method=method)
 
 
 def column(places: tuple[tuple[float, float, float], ...], speed: float) -> Scene:
@@ -294,7 +288,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative, 200 sweeps", method=SWEEPS, expected_order=None),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-6,
             target_seconds=0.1,
         ),

@@ -20,7 +20,6 @@ from spook_tracker.engine import (
     Orientation,
     Position,
     Prismatic,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -222,11 +221,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(np.abs(z - PUSHED * np.cos(heave_rate() * result.sample_times["z"])).max())
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same bobbing with nothing observed."""
-    return simulate(scene(raised=PUSHED), time_step=time_step, duration=2.0, method=method)
-
-
 def draw_heave(simulate: Simulate) -> Drawing:
     """Height above the draught against time."""
     observe = {"z": Trace(quantity=Position("log"))}
@@ -409,7 +403,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=5e-3,
             target_seconds=0.01,
         ),

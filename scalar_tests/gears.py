@@ -21,7 +21,6 @@ from spook_tracker.engine import (
     Motor,
     Prismatic,
     Relation,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -195,11 +194,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(result["angle"][-1]) - 0.5 * TORQUE * RATIO / reduced_inertia()
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same start with nothing observed."""
-    return simulate(planetary(TORQUE), time_step=time_step, duration=1.0, method=method)
-
-
 def draw(simulate: Simulate) -> Drawing:
     """Angles of all three against time."""
     observe = {name: Trace(quantity=JointCoordinate(f"{name} axle"), every=12) for name in INERTIA}
@@ -359,7 +353,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.1,
             target_seconds=0.05,
         ),

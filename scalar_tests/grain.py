@@ -16,7 +16,6 @@ from spook_tracker.engine import (
     Method,
     Plane,
     Position,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -179,11 +178,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     result = simulate(scene(throw=THROW), time_step=time_step, duration=1.5, method=method, observe=observe)
     found = grain_axes(float(result["x"][0]), float(result["x"][1]))
     return math.dist(found, stop())
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same throw with nothing observed."""
-    return simulate(scene(throw=THROW), time_step=time_step, duration=1.5, method=method)
 
 
 def stands(simulate: Simulate, tangent: float) -> bool:
@@ -393,7 +387,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.01,
             target_seconds=0.01,
         ),

@@ -18,7 +18,6 @@ from spook_tracker.engine import (
     Method,
     Position,
     Prismatic,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -133,11 +132,6 @@ def sunk(simulate: Simulate, time_step: float, method: Method) -> float:
     observe = {"x": Final(quantity=Position("capsule"), from_start=True)}
     result = simulate(scene(GRIPPED), time_step=time_step, duration=DURATION, method=method, observe=observe)
     return float(result["x"][2])
-
-
-def run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same second with nothing observed."""
-    return simulate(scene(GRIPPED), time_step=time_step, duration=DURATION, method=method)
 
 
 def draw_time(simulate: Simulate) -> Drawing:
@@ -277,7 +271,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
             ),
             error=sunk,
-            run=run,
             target_error=1e-9,
             target_seconds=0.01,
         ),

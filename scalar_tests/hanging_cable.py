@@ -15,7 +15,6 @@ from spook_tracker.engine import (
     MaximumAbsolute,
     Method,
     Position,
-    Result,
     RigidBody,
     Scene,
 )
@@ -164,11 +163,6 @@ def pull_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return -float(result["force"][0]) / horizontal(10) - 1.0
 
 
-def run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same second with nothing observed."""
-    return simulate(scene(10), time_step=time_step, duration=DURATION, method=method)
-
-
 def draw(simulate: Simulate) -> Drawing:
     """Where the links lie after a second, and the catenary."""
     count = 10
@@ -260,7 +254,6 @@ TEST = ScalarTest(
                 ),
             ),  # exact
             error=pull_error,
-            run=run,
             target_error=1e-9,
             target_seconds=0.01,
         ),

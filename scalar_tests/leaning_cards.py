@@ -19,7 +19,6 @@ from spook_tracker.engine import (
     Part,
     Plane,
     Position,
-    Result,
     RigidBody,
     Scene,
 )
@@ -133,11 +132,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(result["left"][0]) / (need() * CARD * GRAVITY) - 1.0
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same with nothing observed."""
-    return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
-
-
 def draw(simulate: Simulate) -> Drawing:
     """Thrust over weight against the lean."""
     leans = [5.0, 15.0, 25.0, 35.0, 45.0]
@@ -244,7 +238,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
             ),
             error=ladder_error,
-            run=ladder_run,
         ),
     ),
 )

@@ -135,11 +135,6 @@ def swing(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The swing under the heavy load with nothing observed."""
-    return simulate(scene(), time_step=time_step, duration=LADDER_DURATION, method=method)
-
-
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """How far the load is from its swing at most [m], of 0.1 m."""
     observe = {"load": Trace(quantity=Position("load"))}
@@ -325,7 +320,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-3,
             target_seconds=0.01,
         ),

@@ -21,7 +21,6 @@ from spook_tracker.engine import (
     MaximumAbsolute,
     Method,
     Position,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -207,11 +206,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return 100.0 * float(result["place"].max()) / (2.0 * radius(LADDER_COUNT))
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same ring with nothing observed."""
-    return simulate(scene(LADDER_COUNT), time_step=time_step, duration=1.0, method=method)
-
-
 SOFTEST = SAGGED * 2.0 * radius(LADDER_COUNT) / sinks(LADDER_COUNT)  # m/N, rad/(N m)
 TEST = ScalarTest(
     title="Closed ring of locks",
@@ -264,7 +258,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=None,
             target_seconds=None,
         ),

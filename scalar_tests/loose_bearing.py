@@ -24,7 +24,6 @@ from spook_tracker.engine import (
     PointOnLine,
     Position,
     Prismatic,
-    Result,
     RigidBody,
     Scene,
     Sphere,
@@ -271,11 +270,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(np.abs(x - path(times)).max())
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same turns with nothing observed."""
-    return simulate(scene(time_step), time_step=time_step, duration=DURATION, method=method)
-
-
 def draw(simulate: Simulate) -> Drawing:
     """How far the slider is ahead of the pin."""
     times, x, _ = runs(simulate, TIME_STEP)
@@ -397,7 +391,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=5e-4,
             target_seconds=0.02,
         ),

@@ -14,7 +14,6 @@ from spook_tracker.engine import (
     Method,
     Plane,
     Position,
-    Result,
     RigidBody,
     Scene,
 )
@@ -308,13 +307,8 @@ TEST = ScalarTest(
             error=lambda simulate, time_step, method: sinking(
                 simulate, 9, 1.02 * LEAST[9], time_step, method
             ),
-            run=lambda simulate, time_step, method: _run(simulate, time_step, method),
             target_error=1e-3,
             target_seconds=0.2,
         ),
     ),
 )
-
-
-def _run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    return simulate(scene(9, 1.02 * LEAST[9]), time_step=time_step, duration=DURATION, method=method)

@@ -18,7 +18,6 @@ from spook_tracker.engine import (
     Load,
     Method,
     Motor,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -142,11 +141,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(result["turned"][-1] - exact_angle(DURATION))
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same wheel with nothing observed."""
-    return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
-
-
 def draw(simulate: Simulate) -> Drawing:
     """Speed against time."""
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=OBSERVE)
@@ -255,7 +249,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.1,
             target_seconds=0.1,
         ),

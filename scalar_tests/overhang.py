@@ -17,7 +17,6 @@ from spook_tracker.engine import (
     Penetration,
     Plane,
     Position,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -149,11 +148,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(result["depth"])
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same fall with nothing observed."""
-    return simulate(scene(FALLEN, OUTSIDE), time_step=time_step, duration=LADDER_DURATION, method=method)
-
-
 def _at_most(name: str, description: str, unit: str, limit: float, source: str) -> Metric:
     return Metric(
         name=name,
@@ -256,7 +250,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
             ),
             error=ladder_error,
-            run=ladder_run,
         ),
     ),
     stability=(

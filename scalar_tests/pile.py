@@ -40,6 +40,7 @@ from spook_tracker.scalar_tests.case import (
     ScalarTest,
     Simulate,
     StabilityStudy,
+    Unobserved,
 )
 
 COUNT = 1000
@@ -188,11 +189,6 @@ def ladder_load(simulate: Simulate, time_step: float, method: Method) -> float:
     return max(STARTS * LADDER_SPREAD, abs(found.slowed - LADDER_MISSING_LOAD))
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same pile with nothing observed."""
-    return simulate(scene(LADDER_COUNT), time_step=time_step, duration=STEPS * TIME_STEP, method=method)
-
-
 def pyramid(friction: float) -> Scene:
     """The least pile: three spheres on the floor, SPACING apart, and one on all of them."""
     rough = Material(friction=friction)
@@ -244,7 +240,7 @@ def _ladder(
             Configuration(name="direct", method=PLAIN, expected_order=None),
         ),
         error=error,
-        run=ladder_run,
+        run=Unobserved(ladder_overlap),
     )
 
 

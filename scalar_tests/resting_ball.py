@@ -11,7 +11,6 @@ from spook_tracker.engine import (
     Final,
     Method,
     Plane,
-    Result,
     RigidBody,
     Scene,
     Sphere,
@@ -60,11 +59,6 @@ def force(simulate: Simulate, time_step: float = TIME_STEP, method: Method = PLA
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """How far the force is from the weight, over the weight."""
     return abs(force(simulate, time_step, method)["weight_error"])
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same with nothing observed."""
-    return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
 
 
 def heaviest(simulate: Simulate) -> BreakPoint:
@@ -150,7 +144,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-3,
             target_seconds=0.1,
         ),

@@ -6,7 +6,7 @@ import functools
 import math
 from dataclasses import replace
 
-from spook_tracker.engine import PLAIN, Box, Final, Method, Plane, Position, Result, RigidBody, Scene
+from spook_tracker.engine import PLAIN, Box, Final, Method, Plane, Position, RigidBody, Scene
 from spook_tracker.engine.bodies import Material
 from spook_tracker.engine.shapes import Shape
 from spook_tracker.scalar_tests.bracket import break_point
@@ -61,11 +61,6 @@ def depth(simulate: Simulate, floor: str, time_step: float = TIME_STEP, method: 
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """The depth on a box [m]."""
     return abs(depth(simulate, "box", time_step, method))
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same with nothing observed."""
-    return simulate(scene("box"), time_step=time_step, duration=DURATION, method=method)
 
 
 def stays(simulate: Simulate, aside: float) -> bool:
@@ -146,7 +141,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-3,
             target_seconds=0.1,
         ),

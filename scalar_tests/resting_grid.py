@@ -17,7 +17,6 @@ from spook_tracker.engine import (
     Method,
     Plane,
     Position,
-    Result,
     RigidBody,
     Scene,
     Sphere,
@@ -36,6 +35,7 @@ from spook_tracker.scalar_tests.case import (
     ScalarTest,
     Simulate,
     StabilityStudy,
+    Unobserved,
 )
 from spook_tracker.scalar_tests.heavier import heavier
 
@@ -122,11 +122,6 @@ def ladder_load(simulate: Simulate, time_step: float, method: Method) -> float:
 
 def ladder_depth(simulate: Simulate, time_step: float, method: Method) -> float:
     return moved(simulate, heavy_on_light(), time_step, method)[0]
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The heavy box on the light one, with nothing observed."""
-    return simulate(heavy_on_light(), time_step=time_step, duration=DURATION, method=method)
 
 
 def longest_step(simulate: Simulate) -> BreakPoint:
@@ -244,7 +239,7 @@ TEST = ScalarTest(
                 ),
             ),
             error=error,
-            run=ladder_run,
+            run=Unobserved(ladder_load),
             target_error=target,
             target_seconds=0.1,
         )

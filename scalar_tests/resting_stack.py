@@ -143,11 +143,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(np.abs(held / expected(LADDER_COUNT) - 1.0).max())
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same stack with nothing observed."""
-    return simulate(scene(LADDER_COUNT), time_step=time_step, duration=LADDER_DURATION, method=method)
-
-
 def _stands(simulate: Simulate, masses: tuple[float, ...], tolerance: float = 1e-6) -> bool:
     """Whether boxes of these masses [kg], bottom first, stand still for two seconds with the right loads."""
     built = scene(len(masses), masses)
@@ -289,7 +284,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.1,
             target_seconds=1.0,
         ),

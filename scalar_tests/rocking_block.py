@@ -18,7 +18,6 @@ from spook_tracker.engine import (
     Method,
     Orientation,
     Plane,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -232,11 +231,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return kept(leans(simulate, time_step, method), time_step) / KEPT**2 - 1.0
 
 
-def run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same rocking with nothing observed."""
-    return simulate(scene(), time_step=time_step, duration=whole(time_step), method=method)
-
-
 def draw(simulate: Simulate) -> Drawing:
     """The lean over time at three steps."""
     curves = []
@@ -367,7 +361,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
             ),
             error=ladder_error,
-            run=run,
             target_error=1e-2,
             target_seconds=0.05,
         ),

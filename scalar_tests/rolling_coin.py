@@ -19,7 +19,6 @@ from spook_tracker.engine import (
     Orientation,
     Plane,
     Position,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -195,11 +194,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return abs(complex(result["x"][0], result["x"][1]) - place)
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same half turn with nothing observed."""
-    return simulate(scene(COIN), time_step=time_step, duration=half_turn(time_step), method=method)
-
-
 def draw(simulate: Simulate) -> Drawing:
     """How far the coin leans over one turn, at three time steps."""
     curves, ends = [], []
@@ -327,7 +321,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.01,
             target_seconds=0.1,
         ),

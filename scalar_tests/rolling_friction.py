@@ -15,7 +15,6 @@ from spook_tracker.engine import (
     Method,
     Plane,
     Position,
-    Result,
     RigidBody,
     Scene,
     Sphere,
@@ -100,11 +99,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     observe = {"x": Final(quantity=Position("ball"))}
     result = simulate(scene(), time_step=time_step, duration=2.0, method=method, observe=observe)
     return float(np.hypot(result["x"][0], result["x"][1])) - 0.5 * SPEED**2 / BRAKE
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same ball with nothing observed."""
-    return simulate(scene(), time_step=time_step, duration=2.0, method=method)
 
 
 def stands(simulate: Simulate, slope: float) -> bool:
@@ -241,7 +235,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.002,
             target_seconds=0.01,
         ),

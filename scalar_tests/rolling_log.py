@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Method, Orientation, Result, Trace
+from spook_tracker.engine import PLAIN, Method, Orientation, Trace
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
@@ -90,12 +90,6 @@ def edge(simulate: Simulate, easy: float, hard: float) -> BreakPoint:
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Relative error of the roll's frequency, ratio 0.15."""
     return swing(simulate, ROLLED[0], time_step, method) / roll_rate(ROLLED[0]) - 1.0
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same roll with nothing observed."""
-    asked = scene(ROLLED[0], roll=NUDGE)
-    return simulate(asked, time_step=time_step, duration=DURATION, method=method)
 
 
 def draw(simulate: Simulate) -> Drawing:
@@ -196,7 +190,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=2.0),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-4,
             target_seconds=0.01,
         ),

@@ -11,7 +11,6 @@ from spook_tracker.engine import (
     Method,
     Plane,
     Position,
-    Result,
     RigidBody,
     Scene,
     Sphere,
@@ -165,11 +164,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(result["place"][0]) - 0.5 * accelerations(ROLLING)[0] * LADDER_DURATION**2
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same rolling with nothing observed."""
-    return simulate(scene(ROLLING), time_step=time_step, duration=LADDER_DURATION, method=method)
-
-
 TEST = ScalarTest(
     title="Rolling and sliding sphere",
     question="Does a sphere on a slope roll while friction can hold its contact, and slide beyond?",
@@ -219,7 +213,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.05,
             target_seconds=0.01,
         ),

@@ -21,7 +21,6 @@ from spook_tracker.engine import (
     Method,
     Momentum,
     Position,
-    Result,
     RigidBody,
     Scene,
     Shape,
@@ -247,11 +246,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(result["E"]) / (0.5 * DOLL * float(np.dot(THROWN, THROWN)))
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same flight with nothing observed."""
-    return simulate(ragdoll(), time_step=time_step, duration=FLIGHT, method=method)
-
-
 def draw(simulate: Simulate) -> Drawing:
     """Work a step and link against the number of links."""
     counts, works = [16, 32, 64, 125, 250, 500], []
@@ -404,7 +398,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-2,
             target_seconds=0.05,
         ),

@@ -140,11 +140,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return measured_flip_time(simulate, time_step, method) / flip_time() - 1.0
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same tumbling with nothing observed."""
-    return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
-
-
 def exact_turn() -> np.ndarray:
     """Orientation (w, x, y, z) after TURN_DURATION, from Euler's equations integrated to rounding."""
     moments = np.array(INERTIA)
@@ -320,7 +315,6 @@ TEST = ScalarTest(
                 Configuration(name="order4", method=Method(composition="order4"), expected_order=None),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-3,
             target_seconds=0.05,
         ),

@@ -17,7 +17,6 @@ from spook_tracker.engine import (
     Material,
     Method,
     Position,
-    Result,
     RigidBody,
     Scene,
     Sphere,
@@ -115,11 +114,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     observe = {"x": Final(quantity=Position("body"), from_start=True)}
     x = simulate(rolling(), time_step=time_step, duration=1.0, method=method, observe=observe)["x"]
     return math.hypot(float(x[0]), float(x[2])) - 2.5 / 7.0 * GRAVITY * math.sin(TILT)
-
-
-def run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same second with nothing observed."""
-    return simulate(rolling(), time_step=time_step, duration=1.0, method=method)
 
 
 def rolls(simulate: Simulate, slope: float) -> bool:
@@ -228,7 +222,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
             ),
             error=ladder_error,
-            run=run,
         ),
     ),
     stability=(

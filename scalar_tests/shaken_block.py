@@ -17,7 +17,6 @@ from spook_tracker.engine import (
     Method,
     Orientation,
     Plane,
-    Result,
     RigidBody,
     Scene,
     Sinusoid,
@@ -219,11 +218,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return swings(leans(simulate, time_step, method), time_step)[1] / rocking().after - 1.0
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same rocking with nothing observed."""
-    return simulate(shaken(), time_step=time_step, duration=whole(time_step), method=method)
-
-
 LEAST = 1.91538  # times UPLIFT: the least half sine that throws the block over, by integration in the test
 
 
@@ -376,7 +370,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-2,
             target_seconds=0.05,
         ),

@@ -17,7 +17,6 @@ from spook_tracker.engine import (
     Hinge,
     JointCoordinate,
     Method,
-    Result,
     RigidBody,
     Scene,
     Sphere,
@@ -116,11 +115,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     observe = {"v": Final(quantity=Velocity("stone"))}
     result = simulate(sinking(), time_step=time_step, duration=0.5, method=method, observe=observe)
     return -float(result["v"][2]) - TERMINAL * math.tanh(0.5 / RISE)
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same sinking with nothing observed."""
-    return simulate(sinking(), time_step=time_step, duration=0.5, method=method)
 
 
 def stable(simulate: Simulate, time_step: float) -> bool:
@@ -295,7 +289,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.02,
             target_seconds=0.01,
         ),

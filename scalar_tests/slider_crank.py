@@ -18,7 +18,6 @@ from spook_tracker.engine import (
     Motor,
     Position,
     Prismatic,
-    Result,
     RigidBody,
     Scene,
     SimulationFailed,
@@ -233,11 +232,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return errors(simulate, time_step, method)[0]
 
 
-def run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same turns with nothing observed."""
-    return simulate(scene(time_step), time_step=time_step, duration=DURATION, method=method)
-
-
 def draw(simulate: Simulate) -> Drawing:
     """The motor's torque over a turn."""
     observe = {"f": Trace(quantity=ConstraintForce("drive"))}
@@ -360,7 +354,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=run,
             target_error=2e-4,
             target_seconds=0.02,
         ),

@@ -173,11 +173,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(result["x"][1]) - lane(SORTS[0]).imag
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same boxes with nothing observed."""
-    return simulate(belt(), time_step=time_step, duration=DURATION, method=method)
-
-
 def stays(simulate: Simulate, friction: float) -> bool:
     """Whether a box of this µ rides the table for a quarter of a second."""
     steps = TABLE_STEPS // 2
@@ -370,7 +365,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.01,
             target_seconds=0.01,
         ),

@@ -127,12 +127,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     )
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same top with nothing observed."""
-    built = scene(time_step / method.substeps)
-    return simulate(built, time_step=time_step, duration=DURATION, method=method)
-
-
 def sleeping_scene(spin: float) -> Scene:
     """The same top upright, spinning at `spin` [rad/s] and nudged by NUDGE [rad/s] across."""
     top = RigidBody(
@@ -334,7 +328,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-3,
             target_seconds=0.1,
         ),
@@ -354,7 +347,6 @@ TEST = ScalarTest(
                 for order in ORDERS
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-5,
             target_seconds=0.01,
         ),

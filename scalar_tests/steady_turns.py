@@ -20,7 +20,6 @@ from spook_tracker.engine import (
     Orientation,
     Plane,
     Position,
-    Result,
     RigidBody,
     Scene,
     Sphere,
@@ -95,11 +94,6 @@ def motor_error(simulate: Simulate, time_step: float = TIME_STEP, method: Method
     observe = {"angle": Final(quantity=JointCoordinate("axle"))}
     result = simulate(driven(), time_step=time_step, duration=DURATION, method=method, observe=observe)
     return float(result["angle"]) - RATE * DURATION
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The driven wheel with nothing observed."""
-    return simulate(driven(), time_step=time_step, duration=DURATION, method=method)
 
 
 def turned(orientation: np.ndarray, axis: int) -> np.ndarray:
@@ -244,7 +238,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
             ),
             error=motor_error,
-            run=ladder_run,
             target_error=1e-3,
             target_seconds=0.01,
         ),

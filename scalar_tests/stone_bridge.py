@@ -14,7 +14,6 @@ from spook_tracker.engine import (
     Material,
     Method,
     Position,
-    Result,
     RigidBody,
     Scene,
     Table,
@@ -358,13 +357,8 @@ TEST = ScalarTest(
             error=lambda simulate, time_step, method: sinking(
                 simulate, 2, LESS * LIMIT[2], time_step, method, SHORT
             ),
-            run=lambda simulate, time_step, method: _run(simulate, time_step, method),
             target_error=1e-4,
             target_seconds=0.05,
         ),
     ),
 )
-
-
-def _run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    return simulate(scene(2, LESS * LIMIT[2]), time_step=time_step, duration=SHORT, method=method)

@@ -15,7 +15,6 @@ from spook_tracker.engine import (
     Method,
     Orientation,
     Position,
-    Result,
     RigidBody,
     Scene,
     Spring,
@@ -166,11 +165,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return swings(simulate, time_step, method)["bounce"] / BOUNCE - 1.0
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """Its bounce with nothing observed."""
-    return simulate(scene(heave=HEAVE), time_step=time_step, duration=DURATION, method=method)
-
-
 def draw(simulate: Simulate) -> Drawing:
     """Height and nose of the chassis, let go from rest."""
     observe: dict[str, Observable] = {
@@ -296,7 +290,6 @@ TEST = ScalarTest(
                 Configuration(name="order4", method=Method(composition="order4"), expected_order=4.0),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-3,
             target_seconds=0.01,
         ),

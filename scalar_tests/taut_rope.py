@@ -18,7 +18,6 @@ from spook_tracker.engine import (
     Method,
     Position,
     Prismatic,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -121,11 +120,6 @@ def pulsing() -> float:
 def wave_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Relative error of the third mode's frequency."""
     return swing(simulate, 3, time_step, method) / rate(3) - 1.0
-
-
-def wave_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same second with nothing observed."""
-    return simulate(taut(3), time_step=time_step, duration=DURATION, method=method)
 
 
 def tightest() -> float:
@@ -238,7 +232,6 @@ TEST = ScalarTest(
                 Configuration(name="half-step", method=Method(half_step_velocities=True), expected_order=2.0),
             ),
             error=wave_error,
-            run=wave_run,
             target_error=1e-3,
             target_seconds=0.02,
         ),

@@ -238,7 +238,6 @@ TEST = ScalarTest(
                 Configuration(name="order4", method=Method(composition="order4"), expected_order=None),
             ),
             error=turn_error,
-            run=ladder_run,
             target_error=1e-2,
             target_seconds=0.01,
         ),

@@ -16,7 +16,6 @@ from spook_tracker.engine import (
     Method,
     Plane,
     Position,
-    Result,
     RigidBody,
     Scene,
     Sphere,
@@ -134,11 +133,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     observe = {"x": Final(quantity=Position("ball"))}
     result = simulate(rolling(), time_step=time_step, duration=2.0, method=method, observe=observe)
     return abs(complex(result["x"][0], result["x"][1]) - complex(circle(2.0)))
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same ball with nothing observed."""
-    return simulate(rolling(), time_step=time_step, duration=2.0, method=method)
 
 
 def stays(simulate: Simulate, radius: float) -> bool:
@@ -281,7 +275,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.005,
             target_seconds=0.05,
         ),

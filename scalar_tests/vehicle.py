@@ -20,7 +20,6 @@ from spook_tracker.engine import (
     Motor,
     Plane,
     Position,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -177,11 +176,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     asked = scene(0.0, STOPPED, locked=True)
     result = simulate(asked, time_step=time_step, duration=DURATION, method=method, observe=observe)
     return float(result["x"][0]) - STOPPED**2 / (2.0 * BRAKING)
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same stop with nothing observed."""
-    return simulate(scene(0.0, STOPPED, locked=True), time_step=time_step, duration=DURATION, method=method)
 
 
 # Over the front wheels it goes when they carry all: µ g (m_c (r + rise) + 4 m_w r) = g (m_c FRONT + 2 m_w L).
@@ -383,7 +377,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.03,
             target_seconds=0.1,
         ),

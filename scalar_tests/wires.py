@@ -21,7 +21,6 @@ from spook_tracker.engine import (
     Position,
     Prismatic,
     Relation,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -263,11 +262,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return -time_step * math.fsum(result["z"][1:, 2]) - 0.5 * TURNING
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same with nothing observed."""
-    return simulate(drum(), time_step=time_step, duration=1.0, method=method)
-
-
 def draw(simulate: Simulate) -> Drawing:
     """Speeds of stone and puller."""
     curves, ends = [], []
@@ -431,7 +425,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-2,
             target_seconds=0.01,
         ),

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import pytest
 
 from spook_tracker.engine import PLAIN, simulate
-from spook_tracker.scalar_tests.case import Configuration, Ladder, Simulate
+from spook_tracker.scalar_tests.case import Configuration, Ladder, Simulate, Unobserved
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.document.order import in_range, observed_order
 from spook_tracker.tracker.measure.remembered import of_test
@@ -110,6 +110,27 @@ def test_running_and_measuring_simulate_the_same(name: str) -> None:
             if not isinstance(measured.error, Exception):
                 assert set(measured.steps) == set(timed), (ladder.name, configuration.name)
                 assert len(set(timed)) == 1
+
+
+def test_what_is_timed_is_what_the_error_simulates_with_nothing_observed() -> None:
+    ladder = CATALOGUE["falling_object"].ladders[0]
+    asked: list[dict[str, Any]] = []
+
+    def engine(scene: Any, **how: Any) -> Any:
+        asked.append(how)
+        return simulate(scene, **how)
+
+    measured, timed = (call(engine, 0.1, PLAIN) for call in (ladder.error, ladder.run))
+    with_observables, without = asked
+
+    assert isinstance(measured, float) and timed.completed and timed.observables == {}
+    assert with_observables.pop("observe") and with_observables == without
+    assert ladder.run == Unobserved(ladder.error) != Unobserved(simulate)  # equal runs share their times
+
+
+def test_an_error_that_simulates_nothing_leaves_nothing_to_time() -> None:
+    with pytest.raises(ValueError, match="give its ladder a `run`"):
+        Unobserved(lambda simulate, h, method: 0.0)(simulate, 0.1, PLAIN)
 
 
 def test_falling_with_half_step_velocities_is_exact() -> None:

@@ -67,7 +67,6 @@ STACK = replace(
                 Configuration(name="fifty sweeps", method=SWEEPS, expected_order=None),
             ),
             error=lambda simulate, h, method: lowered(simulate, COUNT, method, h)[0],
-            run=lambda simulate, h, method: simulate(scene(COUNT), time_step=h, steps=STEPS, method=method),
             target_error=1e3,
         ),
     ),

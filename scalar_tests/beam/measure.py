@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spook_tracker.engine import MaximumAbsolute, Method, Position, Result, Trace
+from spook_tracker.engine import MaximumAbsolute, Method, Position, Trace
 from spook_tracker.scalar_tests.beam.scene import (
     COUNT,
     SAG_COMPLIANCE,
@@ -119,9 +119,3 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     observe = {"place": MaximumAbsolute(quantity=Position(), from_start=True)}
     result = simulate(built, time_step=time_step, duration=2.0, method=method, observe=observe)
     return 100.0 * float(result["place"][:LADDER_COUNT, 2].max()) / (LADDER_COUNT * SIZE[0])
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same beam with nothing observed."""
-    built = scene(LADDER_COUNT, time_step=time_step)
-    return simulate(built, time_step=time_step, duration=2.0, method=method)

@@ -9,7 +9,6 @@ from spook_tracker.scalar_tests.beam.measure import (
     _measure_sag,
     _measure_support,
     ladder_error,
-    ladder_run,
 )
 from spook_tracker.scalar_tests.beam.scene import COUNT, SAG, TIME_STEP
 from spook_tracker.scalar_tests.case import Configuration, Ladder, LimitKind, Measurement, Metric
@@ -113,7 +112,6 @@ LADDERS = (
             ),
         ),
         error=ladder_error,
-        run=ladder_run,
         target_error=None,
         target_seconds=None,
     ),

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import Final, Method, Orientation, Position, Result, Trace, Velocity
+from spook_tracker.engine import Final, Method, Orientation, Position, Trace, Velocity
 from spook_tracker.scalar_tests.cantilever.scene import (
     COUNT,
     COUNTS,
@@ -87,8 +87,3 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     half = 0.5 * LENGTH / LADDER_COUNT
     tip = -(float(result["last"][2]) + half * 2.0 * float(x * z - w * y))
     return tip / chain_tip(LADDER_COUNT) - 1.0
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same beam with nothing observed."""
-    return simulate(scene(LADDER_COUNT), time_step=time_step, duration=20.0, method=method)

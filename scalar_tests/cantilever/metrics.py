@@ -8,7 +8,6 @@ from spook_tracker.scalar_tests.cantilever.measure import (
     _measure_tip,
     _measure_weight,
     ladder_error,
-    ladder_run,
 )
 from spook_tracker.scalar_tests.cantilever.scene import COUNT, LARGE_DEFLECTION, TIME_STEP, TIP
 from spook_tracker.scalar_tests.case import Configuration, Ladder, Measurement, Metric
@@ -113,7 +112,6 @@ LADDERS = (
             Configuration(name="direct, no refinement", method=Method(refinements=0), expected_order=None),
         ),
         error=ladder_error,
-        run=ladder_run,
         target_error=1e-6,
         target_seconds=1.0,
     ),

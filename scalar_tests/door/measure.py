@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spook_tracker.engine import ConstraintForce, Method, Result, Trace
+from spook_tracker.engine import ConstraintForce, Method, Trace
 from spook_tracker.scalar_tests.case import Curve, Drawing, Simulate
 from spook_tracker.scalar_tests.door.scene import TIME_STEP, forces, least_norm_forces, scene, weight_error
 from spook_tracker.scalar_tests.sweep import told
@@ -129,9 +129,3 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     result = simulate(built, time_step=time_step, duration=2.0, method=method, observe=observe)
     held = np.stack([result[name] for name in observe], axis=1)
     return abs(_largest(weight_error(held)))
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same door with nothing observed."""
-    built = scene(LADDER_COUNT, damping=2.0 * time_step)
-    return simulate(built, time_step=time_step, duration=2.0, method=method)

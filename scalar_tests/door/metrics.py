@@ -11,7 +11,6 @@ from spook_tracker.scalar_tests.door.measure import (
     _measure_singular,
     _measure_split,
     ladder_error,
-    ladder_run,
 )
 from spook_tracker.scalar_tests.door.scene import TIME_STEP
 
@@ -159,7 +158,6 @@ LADDERS = (
             ),
         ),
         error=ladder_error,
-        run=ladder_run,
         target_error=1e-6,
         target_seconds=0.1,
     ),

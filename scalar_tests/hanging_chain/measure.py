@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Method, Position, Result, Trace
+from spook_tracker.engine import PLAIN, Method, Position, Trace
 from spook_tracker.scalar_tests.case import Drawing, Simulate
 from spook_tracker.scalar_tests.chain import LENGTH
 from spook_tracker.scalar_tests.hanging_chain.scene import (
@@ -85,10 +85,3 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     )
     exact = exact_load(LADDER_RATIO, result.sample_times["places"], LADDER_TILT)
     return float(np.abs(result["places"][:, -1, 0] - exact).max()) / (COUNT * LENGTH * LADDER_TILT)
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same 5 s with nothing observed."""
-    return simulate(
-        scene(LADDER_RATIO, time_step, tilt=LADDER_TILT), time_step=time_step, duration=5.0, method=method
-    )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 
-from spook_tracker.engine import PLAIN, ContactForce, Final, Method, Result
+from spook_tracker.engine import PLAIN, ContactForce, Final, Method
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
@@ -68,11 +68,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     result = simulate(scene(LADDER_SLOPE), time_step=time_step, duration=1.0, method=method, observe=observe)
     x, y, z = result["force"]
     return abs(math.hypot(x, y) / abs(float(z)) - LADDER_SLOPE)
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same second with nothing observed."""
-    return simulate(scene(LADDER_SLOPE), time_step=time_step, duration=1.0, method=method)
 
 
 def tells_both(simulate: Simulate, mass: float) -> bool:
@@ -147,7 +142,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-9,
             target_seconds=0.01,
         ),

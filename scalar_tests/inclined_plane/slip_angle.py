@@ -5,7 +5,7 @@ from __future__ import annotations
 import functools
 import math
 
-from spook_tracker.engine import PLAIN, AngularVelocity, Final, Method, Result, Velocity
+from spook_tracker.engine import PLAIN, AngularVelocity, Final, Method, Velocity
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
@@ -73,11 +73,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     tilt = math.atan(LADDER_SLOPE)
     x, y, _ = result["velocity"]
     return math.hypot(x, y) - GRAVITY * (math.sin(tilt) - FRICTION * math.cos(tilt))
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same second with nothing observed."""
-    return simulate(scene(LADDER_SLOPE), time_step=time_step, duration=1.0, method=method)
 
 
 def slides_flat(simulate: Simulate, friction: float) -> bool:
@@ -193,7 +188,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-3,
             target_seconds=0.01,
         ),

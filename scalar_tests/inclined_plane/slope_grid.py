@@ -8,7 +8,7 @@ from itertools import product
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Final, Method, Position, Result, Trace, Velocity
+from spook_tracker.engine import PLAIN, Final, Method, Position, Trace, Velocity
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
@@ -80,12 +80,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """The error of the velocity [m/s] of a box that slides askew."""
     size = float(np.linalg.norm(downhill(FRICTION, ASKEW, SLID)))
     return size * speed_error(simulate, time_step, FRICTION, ASKEW, 1.0, method)
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same second with nothing observed."""
-    built = scene(STEEP * FRICTION, ASKEW, FRICTION)
-    return simulate(built, time_step=time_step, duration=SLID, method=method)
 
 
 def tells_apart(simulate: Simulate, time_step: float = 1.0 / 60.0, mass: float = 1.0) -> bool:
@@ -182,7 +176,6 @@ TEST = ScalarTest(
                 Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=1e-3,
             target_seconds=0.01,
         ),

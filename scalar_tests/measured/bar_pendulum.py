@@ -158,8 +158,6 @@ TEST = readings.measured_test(
     figures=(Figure(name="period", title="Period against length", draw=_draw),),
     ladders=readings.ladder(
         ladder_error,
-        lambda: scene(LENGTHS[0], STARTS[0]),
-        DURATION,
         (1.0 / n for n in (60, 120, 240, 480, 960)),
         2.0,
         better="order 4",

@@ -163,8 +163,6 @@ TEST = readings.measured_test(
     figures=(Figure(name="bounces", title="Bounces, and when the real ball was heard last", draw=_draw),),
     ladders=readings.ladder(
         ladder_error,
-        scene,
-        DURATION,
         (1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5),
         1.0,
         better="four substeps",

@@ -9,7 +9,7 @@ from typing import Any
 
 from scipy.special import chdtri
 
-from spook_tracker.engine import PLAIN, Method, Result, Scene
+from spook_tracker.engine import PLAIN, Method
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
@@ -89,8 +89,6 @@ def against_theory(limit: float, why: str, role: Role = "companion") -> Metric:
 
 def ladder(
     error: Callable[[Simulate, float, Method], float],
-    built: Callable[[], Scene],
-    duration: float,
     time_steps: Iterable[float],
     order: float,
     *,
@@ -100,13 +98,10 @@ def ladder(
     order_range: tuple[float, float] | None = None,
     **rest: Any,
 ) -> tuple[Ladder, ...]:
-    """Plain SPOOK and its order, beside one better method; timed is the scene over its duration [s], nothing observed.
+    """Plain SPOOK and its order, beside one better method.
 
     `better_order` None: its error ends in rounding, or in how it is read. `rest` is as in any other ladder.
     """
-
-    def unobserved(simulate: Simulate, time_step: float, method: Method) -> Result:
-        return simulate(built(), time_step=time_step, duration=duration, method=method)
 
     plain = Configuration(name="plain", method=PLAIN, expected_order=order, order_range=order_range)
     other = Configuration(name=better, method=method, expected_order=better_order)
@@ -115,7 +110,6 @@ def ladder(
             time_steps=tuple(time_steps),
             configurations=(plain, other),
             error=error,
-            run=unobserved,
             target_seconds=0.01,
             **rest,
         ),

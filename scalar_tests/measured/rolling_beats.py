@@ -169,8 +169,6 @@ TEST = readings.measured_test(
     figures=(Figure(name="frets", title="Distance at each beat", draw=_draw),),
     ladders=readings.ladder(
         ladder_error,
-        scene,
-        LADDER_DURATION,
         (BEAT / n for n in (10, 20, 40, 80, 160)),
         1.0,
         better="half-step",

@@ -139,8 +139,6 @@ TEST = readings.measured_test(
     figures=(Figure(name="beat", title="How far a beat is from a second", draw=_draw),),
     ladders=readings.ladder(
         ladder_error,
-        scene,
-        DURATION,
         (1.0 / n for n in (30, 60, 120, 240, 480)),
         2.0,
         better="order 4",

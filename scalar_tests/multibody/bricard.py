@@ -16,7 +16,6 @@ from spook_tracker.engine import (
     Method,
     Orientation,
     Position,
-    Result,
     Scene,
     Trace,
 )
@@ -127,11 +126,6 @@ def fine(simulate: Simulate) -> dict[str, float]:
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Of P3 at four times in 10 s."""
     return answers(simulate, time_step, method)["library_error"]
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same 10 s with nothing observed."""
-    return simulate(scene(time_step), time_step=time_step, duration=10.0, method=method)
 
 
 def stiffest(simulate: Simulate) -> BreakPoint:
@@ -247,7 +241,6 @@ TEST = ScalarTest(
             ),
         },
         ladder_error,
-        ladder_run,
     ),
     stability=(
         StabilityStudy(

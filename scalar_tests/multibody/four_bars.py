@@ -18,7 +18,6 @@ from spook_tracker.engine import (
     MaximumAbsolute,
     Method,
     Position,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -156,19 +155,9 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return answers(simulate, FEW, time_step, 10.0, method)["library_error"]
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same with nothing observed."""
-    return simulate(scene(FEW, time_step), time_step=time_step, duration=10.0, method=method)
-
-
 def many_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Of forty linkages over 20 s, the library's own case."""
     return answers(simulate, MANY, time_step, 20.0, method)["library_error"]
-
-
-def many_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same with nothing observed."""
-    return simulate(scene(MANY, time_step), time_step=time_step, duration=20.0, method=method)
 
 
 def falling_error(simulate: Simulate, time_step: float, method: Method) -> float:
@@ -177,11 +166,6 @@ def falling_error(simulate: Simulate, time_step: float, method: Method) -> float
     built = scene(FEW, time_step)
     result = simulate(built, time_step=time_step, duration=BEFORE_LEVEL, method=method, observe=observe)
     return float(np.abs(2.0 * result["side"][:2] - exact(FEW, (BEFORE_LEVEL,))[0]).max())
-
-
-def falling_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same with nothing observed."""
-    return simulate(scene(FEW, time_step), time_step=time_step, duration=BEFORE_LEVEL, method=method)
 
 
 def hangs(simulate: Simulate, count: int, time_step: float) -> bool:
@@ -314,7 +298,6 @@ TEST = ScalarTest(
                 ),
             },
             ladder_error,
-            ladder_run,
         ),
         *ladders(
             "B0 of forty linkages over 20 s",
@@ -330,7 +313,6 @@ TEST = ScalarTest(
                 ),
             },
             many_error,
-            many_run,
             of="forty, ",
         ),
         Ladder(
@@ -358,7 +340,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=falling_error,
-            run=falling_run,
             target_error=3e-3,
             target_seconds=0.01,
         ),

@@ -19,7 +19,6 @@ from spook_tracker.engine import (
     Method,
     Position,
     Prismatic,
-    Result,
     RigidBody,
     Scene,
     Trace,
@@ -162,11 +161,6 @@ def fine(simulate: Simulate) -> dict[str, float]:
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Of the slider at six times in 10 s."""
     return answers(simulate, time_step, method)["library_error"]
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same 10 s with nothing observed."""
-    return simulate(scene(time_step), time_step=time_step, duration=10.0, method=method)
 
 
 def spun(simulate: Simulate, spin: float, stiffness: float = STIFFNESS) -> float:
@@ -335,7 +329,6 @@ TEST = ScalarTest(
             ),
         },
         ladder_error,
-        ladder_run,
     ),
     stability=(
         StabilityStudy(

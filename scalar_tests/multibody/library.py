@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from spook_tracker.engine import PLAIN, Method, Result, RigidBody
+from spook_tracker.engine import PLAIN, Method, RigidBody
 from spook_tracker.scalar_tests.case import Configuration, Ladder, LimitKind, Metric, Role, Simulate
 
 GRAVITY = 9.81  # m/s²
@@ -65,7 +65,6 @@ def ladders(
     what: str,
     classes: Mapping[str, tuple[tuple[float, ...], tuple[Configuration, ...]]],
     error: Callable[[Simulate, float, Method], float],
-    run: Callable[[Simulate, float, Method], Result],
     of: str = "",
 ) -> tuple[Ladder, ...]:
     """A ladder for each precision class, {"low" or "high": (time steps, configurations that reach it)}; `of` stands
@@ -81,7 +80,6 @@ def ladders(
             time_steps=time_steps,
             configurations=configurations,
             error=error,
-            run=run,
             target_error=ALLOWED[name],
         )
         for name, (time_steps, configurations) in classes.items()

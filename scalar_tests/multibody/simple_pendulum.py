@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from spook_tracker.engine import MaximumAbsolute, Method, Position, Result, Trace
+from spook_tracker.engine import MaximumAbsolute, Method, Position, Trace
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
@@ -44,11 +44,6 @@ def path_error(simulate: Simulate, time_step: float, method: Method, duration: f
 def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """The same over the first 100 s."""
     return path_error(simulate, time_step, method, LADDER_DURATION)
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same 100 s with nothing observed."""
-    return simulate(scene(time_step), time_step=time_step, duration=LADDER_DURATION, method=method)
 
 
 def order_4(simulate: Simulate) -> dict[str, float]:
@@ -133,7 +128,6 @@ TEST = ScalarTest(
             ),
         },
         ladder_error,
-        ladder_run,
     ),
     stability=(
         StabilityStudy(

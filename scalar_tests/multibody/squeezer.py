@@ -166,11 +166,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return answers(simulate, time_step, method)["library_error"]
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same with nothing observed."""
-    return simulate(scene(time_step), time_step=time_step, duration=DURATION, method=method)
-
-
 def in_class(simulate: Simulate, time_step: float) -> bool:
     """Whether the low class is kept, 0.03 s being divided into the number of steps nearest to that one [s]."""
     return answers(simulate, DURATION / round(DURATION / time_step))["library_error"] < LOW
@@ -260,7 +255,6 @@ TEST = ScalarTest(
             ),
         },
         ladder_error,
-        ladder_run,
     ),
     stability=(
         StabilityStudy(

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Final, MaximumAbsolute, Method, Position, Result, Trace, Violation
+from spook_tracker.engine import PLAIN, Final, MaximumAbsolute, Method, Position, Trace, Violation
 from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.case import Simulate
 from spook_tracker.scalar_tests.chain import LENGTH, chain, exact_tip, level_chain, small_motion
@@ -123,8 +123,3 @@ def length_error(simulate: Simulate, time_step: float, method: Method) -> float:
         observe={"violation": MaximumAbsolute(quantity=Violation())},
     )
     return 100.0 * float(result["violation"].max()) / LENGTH
-
-
-def run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same 2 s with nothing observed."""
-    return simulate(_scene(time_step, method), time_step=time_step, duration=TIP_TIME, method=method)

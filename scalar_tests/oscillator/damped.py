@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Method, Position, Result, Trace
+from spook_tracker.engine import PLAIN, Method, Position, Trace
 from spook_tracker.scalar_tests.case import (
     Configuration,
     Drawing,
@@ -93,11 +93,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     )
     exact = _damped_wave(result.sample_times["x"])
     return float(np.abs(result["x"][:, 2] - exact).max())
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same oscillation with nothing observed."""
-    return simulate(row_scene(STIFFNESS, DAMPING), time_step=time_step, duration=2.0, method=method)
 
 
 TEST = ScalarTest(
@@ -208,7 +203,6 @@ TEST = ScalarTest(
                 Configuration(name="half-step", method=Method(half_step_velocities=True), expected_order=1.0),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.01,
             target_seconds=1e-3,
         ),

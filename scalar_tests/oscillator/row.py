@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Method, Position, Result, Trace
+from spook_tracker.engine import PLAIN, Method, Position, Trace
 from spook_tracker.engine.theory import undamped_row_invariant, undamped_row_phase
 from spook_tracker.scalar_tests.case import (
     Configuration,
@@ -174,11 +174,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(np.abs(result["x"][:, 2] - exact).max())
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same oscillation with nothing observed."""
-    return simulate(row_scene(STIFFNESS, 0.0), time_step=time_step, duration=2.0, method=method)
-
-
 TEST = ScalarTest(
     title="Oscillator: distance row",
     question="Does a distance row with compliance 1/κ oscillate as a spring κ, bounded at any frequency?",
@@ -288,7 +283,6 @@ TEST = ScalarTest(
                 Configuration(name="half-step", method=Method(half_step_velocities=True), expected_order=2.0),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.01,
             target_seconds=1e-3,
         ),

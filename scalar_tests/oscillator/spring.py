@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Method, Position, Result, Trace
+from spook_tracker.engine import PLAIN, Method, Position, Trace
 from spook_tracker.engine.theory import plain_spring_invariant
 from spook_tracker.scalar_tests.case import (
     Configuration,
@@ -70,11 +70,6 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     result = simulate(spring_scene(), time_step=time_step, duration=2.0, method=method, observe=observe)
     exact = START * np.cos(np.sqrt(STIFFNESS / MASS) * result.sample_times["x"])
     return float(np.abs(result["x"][:, 2] - exact).max())
-
-
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same oscillation with nothing observed."""
-    return simulate(spring_scene(), time_step=time_step, duration=2.0, method=method)
 
 
 TEST = ScalarTest(
@@ -149,7 +144,6 @@ TEST = ScalarTest(
                 ),
             ),
             error=ladder_error,
-            run=ladder_run,
             target_error=0.01,
             target_seconds=1e-3,
         ),

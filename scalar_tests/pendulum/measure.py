@@ -11,7 +11,6 @@ from spook_tracker.engine import (
     Maximum,
     MaximumAbsolute,
     Method,
-    Result,
     Trace,
     Violation,
 )
@@ -27,7 +26,6 @@ from spook_tracker.scalar_tests.pendulum.scene import (
     percent_of_energy,
     percent_of_length,
     period,
-    scene,
     swing,
     traced_angle,
 )
@@ -94,8 +92,3 @@ def angle_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Largest |angle − exact angle| over 10 s [rad]."""
     time, theta = traced_angle(simulate, time_step, LADDER_DURATION, method)
     return float(np.abs(theta - angle(time)).max())
-
-
-def run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same 10 s with nothing observed."""
-    return simulate(scene(time_step), time_step=time_step, duration=LADDER_DURATION, method=method)

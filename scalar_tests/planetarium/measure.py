@@ -19,7 +19,6 @@ from spook_tracker.engine import (
     Method,
     Position,
     PotentialEnergy,
-    Result,
     Trace,
 )
 from spook_tracker.engine.observe import Observable
@@ -118,11 +117,6 @@ def long_run(simulate: Simulate) -> dict[str, float]:
 def position_error(simulate: Simulate, time_step: float, method: Method) -> float:
     """Distance from Kepler's position after 1200 s [m]."""
     return _position_error(simulate, time_step, method)
-
-
-def run(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """The same 1200 s with nothing observed."""
-    return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
 
 
 def largest_step(simulate: Simulate) -> BreakPoint:

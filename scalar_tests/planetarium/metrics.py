@@ -13,7 +13,6 @@ from spook_tracker.scalar_tests.planetarium.measure import (
     long_run,
     plain,
     position_error,
-    run,
 )
 from spook_tracker.scalar_tests.planetarium.scene import HALF_STEP, LONG_STEPS, TIME_STEP
 
@@ -198,7 +197,6 @@ LADDERS = (
             Configuration(name="order 8", method=ORDER_8, expected_order=8.0, order_range=(5.0, 20.0)),
         ),
         error=position_error,
-        run=run,
         target_error=1e-3,
         target_seconds=1e-3,
     ),
