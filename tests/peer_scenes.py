@@ -167,6 +167,13 @@ def box_on_ground(pull: float, friction: float = 0.5) -> Scene:
     return Scene(bodies=(ground, box), gravity=(pull * G, 0.0, -G))
 
 
+def unlike() -> Scene:
+    """That cube on a plane of another friction."""
+    ground, box = box_on_ground(0.0).bodies
+    assert isinstance(box, RigidBody)
+    return Scene(bodies=(ground, replace(box, material=Material(friction=0.1))))
+
+
 def slid(simulate: Any, pull: float, seconds: float = 2.0) -> float:
     """How far that cube slid [m]: none below its friction of 0.5, ½ (pull − 0.5) g t² above."""
     end = {"end": Final(quantity=Position("box"))}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -11,12 +10,10 @@ import pytest
 from spook_tracker.engine import (
     Ball,
     Box,
-    CentralGravity,
     ConstraintForce,
     Distance,
     Final,
     Hinge,
-    Load,
     Lock,
     Material,
     MaximumAbsolute,
@@ -97,29 +94,6 @@ def test_a_fall_has_the_error_of_the_symplectic_step() -> None:
     assert run["place"][2] == pytest.approx(-0.5 * 9.81 * 2.0 * (2.0 + STEP), rel=1e-12)
     assert run["place"][0] == pytest.approx(2.0, rel=1e-12)
     assert run["speed"][2] == pytest.approx(-9.81 * 2.0, rel=1e-12)
-
-
-def test_forces_act_at_every_step() -> None:
-    """A circular orbit stays one; a load of twice the weight lifts."""
-    moon = Particle(name="moon", mass=3.0, position=(2.0, 0.0, 0.0), velocity=(0.0, math.sqrt(0.5), 0.0))
-    field = CentralGravity(name="pull", strength=1.0, centre=(0.0, 0.0, 0.0))
-    orbit = CANNON.simulate(
-        Scene(bodies=(moon,), forces=(field,), gravity=(0.0, 0.0, 0.0)),
-        time_step=0.001,
-        duration=5.0,
-        observe={"path": Trace(quantity=Position("moon"))},
-    )
-    assert np.abs(np.linalg.norm(orbit["path"], axis=1) - 2.0).max() < 1e-3
-
-    box = RigidBody(name="box", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
-    lift = Load(name="lift", body="box", force=(0.0, 0.0, 2.0 * 2.0 * 9.81))
-    lifted = CANNON.simulate(
-        Scene(bodies=(box,), forces=(lift,), gravity=GRAVITY),
-        time_step=0.01,
-        steps=100,
-        observe={"speed": Final(quantity=Velocity("box"))},
-    )
-    assert lifted["speed"][2] == pytest.approx(9.81, rel=1e-9)
 
 
 @pytest.mark.parametrize("kind", [Ball, Hinge, Lock])

@@ -8,16 +8,11 @@ from typing import Any
 import pytest
 
 from spook_tracker.engine import (
-    Ball,
     Cone,
     ContactForce,
-    Cylinder,
     Final,
-    Hinge,
-    Lock,
     Plane,
     Position,
-    Prismatic,
     RigidBody,
     Scene,
     Velocity,
@@ -34,42 +29,6 @@ DEFAULTS, MANY = "defaults", "many-iterations"
 
 def run(configuration: str) -> Any:
     return partial(find("rapier3d").simulate, configuration=configuration)
-
-
-@pytest.mark.parametrize("configuration", [DEFAULTS, MANY])
-def test_a_fall_is_that_of_as_many_substeps_as_it_has_iterations(configuration: str) -> None:
-    """g T h / 2 of a semi-implicit step h is 9.81 h after 2 s; Rapier's iterations are substeps."""
-    substeps = {DEFAULTS: 4, MANY: 100}[configuration]
-    assert peer_scenes.fall_error(run(configuration), 1 / 60) == pytest.approx(
-        9.81 / 60.0 / substeps, abs=2e-3
-    )
-
-
-@pytest.mark.parametrize("kind", [Ball, Hinge, Lock, Prismatic])
-def test_a_joint_holds_its_body(kind: Any) -> None:
-    assert peer_scenes.left_its_place(run(MANY), kind) < 1e-6
-
-
-@pytest.mark.parametrize("kind", ["ball", "hinge", "lock", "prismatic"])
-def test_joints_between_bodies_turned_at_random_move_as_in_our_engine(kind: str) -> None:
-    assert peer_scenes.parted_from_ours(run(DEFAULTS), kind) < 3e-3
-
-
-def test_a_hinged_body_swings_with_its_period() -> None:
-    assert peer_scenes.swings(run(DEFAULTS), 1 / 1000) == pytest.approx(1.0, abs=2e-4)
-
-
-def test_friction_holds_below_its_coefficient_and_slides_by_the_closed_form_above() -> None:
-    assert abs(peer_scenes.slid(run(MANY), 0.3)) < 1e-3
-    assert peer_scenes.slid(run(MANY), 0.7) == pytest.approx(0.5 * 0.2 * 9.81 * 4.0, rel=2e-3)
-
-
-def test_a_ball_comes_back_to_restitution_squared() -> None:
-    assert peer_scenes.bounced(run(DEFAULTS), 0.5, 1e-3) == pytest.approx(0.25, abs=2e-3)
-
-
-def test_a_cylinder_stands_on_its_face_along_our_axis() -> None:
-    assert abs(peer_scenes.sunk(run(DEFAULTS), Cylinder(0.2, 1.0), 0.5)) < 1e-3
 
 
 def test_what_it_cannot_be_asked_is_said_to_be_our_adapter_s_lack_where_it_is() -> None:
