@@ -39,6 +39,7 @@ EXTRAS: Mapping[str, str] = {
     "newton": "newton",
     "mujoco_warp": "mujoco-warp",
     "motrixsim": "motrixsim",
+    "simbody": "opensim",
 }  # engine: its package, from PyPI
 NODE: Mapping[str, str] = {
     "cannon": "cannon-es",

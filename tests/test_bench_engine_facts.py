@@ -94,7 +94,7 @@ def test_the_friction_of_mujocos_defaults_creeps() -> None:
 
 def test_single_precision_loses_digits_that_double_keeps() -> None:
     lost = column(5)
-    single = {"box3d", "jolt", "rapier", "rapier3d", "sapien"}
+    single = engine_kinds.SINGLE
 
     for name, error in lost.items():
         if name.split()[0] in single or name == "p2 (defaults)":

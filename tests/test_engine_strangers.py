@@ -116,6 +116,44 @@ def test_motrixsim(scene: str) -> None:
 
 
 @pytest.mark.parametrize("scene", SCENES)
+def test_simbody(scene: str) -> None:
+    """By OpenSim's own classes, to 1e-6 a step: the slide by the springs of the cube's corners."""
+    osim = pytest.importorskip("opensim", reason="the extra simbody is not installed")
+    osim.Logger.setLevelString("Off")
+    world, mass, inertia = osim.Model(), 2.0 if scene == "fall" else 1.0, 1 / 6 if scene == "slide" else 1e-9
+    world.setGravity(osim.Vec3(0.7 * 9.81 if scene == "slide" else 0.0, 0.0, -9.81))
+    body = osim.Body("body", mass, osim.Vec3(0.0), osim.Inertia(inertia, inertia, inertia))
+    world.addBody(body)
+    level, at = osim.Vec3(-np.pi / 2.0, 0.0, 0.0), osim.Vec3(-1.0 if scene == "swing" else 0.0, 0.0, 0.0)
+    kind = osim.PinJoint if scene == "swing" else osim.FreeJoint
+    joint = kind("joint", world.getGround(), osim.Vec3(0.0), level, body, at, level)
+    world.addJoint(joint)
+    corners = np.array(np.meshgrid(*[[-0.5, 0.5]] * 3)).reshape(3, 8).T if scene == "slide" else ()
+    for number, (x, y, z) in enumerate(corners):
+        low = osim.Transform(osim.Vec3(0.0, 0.0, -0.5))  # the cube begins at the origin of its joint
+        spring = osim.ExponentialContactForce(low, body, osim.Vec3(float(x), float(y), float(z)))
+        spring.setName(f"corner {number}".replace(" ", ""))
+        pull = float(np.hypot(0.7, 1.0)) * 9.81 / 4.0
+        spring.setExponentialShapeParameters(osim.Vec3(0.0, pull, 1e4))
+        spring.setNormalViscosity(20.0)
+        spring.setFrictionElasticity(1e5)
+        spring.setFrictionViscosity(1e5**0.5)
+        spring.setInitialMuStatic(0.5)
+        spring.setInitialMuKinetic(0.5)
+        world.addForce(spring)
+    state = world.initSystem()
+    run = osim.Manager(world)
+    run.setIntegratorAccuracy(1e-6)
+    run.setIntegratorMaximumStepSize(1 / 60)
+    run.setWriteToStorage(False)
+    run.initialize(state)
+    state = run.integrate(SCENES[scene][3] / 60)
+    told = body.getPositionInGround(state).get(SCENES[scene][2])
+
+    assert f"{told:.{DIGITS}g}" == through_the_adapter("simbody", scene, "merson")
+
+
+@pytest.mark.parametrize("scene", SCENES)
 def test_sapien(scene: str) -> None:
     pytest.importorskip("sapien", reason="the extra sapien is not installed")
     import sapien

@@ -87,6 +87,7 @@ FACTS: Mapping[str, Facts] = {
     "rapier": Facts("32 bits", "Apache-2.0", "Rust, JavaScript", "CPU"),
     "rapier3d": Facts("32 bits", "Apache-2.0", "Rust, Python", "CPU"),
     "sapien": Facts("32 bits", "MIT", "C++ (PhysX), Python", "CPU, GPU"),
+    "simbody": Facts("64 bits", "Apache-2.0", "C++ (OpenSim), Python", "CPU"),
 }
 
 
