@@ -87,7 +87,7 @@ def _box(facts: Columns) -> bool:
 
 def _digits(facts: Columns) -> bool:
     lost = {name: name.split()[0] in SINGLE or name == "p2 (defaults)" for name in facts[5]}
-    return SINGLE <= {name.split()[0] for name in lost} and all(
+    return {name.split()[0] for name in lost} >= SINGLE and all(
         1e-6 < facts[5][name] < 1e-2 if much else facts[5][name] < 1e-12 for name, much in lost.items()
     )
 
