@@ -9,6 +9,8 @@ import math
 import re
 from collections.abc import Callable, Mapping, Sequence
 
+from bench.engine_places import SINGLE
+
 Columns = Sequence[Mapping[str, float]]  # in the order of the facts: setting -> what it answered
 UPPER = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 NO_ANSWER = ("-", "timed out", "crashed")
@@ -19,7 +21,6 @@ JOINT_COORDINATES = frozenset(
         "motrixsim (many-iterations)",
     }
 )  # fmt: skip
-SINGLE = frozenset({"box3d", "jolt", "motrixsim", "rapier", "rapier3d", "sapien"})
 
 
 def said(cell: str) -> float:
@@ -87,7 +88,7 @@ def _box(facts: Columns) -> bool:
 
 def _digits(facts: Columns) -> bool:
     lost = {name: name.split()[0] in SINGLE or name == "p2 (defaults)" for name in facts[5]}
-    return {name.split()[0] for name in lost} >= SINGLE and all(
+    return {name.split()[0] for name in lost} >= set(SINGLE) and all(
         1e-6 < facts[5][name] < 1e-2 if much else facts[5][name] < 1e-12 for name, much in lost.items()
     )
 
@@ -160,7 +161,7 @@ TWINS = (
     "",
 )
 NEWCOMERS = (
-    "## MotrixSim, asked since that night",
+    "## MotrixSim, which reads the files of MuJoCo",
     "",
     "`motrixsim` 0.10.1 (PyPI, 32 bits) reads MJCF: it is asked the models that MuJoCo is. Its settings, with what they rest on:",
     "",
@@ -175,8 +176,6 @@ NEWCOMERS = (
     "box on a diagonal of them stands on slopes of up to 1.4 times its friction, and one of ten tonnes creeps; 400 links end the process",
     "(`tracker run slope_grid --engine motrixsim --all`). Of a",
     "link beside its joint it tells the speed with the sign of the turning's part reversed, which is put right here while it does so.",
-    "What its makers would object to: it is made for many worlds at once on all cores, and is asked one world on one; its",
-    "single precision is a choice for learning; a better setting is a few lines in `engine/peers/motrixsim.py`.",
     "",
     "## Simbody, inside OpenSim",
     "",
@@ -184,7 +183,7 @@ NEWCOMERS = (
     "",
     "| setting | what it is | source |",
     "|---|---|---|",
-    "| merson | Runge-Kutta-Merson, which chooses its steps: to 1e-6 a step, and none longer than the time step | OpenSim's integrator unless told; Simbody's manual advises to hold the error |",
+    "| merson | Runge-Kutta-Merson, which chooses its steps: to 1e-6 a step, and none longer than the time step | OpenSim's integrator unless told |",
     "| held-step | the same with its steps held, without contacts, which are stiff springs | `Manager.setIntegratorFixedStepSize` |",
     "| defaults | as merson, to 1e-3 a step | Simbody's accuracy unless told |",
     "| cpodes | CPODES, implicit and of several steps, to 1e-6 | for stiff springs: `Manager.setIntegratorMethod` |",
@@ -194,9 +193,7 @@ NEWCOMERS = (
     "a cube of a metre that is pulled by 0.3 of its weight yields by 0.04 mm, and then stays. Boxes on boxes, capsules, cylinders",
     "and restitution (what Hunt and Crossley's gives back depends on the speed) are not supported. OpenSim turns free bodies and",
     "ball joints by three angles: past the place where two of them turn about one axis a held step of 1/60 s loses two thousandths",
-    "of a spin of 3 rad/s (`tests/test_engine_simbody.py`), which Simbody by itself, with quaternions, would not.",
-    "What its makers would object to: it is made for the motion of people and machines with a dozen joints, by integrators that",
-    "hold the error, not for heaps of bodies at a step that is given; a better setting is a few lines in `engine/peers/simbody.py`.",
+    "of a spin of 3 rad/s (`tests/test_engine_simbody.py`), where Simbody has quaternions, too.",
     "",
 )
 NOT_ASKED = (

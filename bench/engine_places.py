@@ -17,6 +17,7 @@ THEN = {"spook": 85, "mujoco": 14, "box3d": 3, "dart": 3, "cannon": 1, "jolt": 1
 SINGLE = (
     "box3d",
     "jolt",
+    "motrixsim",
     "rapier",
     "rapier3d",
     "sapien",

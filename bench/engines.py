@@ -30,6 +30,7 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 
 import bench.engine_kinds as engine_kinds
 import bench.engine_places as engine_places
+import bench.engine_settings as engine_settings
 import bench.recorded as recorded
 import spook_tracker.engine.find as find
 import spook_tracker.tracker as tracker
@@ -213,6 +214,7 @@ def page(database: str, of_facts: str = "") -> str:
         *engine_places.choice(run),
         *engine_places.single(run),
         *_facts(facts),
+        *engine_settings.SETTINGS,
         *engine_kinds.ARM,
         *engine_kinds.TWINS,
         *engine_kinds.NEWCOMERS,

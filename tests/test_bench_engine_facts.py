@@ -11,6 +11,7 @@ import pytest
 
 import bench.engine_kinds as engine_kinds
 from bench.engine_facts import FACTS, TWINS
+from bench.engine_places import SINGLE
 from spook_tracker.engine import simulate
 from spook_tracker.engine.find import find
 from spook_tracker.engine.result import SimulationFailed
@@ -94,7 +95,7 @@ def test_the_friction_of_mujocos_defaults_creeps() -> None:
 
 def test_single_precision_loses_digits_that_double_keeps() -> None:
     lost = column(5)
-    single = engine_kinds.SINGLE
+    single = set(SINGLE)
 
     for name, error in lost.items():
         if name.split()[0] in single or name == "p2 (defaults)":

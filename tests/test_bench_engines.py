@@ -13,6 +13,7 @@ import msgspec
 import pytest
 
 import bench.engine_kinds as engine_kinds
+import bench.engine_settings as engine_settings
 import spook_tracker.engine.find as find
 import spook_tracker.tracker as tracker
 from spook_tracker.tracker.document.run_document import Asked
@@ -214,9 +215,18 @@ def test_the_published_page_says_which_engines_are_not_asked_and_what_stops_do_t
 ) -> None:
     told = engines.PAGE.read_text(encoding="utf-8")
     assert (
-        "\n".join((*engine_kinds.ARM, *engine_kinds.TWINS, *engine_kinds.NEWCOMERS, *engine_kinds.NOT_ASKED))
+        "\n".join(
+            (
+                *engine_settings.SETTINGS,
+                *engine_kinds.ARM,
+                *engine_kinds.TWINS,
+                *engine_kinds.NEWCOMERS,
+                *engine_kinds.NOT_ASKED,
+            )
+        )
         in told
     )
+    assert {*find.EXTRAS, *find.NODE, *find.BUILT} == {*engine_settings.OBJECTIONS}
     assert not {*find.EXTRAS, *find.NODE, *find.BUILT} & {
         line.split(" | ")[0].strip("| ").lower() for line in engine_kinds.NOT_ASKED
     }

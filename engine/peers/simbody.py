@@ -43,7 +43,7 @@ class Simbody:
         Configuration(
             name="merson",
             reason="joint coordinates; the manager's own integrator, Runge-Kutta-Merson, which chooses its steps: to 1e-6 a "
-            "step, and none longer than the time step; Simbody's makers advise to hold the error, not the step",
+            "step, and none longer than the time step; Simbody's integrators hold an error unless told",
             options={"method": "RungeKuttaMerson", "accuracy": 1e-6},
         ),
         Configuration(

@@ -46,6 +46,10 @@ CREEPING = 1e-3  # m/s below which a ball's friction falls off
 STEEP = 1e4  # 1 over edges: so fast a corner's force grows as it sinks; 1150 / m unless told, where a metre is a foot's
 TANGENTIAL = 1e5  # N/m a kg: what holds a corner that sticks
 MOST_PAIRS = 300  # of balls and planes that are asked pair by pair; beyond, all in one force
+MOST_BODIES = (
+    200  # OpenSim looks through all of a model for each that is added: two seconds for three hundred
+)
+SHORTEST = 1e-4  # of the time step: what chooses its steps gives up there, where it would not end
 WEIGHT = 9.81  # m/s², of what there is without gravity
 
 
@@ -56,6 +60,10 @@ class Model:
         self.task, self.done = task, 0
         scene = self.scene = task.scene
         self.nodes = grown(scene)
+        if sum(not fixed(body) for body in scene.bodies) > MOST_BODIES:
+            raise NotSupported(
+                f"OpenSim builds models for simbody in the square of their size: at most {MOST_BODIES} bodies"
+            )
         self.normal = plane_of_motion(scene)
         self.bodies: dict[str, Any] = {}
         self.joints: dict[str, Any] = {}
@@ -333,6 +341,7 @@ class Model:
         else:
             manager.setIntegratorAccuracy(options["accuracy"])
             manager.setIntegratorMaximumStepSize(self.task.time_step)
+            manager.setIntegratorMinimumStepSize(SHORTEST * self.task.time_step)
         manager.setIntegratorConstraintTolerance(TOLERANCE)
 
 
