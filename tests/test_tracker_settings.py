@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import re
 import sys
 import traceback
 from pathlib import Path
@@ -11,9 +12,14 @@ import click
 import pytest
 from click.testing import CliRunner, Result
 
+from spook_tracker.engine.protocol import Configuration
+from spook_tracker.scalar_tests.case import ScalarTest
+from spook_tracker.scalar_tests.catalogue import Catalogue
 from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.cli.settings import KINDS, NOT_MEANT, Settings, SettingsError, defaults, read
 from spook_tracker.tracker.document.toml_file import read_toml
+from spook_tracker.tracker.measure.limits import held_to
+from spook_tracker.tracker.measure.others import asked_of
 from spook_tracker.tracker.measure.run import Questions
 
 TOY = 'engine = "toy_engine"\ncatalogue = "toy_questions"\n'
@@ -148,6 +154,43 @@ def test_of_two_limits_the_later_one_counts() -> None:
     metrics = {m.name: m for _, m in limited((error, 1.0), (error, 0.5)).metrics()}  # type: ignore[attr-defined]
 
     assert metrics["position_error"].limit == 0.5
+
+
+class Imported(Catalogue):
+    """Our catalogue, and which of its tests were asked for."""
+
+    def __init__(self) -> None:
+        self.names: list[str] = []
+
+    def __getitem__(self, name: str) -> ScalarTest:
+        self.names.append(name)
+        return super().__getitem__(name)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "may_be_of"),
+    [
+        ("falling_object/default/position_error/*", "falling_object$"),
+        ("falling_object/*/position_error/h=0.0[1]*", "falling_object$"),
+        ("fall*/position_error/*", "fall"),
+        ("*/position_error/*", ""),
+        ("[f]alling_object/*/position_error/*", ""),
+        ("?alling_object/*/position_error/*", ""),
+    ],
+)
+def test_a_limit_imports_the_tests_it_may_be_of_and_another_engine_those_it_is_asked(
+    pattern: str, may_be_of: str
+) -> None:
+    tests = Imported()
+    asked = asked_of(tests, (Configuration(name="default", reason="the only one"),), gating=True)
+    assert tests.names == []
+
+    held = held_to(asked, ((pattern, 3.0),))
+
+    assert tests.names == [name for name in Catalogue() if re.match(may_be_of, name)]
+    assert {3.0} <= {metric.limit for _, metric in held["falling_object"].metrics()}
+    assert held["pendulum"] is held["pendulum"]
+    assert "pendulum" in tests.names
 
 
 @pytest.mark.parametrize(

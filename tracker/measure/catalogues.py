@@ -11,7 +11,7 @@ The folder one stands in is looked at, too: a team's own questions need no insta
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from importlib.util import find_spec
 
 from spook_tracker.engine.find import look_beside, thrown
@@ -49,6 +49,27 @@ class Several(Mapping[str, ScalarTest]):
 
     def __len__(self) -> int:
         return len(self.owner)
+
+
+class Changed(Mapping[str, ScalarTest]):
+    """The tests of a catalogue asked otherwise, each when it is asked for: none of the others is imported."""
+
+    def __init__(
+        self, tests: Mapping[str, ScalarTest], change: Callable[[str, ScalarTest], ScalarTest]
+    ) -> None:
+        self.tests, self.change = tests, change
+        self.found: dict[str, ScalarTest] = {}
+
+    def __getitem__(self, name: str) -> ScalarTest:
+        if name not in self.found:
+            self.found[name] = self.change(name, self.tests[name])
+        return self.found[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.tests)
+
+    def __len__(self) -> int:
+        return len(self.tests)
 
 
 def find(names: str) -> Mapping[str, ScalarTest]:

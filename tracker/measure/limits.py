@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fnmatch import fnmatchcase
 
 from spook_tracker.scalar_tests.case import Measurement, Metric, ScalarTest
 from spook_tracker.tracker.document.errors import TrackerError
+from spook_tracker.tracker.measure.catalogues import Changed
 from spook_tracker.tracker.measure.question import series_key
 
 Limit = float | tuple[float, float]
@@ -19,25 +21,37 @@ class LimitError(TrackerError):
     """A limit that cannot be applied; one sentence that names it."""
 
 
-def held_to(tests: Mapping[str, ScalarTest], limits: Limits) -> dict[str, ScalarTest]:
+def held_to(tests: Mapping[str, ScalarTest], limits: Limits) -> Mapping[str, ScalarTest]:
     """The tests with these limits; of two that match, the later one counts. LimitError if one matches nothing."""
     used: set[str] = set()
-    found = {
-        name: replace(
+
+    def held(name: str, test: ScalarTest) -> ScalarTest:
+        return replace(
             test,
             measurements=tuple(
                 replace(m, metrics=tuple(_metric(name, m, metric, limits, used) for metric in m.metrics))
                 for m in test.measurements
             ),
         )
-        for name, test in tests.items()
-    }
+
+    found = Changed(tests, held)
+    for name in found:
+        if any(_may_match(pattern, name) for pattern, _ in limits):
+            _ = found[
+                name
+            ]  # now, not when it is asked for: a limit that cannot be applied is refused at the start
     for pattern, _ in limits:
         if pattern not in used:
             raise LimitError(
                 f"{SOURCE}: no series is called {pattern!r}; `tracker run --no-record --json FILE` names them all"
             )
     return found
+
+
+def _may_match(pattern: str, test: str) -> bool:
+    """Whether a pattern may be of a series of this test, by its characters before the first that stands for others."""
+    beginning, key = re.split(r"[*?\[]", pattern, maxsplit=1)[0], f"{test}/"
+    return key.startswith(beginning) or beginning.startswith(key)
 
 
 def _metric(

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from spook_tracker.engine.method import PLAIN
 from spook_tracker.engine.protocol import Configuration
@@ -19,10 +19,7 @@ from spook_tracker.engine.result import Result
 from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.case import Ladder, Measurement, Metric, ScalarTest
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
-
-if TYPE_CHECKING:
-    pass
-
+from spook_tracker.tracker.measure.catalogues import Changed
 
 Answer = TypeVar("Answer")
 
@@ -32,30 +29,25 @@ def asked_of(
     configurations: Sequence[Configuration],
     gating: bool,
     every_setting: bool = True,
-) -> dict[str, ScalarTest]:
+) -> Mapping[str, ScalarTest]:
     """The catalogue as another engine is asked it: no figures and no stability studies, they are SPOOK's.
 
     Single values are asked in each configuration, or in the first alone; ladders in each.
     """
-    return {
-        name: test
-        if test.as_given
-        else replace(
+    single = configurations if every_setting else configurations[:1]
+
+    def asked(name: str, test: ScalarTest) -> ScalarTest:
+        if test.as_given:
+            return test
+        return replace(
             test,
-            measurements=tuple(
-                _measurements(
-                    test,
-                    configurations if every_setting else configurations[:1],
-                    gating,
-                    both_kinds=not _is_ours(name, test),
-                )
-            ),
+            measurements=tuple(_measurements(test, single, gating, both_kinds=not _is_ours(name, test))),
             ladders=tuple(_ladder(ladder, one) for ladder in test.ladders for one in configurations),
             figures=(),
             stability=(),
         )
-        for name, test in tests.items()
-    }
+
+    return Changed(tests, asked)
 
 
 def in_configuration(
