@@ -213,6 +213,11 @@ def main(arguments: list[str]) -> int:
     if "--tests" in parts:
         at = parts.index("--tests")
         parts, tests = parts[:at], tuple(Path(name).stem for name in parts[at + 1 :])
+    unknown = [part for part in parts if part not in NEAR]
+    if unknown and not (bits or tests):
+        raise SystemExit(
+            f"which tests are beside {unknown[0]} is not known: say --tests NAME …, or --bits for runs alone"
+        )
     module = build()
     found = [one for one in every_constant() if f"{one.room}/{one.part}" in (parts or NEAR)]
     plain = states(module, "")

@@ -1,5 +1,6 @@
-// Energy that comes out of nothing: an outcome, not "completed". Asked of the methods whose rows can add to it and that keep it else:
-// compositions, whose final state tells, and corrections, which may gain and lose on the way.
+// Energy that comes out of nothing: an outcome, not "completed". Compositions and corrections are asked, since they keep energy and
+// their rows can add to it: of compositions the final state tells, while corrections may gain and lose on the way. Plain SPOOK is not:
+// it dissipates by its method, and is asked by the books (engine/books.py).
 //
 // reads: places and velocities of bodies, drives. writes: what the run has known of its energy.
 #include <algorithm>

@@ -40,7 +40,9 @@ int find_whirling(const RigidModel& model, const RigidState& live, const JointSe
         if (model.h * norm(spin) < 1.0) continue;
         deliver();
         for (const JointBlock& block : joints.blocks()) {
-            if (joints.constants(block.joint).kind >= JointKind::relation) continue;
+            if (const JointKind kind = joints.constants(block.joint).kind;
+                kind != JointKind::distance && holds_of(kind).rows() == 0)
+                continue;
             const JointSet::State& state = joints.states[block.joint];
             for (const bool second : {false, true}) {
                 if ((second ? block.second : block.first) != i) continue;

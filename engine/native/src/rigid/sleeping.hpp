@@ -35,8 +35,8 @@ public:
     /// Wakes the islands of some bodies; what is awake begins anew to be at rest.
     void wake(const std::vector<int>& met);
     /// What acts on a body, or on a joint, has been changed from outside.
-    void mark_moving(int body);
-    void mark_joint(int joint);
+    void wake_body(int body);
+    void wake_joint(int joint);
     /// The stage, at the end of a step: what was met by a displaced body is awake, and islands that have been at rest fall asleep.
     void sleep();
 

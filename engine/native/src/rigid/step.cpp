@@ -1,4 +1,4 @@
-// The order of a step of h: what step() calls, in this order, each stage in the file of its name.
+// The order of a step of h: what step() calls, in this order, each stage in the file of its name; impact is called by solve velocities.
 //
 //   wake               wake.cpp               what moving bodies touch or hold is awake; again, with all that follows, for what is met
 //   apply forces       apply_forces.cpp       dv_ext = h M⁻¹ f

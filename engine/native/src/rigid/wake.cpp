@@ -82,16 +82,16 @@ void Sleeping::wake(const std::vector<int>& met) {
 }
 
 /// What acts on a body has been changed from outside.
-void Sleeping::mark_moving(int body) {
+void Sleeping::wake_body(int body) {
     if (rules_.on() && body >= 0) wake({body});
 }
 
-void Sleeping::mark_joint(int joint) {
+void Sleeping::wake_joint(int joint) {
     for (std::size_t k = 0; k < joints_.blocks().size(); ++k) {
         const JointBlock& block = joints_.blocks()[k];
         if (block.joint != joint) continue;
-        mark_moving(block.first);
-        mark_moving(block.second);
+        wake_body(block.first);
+        wake_body(block.second);
     }
 }
 

@@ -1,7 +1,8 @@
 // A state as bytes, to go on from in another process: every field of it, found by the compiler.
 //
 // A record is written as its fields, an array as its items, and what is plain memory as that. Each says what it is and how
-// large, so that bytes of a build whose state has other fields are refused. No list names the fields: a new one is in.
+// large, so that bytes of a build whose state has other fields are refused. No list names the fields: a new one of a
+// record is in, though a record of a new number of fields may need its line in `each` below.
 #pragma once
 
 #include <cstddef>

@@ -80,18 +80,18 @@ void RigidSystem::set_load(int body, Vec3 force, Vec3 torque) {
     if (!model_.constants[body].moves()) return;
     plane_.give_up();
     if (!forces_.is_new_load(body, force, torque)) return;
-    sleeping_.mark_moving(body);
+    sleeping_.wake_body(body);
     composition_.catch_up();
     forces_.set_load(body, force, torque);
 }
 
 void RigidSystem::set_motor(int joint, double speed, double max_force) {
-    if (joints_.drives().set_motor(joint, speed, max_force)) sleeping_.mark_joint(joint);
+    if (joints_.drives().set_motor(joint, speed, max_force)) sleeping_.wake_joint(joint);
 }
 
 void RigidSystem::set_rest(int joint, double rest) {
     composition_.catch_up();
-    if (joints_.drives().set_rest(joint, rest)) sleeping_.mark_joint(joint);
+    if (joints_.drives().set_rest(joint, rest)) sleeping_.wake_joint(joint);
 }
 
 void RigidSystem::set_velocity(int body, Vec3 velocity, Vec3 angular_velocity) {
