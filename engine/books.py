@@ -95,7 +95,7 @@ def kept(scene: Scene, method: Method, result: Result) -> Result:
     left = {name: values for name, values in result.observables.items() if not _ours(name)}
     times = {name: values for name, values in result.sample_times.items() if not _ours(name)}
     told = replace(result, books=books, observables=left, sample_times=times)
-    between = method.composition == "none" and not method.half_step_velocities
+    between = method.composition == method.runge_kutta == "none" and not method.half_step_velocities
     if (
         between
     ):  # where something takes all the time, what a fall comes short of by half a step is not dissipated

@@ -74,5 +74,7 @@ def _only_particles(scene: Scene) -> bool:
 
 
 def _forces_rigid_stages(method: Method) -> bool:
-    """Whether a stage only rigid bodies have is to be measured, and nothing is asked that they lack."""
-    return not {"rotation", "collision"}.isdisjoint(method.force_stages) and not method.string_stiffness
+    """Whether a method or a stage to be measured is of rigid bodies only, and nothing is asked that they lack."""
+    return method.runge_kutta != "none" or (
+        not {"rotation", "collision"}.isdisjoint(method.force_stages) and not method.string_stiffness
+    )

@@ -23,6 +23,7 @@ ALONE = (
 )
 _NUMBERS = (
     "correction_cap",
+    "tolerance",
     "residual_tolerance",
     "unsettled_residual",
     "sleep_speed",
@@ -52,6 +53,11 @@ class Method:
                        compliance, damping and corrections play no part; forces are those at the sample's time.
                        Small trees of rigid joints on the world are solved in joint coordinates, the rest by rows. Steps that are
                        too long for the tension of light bodies are taken in parts
+    runge_kutta        order8: the explicit method of Dormand and Prince, twelve accelerations a step (articulated bodies) in the
+                       joint coordinates of trees; a free body is one. Rows, springs and forces as for compositions, and
+                       no loop; neither time reversal nor energy is kept beyond the error. The cheapest way to an error
+    tolerance          of runge_kutta: a step is taken in parts, each with an estimated error of at most this, in rad or in sizes of
+                       joints; 0: a step is one part, and its error of order 8
     solver             direct; iterative (projected Gauss-Seidel); an impact
                        among up to 24 contacts that iterations do not settle is solved directly, since what it leaves stays;
                        so are up to 24 joints (and their contacts) that they do not settle, and up to 64 that
@@ -92,6 +98,8 @@ class Method:
     string_stiffness: bool = False
     substeps: int = 1
     composition: Literal["none", "order4", "order6", "order8"] = "none"
+    runge_kutta: Literal["none", "order8"] = "none"
+    tolerance: float = 0.0
     solver: Literal["direct", "iterative"] = "direct"
     iterations: int = 50
     residual_tolerance: float = 1e-10
@@ -129,6 +137,16 @@ class Method:
             refuse("substeps", "a whole number from 1")
         if not one_of(self.composition, ("none", "order4", "order6", "order8")):
             refuse("composition", "none, order4, order6 or order8")
+        if not one_of(self.runge_kutta, ("none", "order8")):
+            refuse("runge_kutta", "none or order8")
+        if self.runge_kutta != "none" and self.composition != "none":
+            raise MethodError(
+                "method: a step is a composition or one of Runge-Kutta; leave one of them at 'none'"
+            )
+        if not 0.0 <= self.tolerance < 1.0:
+            refuse("tolerance", "from 0, which makes a step one part, to below 1")
+        if self.tolerance > 0.0 and self.runge_kutta == "none":
+            raise MethodError("method: tolerance is of runge_kutta; give that, or leave it at 0")
         if isinstance(self.solver, str) and self.solver == FORMER_SOLVER:
             warnings.warn(FORMER, DeprecationWarning, stacklevel=3)
             object.__setattr__(self, "solver", "direct")
@@ -173,6 +191,7 @@ class Method:
         """What looks further than the step at hand, or bends its rows, would not see what sleeps."""
         plain = {
             "composition": "none",
+            "runge_kutta": "none",
             "half_step_velocities": False,
             "string_stiffness": False,
             "corrections": 0,

@@ -21,6 +21,7 @@ from spook_tracker.engine import _core
 from spook_tracker.engine.bodies import Particle, RigidBody
 from spook_tracker.engine.check import Vector
 from spook_tracker.engine.couplings import Relation, Wire
+from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.forces import CentralGravity, Fluid, Load, Spring
 from spook_tracker.engine.joint_tables import couplings, drives, or_default
 from spook_tracker.engine.joints import (
@@ -37,7 +38,7 @@ from spook_tracker.engine.particle_program import ends
 from spook_tracker.engine.program import Program, observations, table
 from spook_tracker.engine.quantities import requests
 from spook_tracker.engine.scene import Scene, wire_length
-from spook_tracker.engine.smooth import check_rigid, check_wide_rows
+from spook_tracker.engine.smooth import check_rigid, check_trees, check_wide_rows
 from spook_tracker.engine.surface_tables import Outlined, hull_tables, surfaces
 from spook_tracker.engine.time_functions import Ramp, Sinusoid, TimeFunction
 from spook_tracker.engine.tyres import Tyre
@@ -55,13 +56,18 @@ def compile_rigid(
 ) -> Program:
     """The Program of a scene with at least one rigid body; `held`: its loads may be set."""
     check_wide_rows(scene, method)
+    if method.runge_kutta != "none":
+        check_trees(scene, method)
     quantities, shapes = requests(scene, observe)
-    native = _core.RigidProgram(
-        **pack(scene, time_step, method, held),
-        quantities=quantities,
-        observations=observations(observe),
-        time_left=time_left(),
-    )
+    packed = pack(scene, time_step, method, held)
+    try:
+        native = _core.RigidProgram(
+            **packed, quantities=quantities, observations=observations(observe), time_left=time_left()
+        )
+    except ValueError as error:
+        if method.runge_kutta == "none":
+            raise
+        raise MethodError(str(error)) from None
     names = [body.name for body in scene.bodies]
     program = Program(
         native,
@@ -152,6 +158,8 @@ def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> 
             "iterations": method.iterations,
             "residual_tolerance": method.residual_tolerance,
             "composition": method.composition,
+            "runge_kutta": method.runge_kutta != "none",
+            "tolerance": method.tolerance,
             "string_stiffness": method.string_stiffness,
             "half_step_velocities": method.half_step_velocities,
             "corrections": method.corrections,

@@ -8,13 +8,14 @@ from spook_tracker.engine.bodies import WORLD, RigidBody
 from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.forces import Fluid, Load, Spring
-from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, frictions
+from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Joint, Universal, frictions
 from spook_tracker.engine.method import Method
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.time_functions import TimeFunction
 from spook_tracker.engine.tyres import Tyre
 
 RIGID = 1e-7  # m/N or rad/(N m), the softest row a composition takes for rigid
+MOST_IN_TREES = 2000  # bodies
 
 
 def check_smooth(scene: Scene, method: Method) -> None:
@@ -40,6 +41,56 @@ def check_smooth(scene: Scene, method: Method) -> None:
     known = {body.name: body for body in scene.bodies}
     for row in scene.constraints:
         _check_held(row, scene.length(row, known) if isinstance(row, Distance) else 0.0)
+
+
+def check_trees(scene: Scene, method: Method) -> None:
+    """Runge-Kutta moves joint coordinates: refuse what has none, closes a loop or holds softly."""
+    if method.solver == "iterative" or method.string_stiffness or method.half_step_velocities:
+        raise MethodError(
+            "method: runge_kutta needs the direct solver, without string stiffness and half_step_velocities"
+        )
+    bodies = {body.name: body for body in scene.bodies}
+    moving = sum(1 for body in scene.bodies if not isinstance(body, RigidBody) or body.motion == "dynamic")
+    if moving > MOST_IN_TREES:
+        raise MethodError(
+            f"method: runge_kutta moves up to {MOST_IN_TREES} bodies, not {moving}; use composition='order8'"
+        )
+    for body in scene.bodies:
+        if isinstance(body, RigidBody) and body.follows_time:
+            raise MethodError(
+                f"method: runge_kutta takes loads and springs in time, but {body.name!r} moves as it is told; use "
+                f"half_step_velocities"
+            )
+    tree: dict[str, str] = {}
+
+    def root(name: str) -> str:
+        while name in tree:
+            name = tree[name]
+        return name
+
+    for row in scene.constraints:
+        if not isinstance(row, Joint) or isinstance(row, Universal):
+            raise MethodError(
+                f"method: runge_kutta moves along joint coordinates, and {row.kind} {row.name!r} has none here; use "
+                f"composition='order8'"
+            )
+        roots = []
+        for end in row.between:
+            held = bodies.get(end) if isinstance(end, str) else None
+            if isinstance(held, RigidBody) and held.motion == "kinematic":
+                raise MethodError(
+                    f"method: runge_kutta takes joints of the world and of bodies that move freely, but {row.name!r} holds {end!r}"
+                )
+            roots.append(
+                root(held.name) if isinstance(held, RigidBody) and held.motion == "dynamic" else WORLD
+            )
+        if roots[0] == roots[1]:
+            raise MethodError(
+                f"method: runge_kutta needs joints that make trees, but {row.name!r} closes a loop; use composition='order8'"
+            )
+        first, second = sorted(roots, key=lambda name: name == WORLD)
+        tree[first] = second
+        _check_held(row, 0.0, "runge_kutta")
 
 
 def check_wide_rows(scene: Scene, method: Method) -> None:
@@ -68,6 +119,7 @@ def check_rigid(scene: Scene, method: Method, touching: bool) -> None:
     """What rigid bodies cannot do beyond plain SPOOK; `touching`: whether surfaces may ever meet."""
     composed = method.composition != "none"
     asked = [f"composition {method.composition!r}"] if composed else []
+    asked += ["runge_kutta"] if method.runge_kutta != "none" else []
     asked += ["half_step_velocities"] if method.half_step_velocities else []
     asked += ["string_stiffness"] if method.string_stiffness else []
     if not asked:
@@ -124,22 +176,28 @@ def _bounded(joint: Constraint) -> str | None:
     return None
 
 
-def _check_held(row: Constraint, length: float) -> None:
+def _check_held(row: Constraint, length: float, by: str = "a composition") -> None:
     """`length` [m] at the start, of a distance."""
     held = row.compliance if isinstance(row.compliance, tuple) else (row.compliance,)
     if max(held) > RIGID:
         raise MethodError(
-            f"method: a composition holds rows rigidly, but {row.name!r} has a compliance of "
+            f"method: {by} holds rows rigidly, but {row.name!r} has a compliance of "
             f"{max(held):g} m/N; make it {RIGID:g} at most, or a Spring"
         )
     if isinstance(row, AxialJoint):
         for drive in ("motor", "limit"):
             if getattr(row, drive) is not None:
                 raise MethodError(
-                    f"method: a composition holds rows rigidly, but the {drive} of {row.name!r} drives one; use "
+                    f"method: {by} holds rows rigidly, but the {drive} of {row.name!r} drives one; use "
                     f"half_step_velocities, of order 2, there"
                 )
-        if row.spring is not None and (
+        if row.spring is not None and by == "runge_kutta":
+            if row.spring.damping is None:
+                raise MethodError(
+                    f"method: runge_kutta takes the spring of {row.name!r} as a force, and its damping would be two time "
+                    f"steps; give it one in seconds, or 0"
+                )
+        elif row.spring is not None and (
             row.spring.damping != 0.0 or isinstance(row.spring.rest, TimeFunction)
         ):
             raise MethodError(

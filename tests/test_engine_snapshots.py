@@ -41,6 +41,11 @@ def corpus() -> dict[str, Made]:
     made["unsettled"] = (islands((40,), few)[0], 0.01, few)
     for kind, scenes in (("particles", particle_scenes), ("rigid", rigid_scenes)):
         made[f"{kind}, halved"] = (stiff(scenes.tree(rng())), 0.15, Method(composition="order4"))
+    made["rigid, within a tolerance"] = (
+        loaded_chain(300.0),
+        1 / 60,
+        Method(runge_kutta="order8", tolerance=1e-6),
+    )
     made["rigid, in parts"] = (loaded_chain(300.0), 1 / 60, Method(composition="order4"))
     made["a lock that breaks"] = (coupling_scenes.hung(strength=22.0), 0.01, Method())
     scene, method = islands((12, 9), Method())

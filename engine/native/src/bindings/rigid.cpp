@@ -353,6 +353,9 @@ RigidMethod to_method(const nb::dict& method) {
     Composition composition{};
     options.read_kind("composition", composition);
     out.composition = order_of(composition);
+    options.read("runge_kutta", out.runge_kutta);
+    options.read("tolerance", out.tolerance);
+    if (out.runge_kutta) out.composition = 8;  // what holds beside a composition's stages holds here
     options.read("string_stiffness", out.string_stiffness);
     options.read("half_step_velocities", out.half_step_velocities);
     options.read("corrections", out.corrections);

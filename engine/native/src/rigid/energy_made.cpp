@@ -85,7 +85,8 @@ void EnergyMade::judge(RunReport& report) const {
     std::snprintf(
         said, sizeof said, "was found to move with %.3g J that came out of nothing, of %.3g J at most; %s",
         gained, most,
-        model_.composed
+        model_.method.runge_kutta ? "take smaller steps, or give the method a smaller tolerance"
+        : model_.composed
             ? "where light bodies carry much tension, T h²/(m l) above 0.3, take smaller steps or no "
               "composition"
             : "where bodies turn far in a step, take smaller steps or no corrections");

@@ -26,6 +26,12 @@ public:
     void find() {
         if (!force_.empty()) find_all();
     }
+    /// The same, and loads and rests of springs as the time asks for, within a step.
+    void find_at(double time);
+    /// Whether they are others within a step.
+    bool change_within_steps() const noexcept {
+        return !force_.empty() || !load_follows_.empty() || !drives_.empty();
+    }
     /// Loads, drives and paces as the time asks for.
     void follow_time();
     bool follow_the_time() const noexcept { return !load_follows_.empty() || !drives_.empty(); }

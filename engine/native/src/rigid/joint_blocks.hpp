@@ -48,6 +48,7 @@ struct BearingRow {
 struct JointSpring {
     int block = 0;
     double stiffness = 0.0, rest = 0.0;
+    double damping = 0.0;  // s: the force is −stiffness (q − rest + damping q̇)
 };
 
 }  // namespace spook

@@ -29,7 +29,7 @@ void JointDrives::add(const JointSpec& spec, int own, int number, bool springs_p
         axial.has_spring = true;
         axial.spring_at = static_cast<int>(springs_.size());
         axial.spring_pulls = springs_pull;
-        springs_.push_back({own, spec.spring->stiffness, spec.spring->rest});
+        springs_.push_back({own, spec.spring->stiffness, spec.spring->rest, spec.spring->damping});
         axial.spring_impulse = time_step_ * spec.spring->force;
         axial.spring = regularise(1.0 / spec.spring->stiffness, spec.spring->damping, time_step_);
         if (!springs_pull) add_row(axial.spring.softness);

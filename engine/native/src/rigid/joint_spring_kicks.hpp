@@ -1,4 +1,4 @@
-// Springs of free coordinates as forces −k (q − rest) along them, as compositions take them.
+// Springs of free coordinates as forces −k (q − rest + τ q̇) along them, as compositions and Runge–Kutta take them.
 //
 // reads: places of bodies. writes: velocities and angular momenta; the angles of hinges, counted on.
 #pragma once
@@ -23,7 +23,8 @@ void pull_by_springs(JointSet& joints, const LargeArray<BodyConstants>& constant
                                        state_of(block.second, bodies));
         double& angle = joints.states[block.joint].angle;
         angle = joints.coordinate(block.joint, bodies);
-        const double pull = -spring.stiffness * (angle - spring.rest);
+        double pull = -spring.stiffness * (angle - spring.rest);
+        if (spring.damping > 0.0) pull -= spring.stiffness * spring.damping * row.rate;
         for (const bool second : {false, true}) {
             const int body = second ? block.second : block.first;
             if (body < 0 || !constants[body].moves()) continue;

@@ -128,8 +128,24 @@ void JointTree::analyse(std::span<const BodyConstants> constants, const JointSet
     coordinates_ = 0;
 }
 
-/// The forest, its nodes by depth.
+bool JointTree::hang(std::span<const BodyConstants> constants, const JointSet& joints,
+                     std::span<const int> bodies) {
+    constants_ = constants;
+    joints_ = &joints;
+    coordinates_ = 0;
+    if (!hang_up(bodies, true) || !has_all_rotors()) return false;
+    const auto attaches = [](const Node& node) { return node.joint >= 0; };
+    const auto holds = [](const JointBlock& block) { return !block.axial; };
+    return coordinates_ > 0 && std::count_if(nodes_.begin(), nodes_.end(), attaches) ==
+                                   std::count_if(joints.blocks().begin(), joints.blocks().end(), holds);
+}
+
 bool JointTree::attach(std::span<const int> tied) {
+    return hang_up(tied, false) && has_all_rotors() && has_small_trees();
+}
+
+/// The forest, its nodes by depth.
+bool JointTree::hang_up(std::span<const int> tied, bool particles) {
     BreadthFirst bodies(constants_, *joints_);
     if (!may_be_a_forest(constants_, *joints_) || tied.size() > 2000 || !bodies.find(tied)) return false;
     nodes_.clear();
@@ -152,14 +168,14 @@ bool JointTree::attach(std::span<const int> tied) {
         nodes_[at].end = static_cast<int>(nodes_.size());
     };
     for (const Hung& one : bodies.found()) {
-        if (constants_[one.body].particle) return false;
+        if (constants_[one.body].particle && (!particles || one.block >= 0)) return false;
         if (one.parent < 0) add(add, one);
     }
     scale_ = scale / static_cast<double>(std::max<std::size_t>(1, nodes_.size()));
     courses_.assign(nodes_.size(), Course{});
     pushes_.assign(nodes_.size(), {});
     twists_.assign(nodes_.size(), {});
-    return has_all_rotors() && has_small_trees();
+    return true;
 }
 
 /// A body with its way to move: by the joint of a block, or floating (−1).
@@ -167,7 +183,8 @@ JointTree::Node JointTree::node_held_by(int block, int body) const noexcept {
     Node node;
     node.body = body;
     if (block < 0) {
-        node.turns = node.slides = 3;
+        node.turns = constants_[body].particle ? 0 : 3;
+        node.slides = 3;
         node.slide_axes[0] = {1, 0, 0}, node.slide_axes[1] = {0, 1, 0}, node.slide_axes[2] = {0, 0, 1};
     } else {
         const auto blocks = joints_->blocks();

@@ -25,10 +25,29 @@ namespace spook {
 
 class JointTree {
 public:
+    struct Node {  // a body with the joint it is attached to; a parent stands before all attached to it
+        // joint: −1 of a root that floats; end: of the nodes attached to it.
+        int body = -1, joint = -1, parent = -1, end = 0;
+        int turns = 0, slides = 0;  // coordinates: 0, 1 about the axis or 3; along slide_axes
+        int first = 0;              // of its coordinates
+        int tree = 0;               // which of the forest's
+        bool backwards = false;     // the body is the joint's first
+        Vec3 parent_arm, arm;       // from the centres to the joint, at the start
+        Vec3 axis, slide_axes[3];
+        double mass = 0.0, extent = 1.0;
+        double armature = 0.0;  // of its joint's coordinate, kg or kg m²
+        Vec3 inertia;
+        int coordinates() const noexcept { return turns + slides; }
+    };
+
     /// Takes the scene if it can: every constrained body is attached by joints it knows to the world or on a body that floats, in
     /// small trees, and what closes loops is not redundant at the start. Empty otherwise.
     void analyse(std::span<const BodyConstants> constants, const JointSet& joints, std::span<const int> tied,
                  const LargeArray<BodyState>& start);
+    /// Takes the bodies without stages of its own if joints hang them up in trees of any size, and close no loop. What floats may
+    /// be a particle.
+    bool hang(std::span<const BodyConstants> constants, const JointSet& joints, std::span<const int> bodies);
+    std::span<const Node> nodes() const noexcept { return nodes_; }
     /// Joint coordinates that can move; 0: not a scene for this.
     int coordinates() const noexcept { return coordinates_; }
     /// Rows that close loops.
@@ -47,20 +66,6 @@ public:
                std::int64_t& rounds) noexcept;
 
 private:
-    struct Node {  // a body with the joint it is attached to; a parent stands before all attached to it
-        // joint: −1 of a root that floats; end: of the nodes attached to it.
-        int body = -1, joint = -1, parent = -1, end = 0;
-        int turns = 0, slides = 0;  // coordinates: 0, 1 about the axis or 3; along slide_axes
-        int first = 0;              // of its coordinates
-        int tree = 0;               // which of the forest's
-        bool backwards = false;     // the body is the joint's first
-        Vec3 parent_arm, arm;       // from the centres to the joint, at the start
-        Vec3 axis, slide_axes[3];
-        double mass = 0.0, extent = 1.0;
-        double armature = 0.0;  // of its joint's coordinate, kg or kg m²
-        Vec3 inertia;
-        int coordinates() const noexcept { return turns + slides; }
-    };
     /// Of a turn θ, by y = sin² θ/2: (θ/2)/sin θ/2, (1 − (θ/2) cot θ/2)/y and their derivatives.
     struct Log {
         double ratio = 1.0, bend = 1.0 / 3.0, ratio_slope = 1.0 / 6.0, bend_slope = 2.0 / 15.0;
@@ -105,6 +110,7 @@ private:
     };
 
     bool attach(std::span<const int> tied);
+    bool hang_up(std::span<const int> tied, bool particles);
     Node node_held_by(int block, int body) const noexcept;
     bool has_all_rotors() const noexcept;
     bool has_small_trees() const;

@@ -56,8 +56,18 @@ void RigidComposition::begin() {
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
         for (int i = 0; i < joints_.blocks()[k].size; ++i)
             if (i != joints_.blocks()[k].rotor) rows_.matrix.diagonal(k)[i] = -0.0;
+    turn_rotors();
+}
+
+/// As their joints go.
+void RigidComposition::turn_rotors() noexcept {
     for (const int k : joints_.rotors())
         joints_.states[joints_.blocks()[k].joint].rotor = rotor_speed(joints_, k, live_.bodies);
+}
+
+void RigidComposition::project() {
+    read();
+    turn_rotors();
 }
 
 void RigidComposition::compose(std::int64_t steps) {
@@ -192,7 +202,8 @@ void RigidComposition::step(double h, int depth) {
 
 void RigidComposition::kick_all(double span) {
     if (forces_.loads_change())
-        forces_.find_loads(0.0);  // springs alone: a composition has nothing that follows time
+        forces_.find_loads(static_cast<double>(live_.moved) *
+                           model_.h);  // a composition itself: springs alone
     forces_.find();
     for (int i = 0; i < model_.bodies(); ++i) {
         const BodyConstants& body = model_.constants[i];

@@ -30,6 +30,8 @@ public:
     void compose(std::int64_t steps);
     /// What is seen at the end of a step: momenta kicked and projected to the sample, forces from the accelerations there.
     void read();
+    /// Momenta as joints allow them at the start, for a method that takes rates of joints from them.
+    void project();
     /// What is set from outside acts from here on: up to here momenta are kicked as it was before.
     void catch_up();
 
@@ -42,6 +44,7 @@ private:
     bool stage(double tau, std::size_t stage);
     bool hold_stage(double tau, double span, std::size_t stage);
     void kick_all(double span);
+    void turn_rotors() noexcept;
     void guess(std::size_t stage, double span);
     void remember(std::size_t stage, double span);
     void forget(std::size_t stage);

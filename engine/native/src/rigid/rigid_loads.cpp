@@ -80,6 +80,14 @@ void Forces::follow_time() {
     if (!load_follows_.empty()) find_loads(now);
 }
 
+void Forces::find_at(double time) {
+    for (const TimeDrive& drive : drives_)
+        if (drive.kind == DriveKind::rest)
+            joints_.drives().set_moving_rest(drive.index, drive.function.at(time), 0.0, 0.0);
+    if (!load_follows_.empty()) find_loads(time);
+    find();
+}
+
 void Forces::find_loads(double time) {
     for (int i : load_follows_) {
         acceleration_[i] = steady_[i].force;

@@ -161,8 +161,10 @@ struct RigidMethod {
     ImpactOrder impacts = ImpactOrder::simultaneous;
     double unsettled_residual = 0.1;              // m/s
     double sleep_speed = 0.0, sleep_after = 0.5;  // m/s, s: what is slower for so long sleeps; 0: none
-    int composition = 2;                // order; above 2 a symmetric composition of constrained steps
-    bool string_stiffness = false;      // the geometric stiffness of loaded joints, implicitly
+    int composition = 2;            // order; above 2 a symmetric composition of constrained steps
+    bool runge_kutta = false;       // an explicit method of order 8 in joint coordinates in its place
+    double tolerance = 0.0;         // of its parts of a step, rad or sizes of joints; 0: none, a step is one
+    bool string_stiffness = false;  // the geometric stiffness of loaded joints, implicitly
     bool half_step_velocities = false;  // velocities live at mid-step
     int corrections = 0;                // extra solves per step for the curvature of the rows
     double correction_cap = 0.3;        // of the joint's arms, or rad

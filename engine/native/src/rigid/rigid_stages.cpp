@@ -193,9 +193,10 @@ constexpr StageTable<Facts> TABLE{{
     {Stage::correct_curvature,
      [](const Facts& is) { return is.joints && (is.composed() || is.method().corrections > 0); },
      [](const Facts& is) {
-         return is.composed() ? "iteration keeps the curvature of the rows to rounding"
-                              : std::to_string(is.method().corrections) +
-                                    " extra back-substitutions keep the curvature of the rows";
+         return is.method().runge_kutta ? "joint coordinates keep the joints by construction"
+                : is.composed()         ? "iteration keeps the curvature of the rows to rounding"
+                                        : std::to_string(is.method().corrections) +
+                                              " extra back-substitutions keep the curvature of the rows";
      },
      [](const Facts& is) -> std::string {
          return is.joints ? "the method linearises the rows, so that what spins off its joint slows down; "
@@ -204,9 +205,11 @@ constexpr StageTable<Facts> TABLE{{
      }},
     {Stage::half_step, [](const Facts& is) { return is.composed() || is.method().half_step_velocities; },
      [](const Facts& is) {
-         return is.composed() ? "a symmetric composition of half-step steps, order " +
-                                    std::to_string(is.method().composition)
-                              : "velocities live at mid-step: half-kick start, mid-step read-out";
+         return is.method().runge_kutta
+                    ? "a Runge-Kutta of order 8 in joint coordinates, and velocities at whole steps"
+                : is.composed() ? "a symmetric composition of half-step steps, order " +
+                                      std::to_string(is.method().composition)
+                                : "velocities live at mid-step: half-kick start, mid-step read-out";
      },
      "velocities live at whole steps"},
     {Stage::integrate_positions, [](const Facts& is) { return is.moving; }, "bodies can move",
@@ -244,6 +247,11 @@ void RigidSystem::tell(StageChoices& choices) const {
     if (plane_.is_used())
         solve = std::string("the mechanism lies in the plane across ") + "xyz"[plane_.step().normal()] +
                 ": " + std::to_string(plane_.step().rows()) + " rows of that plane, factored in an envelope";
+    if (model_.method.runge_kutta) {
+        solve = "joints make trees: " + std::to_string(runge_kutta_.coordinates()) +
+                " joint coordinates, accelerated by articulated bodies";
+        choices[static_cast<std::size_t>(Stage::assemble_rows)].reason = "rows for what is read";
+    }
     if (!composition_.in_tree()) return;
     const JointTree& tree = composition_.tree();
     solve = "joints make trees: " + std::to_string(tree.coordinates()) + " joint coordinates, " +

@@ -51,6 +51,7 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
       bilateral_(model_, live_, joints_, forces_, rows_, mixed_, curvature_, scratch_, clock_),
       plane_(model_, live_, joints_, forces_, bilateral_.loops, scratch_.last_rows),
       composition_(model_, live_, joints_, forces_, rows_, clock_),
+      runge_kutta_(model_, live_, joints_, forces_, clock_),
       half_step_(model_, live_, joints_, forces_, rows_),
       sleeping_(model_, live_, joints_, forces_, rows_, mixed_, scratch_),
       projection_(model_, live_, joints_, forces_, mixed_, scratch_),
@@ -72,7 +73,10 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
         joints_.stops().let_fold();
     bilateral_.take();
     sleeping_.take(scene);
-    if (model_.composed) composition_.take();
+    if (method.runge_kutta && !runge_kutta_.take())
+        throw std::invalid_argument(
+            "method: runge_kutta needs joints that make trees; those that slide and turn are to name first what carries them");
+    if (model_.composed && !method.runge_kutta) composition_.take();
     // Nothing of the scene but its joints, steady forces and steps of the plain kind bears on the bodies:
     if (block && !bilateral_.by_links() && !model_.composed && !model_.stiff && !mixed_.surfaces() &&
         !method.force_block && !scene.loads_change && forces_.act_steadily() && model_.free.empty() &&
@@ -174,6 +178,7 @@ void RigidSystem::reset(StageClock* clock) {
     mixed_.begin();
     const bool corrected = model_.method.corrections > 0, may_touch = mixed_.may_touch();
     if (model_.composed) composition_.begin();
+    if (model_.method.runge_kutta) composition_.project();
     if (model_.composed || corrected) energy_.begin();
     if (model_.stiff) bilateral_.stiffness.find_tensions();
     if (model_.half_step || corrected) curvature_.begin();
@@ -187,6 +192,7 @@ void RigidSystem::reset(StageClock* clock) {
 }
 
 void RigidSystem::advance(std::int64_t steps) {
+    if (model_.method.runge_kutta) return runge_kutta_.advance(steps * model_.method.substeps);
     if (model_.composed) return composition_.compose(steps * model_.method.substeps);
     for (std::int64_t n = steps * model_.method.substeps; n > 0; --n) step();
     deliver();
@@ -200,8 +206,10 @@ Health RigidSystem::health() const {
     if (live_.lost >= 0)
         return {
             Status::diverged, live_.lost,
-            "is held by joints that no motion satisfies, even in a small part of the step; start it where its "
-            "joints can move, or take a smaller time step"};
+            model_.method.runge_kutta
+                ? "accelerates so that no part of the step is within the tolerance; is a force without bounds near it?"
+                : "is held by joints that no motion satisfies, even in a small part of the step; start it where its "
+                  "joints can move, or take a smaller time step"};
     if (live_.contradicted >= 0)
         return {Status::diverged, live_.contradicted,
                 "is held by rows that contradict each other, of {joints}; give one of them a compliance",

@@ -20,6 +20,7 @@
 #include "rigid/run_state.hpp"
 #include "rigid/sleeping.hpp"
 #include "rigid/step_scratch.hpp"
+#include "rigid/tree_runge_kutta.hpp"
 #include "run/run_loop.hpp"
 #include "run/stage_clock.hpp"
 #include "run/stages.hpp"
@@ -133,6 +134,7 @@ private:
     BilateralSolve bilateral_;
     PlanePath plane_;
     RigidComposition composition_;
+    TreeRungeKutta runge_kutta_;
     HalfStep half_step_;
     Sleeping sleeping_;
     OverlapProjection projection_;

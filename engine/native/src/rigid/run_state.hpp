@@ -66,6 +66,7 @@ struct RigidState {
     std::vector<int> guess_order;
     int parts = 1;                  // of a step, each of which tension allows
     std::int64_t tension_look = 0;  // steps until the next look at it
+    double part = 0.0;              // s: of a Runge–Kutta step within its tolerance, the next
 
     bool asleep(int body) const noexcept { return sleep.sleepers > 0 && sleep.island[body] != 0; }
     void note_unsettled(int body, double residual, bool sunk = false) {

@@ -80,6 +80,14 @@ inline constexpr double NEAR = 1.0 / 64.0;   // of that: nearer than this tensio
 inline constexpr std::int64_t OFTEN = 8, SELDOM = 256;  // steps
 }  // namespace tolerances::rigid_composition
 
+// tree_runge_kutta.cpp
+namespace tolerances::tree_runge_kutta {
+inline constexpr double SAFE = 0.9;  // of the length whose error is estimated to be the tolerance
+inline constexpr double SHORTEST = 0.2, LONGEST = 6.0;  // times the length of the part before
+inline constexpr double LITTLE_MORE = 1.01;             // times a part: so much is left for one
+inline constexpr double SMALLEST = 1e-9;                // of a step: no smaller part is tried
+}  // namespace tolerances::tree_runge_kutta
+
 // rigid_hold.cpp
 namespace tolerances::rigid_hold {
 inline constexpr double SETTLED = 2e-15;    // of the joint's size: rounding level
