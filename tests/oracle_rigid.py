@@ -163,7 +163,7 @@ class Placed:
     def rate(self, oracle: RigidOracle) -> Array:
         """(1, 6 n): how velocities change the free coordinate; for a hinge about the first body's axis."""
         if isinstance(self.constraint, Prismatic):
-            return oracle.jacobian(self.coordinate)
+            return oracle.jacobian(self.coordinate, self.bodies)
         about = (
             rotation(oracle.pose(self.bodies[0], oracle.x, oracle.q)[1])
             @ rotation(self.start[0]).T
@@ -212,11 +212,12 @@ class RigidOracle:
     def angular_velocity(self) -> Array:
         return np.array([np.linalg.solve(self.world_inertia(i), ell) for i, ell in enumerate(self.ell)])
 
-    def jacobian(self, function: Any) -> Array:
-        """(rows, 6 n): derivative of function(x, q, self) by displacements and world rotations, complex steps."""
-        columns = []
-        for body in range(len(self.x)):
-            for degree in range(6):
+    def jacobian(self, function: Any, of: list[int]) -> Array:
+        """(rows, 6 n): derivative of function(x, q, self) by displacements and world rotations of the bodies that it is a
+        function of, complex steps."""
+        found: dict[int, Array] = {}
+        for body in of:
+            for degree in range(6 if body >= 0 else 0):
                 x, q = self.x.astype(complex), self.q.astype(complex)
                 if degree < 3:
                     x[body, degree] += 1j * TINY
@@ -224,8 +225,10 @@ class RigidOracle:
                     turn = np.zeros(4, dtype=complex)
                     turn[degree - 2] = 0.5j * TINY
                     q[body] = q[body] + product(turn, self.q[body])
-                columns.append(function(x, q, self).imag / TINY)
-        return np.array(columns).T
+                found[6 * body + degree] = function(x, q, self).imag / TINY
+        jacobian = np.zeros((len(next(iter(found.values()))), 6 * len(self.x)))
+        jacobian[:, list(found)] = np.array(list(found.values())).T
+        return jacobian
 
     def force(self) -> Array:
         """(n, 6) N and N m."""
@@ -258,7 +261,14 @@ class RigidOracle:
             count = c.rows
             eps = np.broadcast_to(np.array(c.compliance, dtype=float), count)
             tau = np.broadcast_to(np.array(default if c.damping is None else c.damping, dtype=float), count)
-            found.append((self.jacobian(joint.violation), joint.violation(self.x, self.q, self), eps, tau))
+            found.append(
+                (
+                    self.jacobian(joint.violation, joint.bodies),
+                    joint.violation(self.x, self.q, self),
+                    eps,
+                    tau,
+                )
+            )
         for joint in self.joints:
             c = joint.constraint
             if isinstance(c, AxialJoint) and c.spring is not None:

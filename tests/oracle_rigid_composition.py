@@ -72,7 +72,7 @@ class ComposedOracle(RigidOracle):
         )
 
     def _jacobian(self) -> Array:
-        rows = [self.jacobian(joint.violation) for joint in self.joints]
+        rows = [self.jacobian(joint.violation, joint.bodies) for joint in self.joints]
         return np.vstack(rows) if rows else np.zeros((0, 6 * len(self.x)))
 
     def _inverse_mass(self) -> Array:
