@@ -17,12 +17,14 @@ def gates(test):
 
 
 def test_another_engine_is_held_to_physical_limits_alone():
-    ours = {name: CATALOGUE[name] for name in ("hanging_chain", "falling_object", "grasp", "slip_angle")}
+    names = ("hanging_chain", "simple_pendulum", "falling_object", "grasp", "slip_angle")
+    ours = {name: CATALOGUE[name] for name in names}
 
     asked = asked_of(ours, THEIRS, gating=True)
 
     assert gates(ours["hanging_chain"]) == {"length_deviation"}
-    assert gates(asked["hanging_chain"]) == set()
+    assert gates(ours["simple_pendulum"]) == {"library_error"}
+    assert gates(asked["hanging_chain"]) == gates(asked["simple_pendulum"]) == set()
     assert gates(asked["falling_object"]) == {"position_error"}
     assert gates(asked["grasp"]) == {"held_time"}
     assert gates(asked["slip_angle"]) == {"slip_slope_error"}
