@@ -28,7 +28,6 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -38,6 +37,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.robot_arm import POSES, inverse_dynamics, kinematics
 from spook_tracker.scalar_tests.robot_arm import scene as driven
 from spook_tracker.scalar_tests.sweep import line, told
@@ -397,12 +397,7 @@ TEST = ScalarTest(
             description="largest distance of a joint from the path in half a second",
             unit="rad",
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 480)),
-            configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 480, 1 / 120)),
-                Configuration(
-                    name="half-step", method=Method(half_step_velocities=True), expected_order=None
-                ),
-            ),
+            configurations=configured({"plain": 1.0, "half-step": None}, (1 / 480, 1 / 120)),
             error=ladder_error,
             target_error=0.02,
             target_seconds=0.01,

@@ -12,7 +12,6 @@ from spook_tracker.engine.bodies import Material
 from spook_tracker.scalar_tests.bracket import break_count, break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Curve,
     Drawing,
     Example,
     Figure,
@@ -21,6 +20,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.sweep import line
 
 TIME_STEP = 1.0 / 60.0  # s
 RADIUS = 0.1  # m
@@ -120,20 +120,13 @@ def _draw(simulate: Simulate) -> Drawing:
             duration=BLOWS * FLIGHT,
             observe=observe,
         )
+        curves.append(line(f"{name}, μ = {friction:g}", result.sample_times["v"], result["v"][:, 0]))
         curves.append(
-            Curve(
-                name=f"{name}, μ = {friction:g}",
-                x=tuple(map(float, result.sample_times["v"])),
-                y=tuple(map(float, result["v"][:, 0])),
-                style="line",
-            )
-        )
-        curves.append(
-            Curve(
-                name=f"{name}, closed form",
-                x=tuple((blow + 1.0) * FLIGHT for blow in range(BLOWS)),
-                y=tuple(v for v, _, _ in expected(friction, tangential=tangential)),
-                style="reference",
+            line(
+                f"{name}, closed form",
+                ((blow + 1.0) * FLIGHT for blow in range(BLOWS)),
+                (v for v, _, _ in expected(friction, tangential=tangential)),
+                "reference",
             )
         )
     return Drawing(curves=tuple(curves), x_label="time [s]", y_label="speed along the walls [m/s]")

@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     AngularVelocity,
     Final,
     Method,
@@ -23,8 +22,6 @@ from spook_tracker.engine.bodies import Material
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
-    Curve,
     Drawing,
     Example,
     Figure,
@@ -34,7 +31,8 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
-from spook_tracker.scalar_tests.sweep import apart
+from spook_tracker.scalar_tests.configurations import configured
+from spook_tracker.scalar_tests.sweep import apart, line
 
 TIME_STEP = 1.0 / 60.0  # s
 RADIUS = 0.03  # m
@@ -255,12 +253,12 @@ def _draw(simulate: Simulate) -> Drawing:
     )
     return Drawing(
         curves=(
-            Curve(name="cue ball, rolling again", x=rolls, y=after, style="points"),
-            Curve(
-                name="5/7 v₊ + 2/7 r ω",
-                x=rolls,
-                y=tuple(float(expected_shot(roll, 0.0)[0][0]) for roll in rolls),
-                style="reference",
+            line("cue ball, rolling again", rolls, after, "points"),
+            line(
+                "5/7 v₊ + 2/7 r ω",
+                rolls,
+                (float(expected_shot(roll, 0.0)[0][0]) for roll in rolls),
+                "reference",
             ),
         ),
         x_label="spin at the hit, over that of rolling",
@@ -350,10 +348,7 @@ TEST = ScalarTest(
             description="place of a cue ball with back spin 1.5 s after a full hit, against the closed form",
             unit="m",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 480, 1920)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=1.0),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
-            ),
+            configurations=configured({"direct": 1.0, "iterative": 1.0}),
             error=ladder_error,
             target_error=1e-3,
             target_seconds=0.003,

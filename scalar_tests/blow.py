@@ -33,6 +33,7 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.sweep import line
 
 TIME_STEP = 1.0 / 60.0  # s
 RADIUS = 0.1  # m
@@ -186,7 +187,7 @@ def _draw_friction(simulate: Simulate) -> Drawing:
     after = tuple(bounce_errors(simulate, mu)[0] + expected_slide(mu) for mu in coefficients)
     return Drawing(
         curves=(
-            Curve(name="speed along the floor after the blow", x=coefficients, y=after),
+            line("speed along the floor after the blow", coefficients, after, "both"),
             Curve(
                 name="v − μ (1 + e) u, or 5/7 v",
                 x=coefficients,

@@ -21,7 +21,6 @@ from spook_tracker.engine.bodies import Material
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Example,
     Ladder,
     Measurement,
@@ -30,6 +29,7 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.configurations import configured
 
 RADIUS = 0.1  # m
 HEIGHT = 1.0  # m, gap at the start
@@ -144,10 +144,7 @@ TEST = ScalarTest(
             description="height after the second bounce against e⁴ h, over that, e = 0.5",
             unit="1",
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 480, 960)),
-            configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=None),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
-            ),
+            configurations=configured({"plain": None, "iterative": None}),
             error=ladder_error,
             target_error=1e-2,
             target_seconds=0.01,

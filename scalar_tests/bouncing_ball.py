@@ -27,8 +27,6 @@ from spook_tracker.engine.bodies import Material
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
-    Curve,
     Drawing,
     Example,
     Figure,
@@ -39,6 +37,8 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.configurations import configured
+from spook_tracker.scalar_tests.sweep import line
 
 RADIUS = 0.1  # m
 MASS = 1.0  # kg
@@ -134,10 +134,8 @@ def _draw_heights(simulate: Simulate) -> Drawing:
     every = slice(None, None, 5)
     return Drawing(
         curves=(
-            Curve(
-                name="gap", x=tuple(map(float, times[every])), y=tuple(map(float, gap[every])), style="line"
-            ),
-            Curve(name="stop time t₀(1+e)/(1−e)", x=(STOP, STOP), y=(0.0, HEIGHT), style="reference"),
+            line("gap", times[every], gap[every]),
+            line("stop time t₀(1+e)/(1−e)", (STOP, STOP), (0.0, HEIGHT), "reference"),
         ),
         x_label="time [s]",
         y_label="gap between ball and floor [m]",
@@ -149,13 +147,8 @@ def _draw_order(simulate: Simulate) -> Drawing:
     errors = tuple(ladder_error(simulate, h, PLAIN) for h in steps)
     return Drawing(
         curves=(
-            Curve(name="largest error of five heights", x=steps, y=errors),
-            Curve(
-                name="second order",
-                x=steps,
-                y=tuple(errors[0] * (h / steps[0]) ** 2 for h in steps),
-                style="reference",
-            ),
+            line("largest error of five heights", steps, errors, "both"),
+            line("second order", steps, (errors[0] * (h / steps[0]) ** 2 for h in steps), "reference"),
         ),
         x_label="time step [s]",
         y_label="relative error of the height",
@@ -329,10 +322,7 @@ TEST = ScalarTest(
             description="largest relative error of the first five heights, of 16 drops",
             unit="1",
             time_steps=(4e-3, 2e-3, 1e-3, 5e-4, 2.5e-4),
-            configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=2.0),
-                Configuration(name="half-step", method=Method(half_step_velocities=True), expected_order=2.0),
-            ),
+            configurations=configured({"plain": 2.0, "half-step": 2.0}),
             error=ladder_error,
             target_error=0.05,
             target_seconds=0.01,

@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     AngularVelocity,
     Final,
     Material,
@@ -26,7 +25,6 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -36,6 +34,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
 GRAVITY = 9.81  # m/s²
@@ -344,17 +343,7 @@ TEST = ScalarTest(
             description="largest error of the place in two seconds",
             unit="m",
             time_steps=tuple(1.0 / n for n in (120, 240, 480, 960, 1920)),
-            configurations=(
-                Configuration(
-                    name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 1920, 1 / 240)
-                ),
-                Configuration(
-                    name="half-step",
-                    method=Method(half_step_velocities=True),
-                    expected_order=1.0,
-                    order_range=(1 / 1920, 1 / 240),
-                ),
-            ),
+            configurations=configured({"plain": 1.0, "half-step": 1.0}, (1 / 1920, 1 / 240)),
             error=ladder_error,
             target_error=1e-2,
             target_seconds=0.05,

@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     WORLD,
     ConstraintForce,
     Cylinder,
@@ -31,7 +30,6 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -41,6 +39,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
 GRAVITY = 9.81  # m/s²
@@ -331,10 +330,7 @@ TEST = ScalarTest(
             description="way of the heavy weight in half a second against ½ a t²",
             unit="m",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480)),
-            configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=1.0),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
-            ),
+            configurations=configured({"plain": 1.0, "iterative": 1.0}),
             error=ladder_error,
             target_error=1e-2,
             target_seconds=0.01,

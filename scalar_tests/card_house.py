@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     Box,
     ContactForce,
     Final,
@@ -25,7 +24,6 @@ from spook_tracker.scalar_tests import leaning_cards as cards
 from spook_tracker.scalar_tests.bracket import break_count, break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -35,6 +33,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
 DECK, DECK_MASS = 0.02, 1.0  # m thick, kg: a board between two storeys
@@ -239,12 +238,7 @@ TEST = ScalarTest(
             description="relative error of the load of a lowest foot after a quarter of a second",
             unit="1",
             time_steps=tuple(1.0 / n for n in (40, 60, 120)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(
-                    name="half-step", method=Method(half_step_velocities=True), expected_order=None
-                ),
-            ),
+            configurations=configured({"direct": None, "half-step": None}),
             error=ladder_error,
             target_error=1e-9,
             target_seconds=0.1,

@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     AngularVelocity,
     ContactForce,
     Final,
@@ -21,7 +20,6 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -31,6 +29,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import apart, line, told
 from spook_tracker.scalar_tests.vehicle import (
     FRICTION,
@@ -245,10 +244,7 @@ TEST = ScalarTest(
             description="way up the slope in a second against ½ a t²",
             unit="m",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=1.0),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
-            ),
+            configurations=configured({"direct": 1.0, "iterative": 1.0}),
             error=ladder_error,
             target_error=0.01,
             target_seconds=0.05,

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     WORLD,
     AngularVelocity,
     Box,
@@ -28,7 +27,6 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -38,6 +36,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
 GRAVITY = 9.81  # m/s²
@@ -379,10 +378,7 @@ TEST = ScalarTest(
             description="yaw rate after a tenth of a second against the bicycle model's; its chassis cannot lean",
             unit="rad/s",
             time_steps=tuple(1.0 / n for n in (120, 240, 480, 960, 1920)),
-            configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=1.0),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
-            ),
+            configurations=configured({"plain": 1.0, "iterative": 1.0}),
             error=ladder_error,
             target_error=1e-3,
             target_seconds=0.1,

@@ -11,7 +11,6 @@ from spook_tracker.engine.bodies import Material
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Curve,
     Drawing,
     Example,
     Figure,
@@ -20,6 +19,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.sweep import line
 
 TIME_STEP = 1.0 / 60.0  # s
 RADIUS = 0.1  # m
@@ -126,14 +126,7 @@ def _draw(simulate: Simulate) -> Drawing:
     for name, method in (("successive", SUCCESSIVE), ("simultaneous", Method())):
         observe = {"v": Trace(quantity=Velocity(f"ball {COUNT}"))}
         result = simulate(scene(1), time_step=TIME_STEP, duration=DURATION, method=method, observe=observe)
-        curves.append(
-            Curve(
-                name=name,
-                x=tuple(map(float, result.sample_times["v"])),
-                y=tuple(map(float, result["v"][:, 0])),
-                style="line",
-            )
-        )
+        curves.append(line(name, result.sample_times["v"], result["v"][:, 0]))
     return Drawing(curves=tuple(curves), x_label="time [s]", y_label="speed of the last ball [m/s]")
 
 

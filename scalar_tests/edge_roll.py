@@ -20,7 +20,6 @@ from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
-    Curve,
     Drawing,
     Example,
     Figure,
@@ -30,7 +29,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
-from spook_tracker.scalar_tests.sweep import apart
+from spook_tracker.scalar_tests.sweep import apart, line
 
 TIME_STEP = 2.5e-4  # s
 RADIUS = 0.1  # m
@@ -179,8 +178,8 @@ def _draw(simulate: Simulate) -> Drawing:
     )
     return Drawing(
         curves=(
-            Curve(name="smooth edge", x=speeds, y=found, style="points"),
-            Curve(name="closed form", x=speeds, y=right, style="reference"),
+            line("smooth edge", speeds, found, "points"),
+            line("closed form", speeds, right, "reference"),
         ),
         x_label="speed on the table [m/s]",
         y_label="level speed in flight [m/s]",

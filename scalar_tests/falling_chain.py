@@ -32,7 +32,6 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_count, break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -43,6 +42,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.rope import ragdoll
 from spook_tracker.scalar_tests.sweep import line, told
 
@@ -341,10 +341,7 @@ TEST = ScalarTest(
             description="momentum of a chain of three that came from nowhere: none is right",
             unit="1",
             time_steps=tuple(1.0 / n for n in (30, 45, 60)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
-            ),  # rounding
+            configurations=configured({"direct": None, "iterative": None}),  # rounding
             error=ladder_error,
             target_error=1e-9,
             target_seconds=0.1,

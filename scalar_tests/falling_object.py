@@ -22,7 +22,6 @@ from spook_tracker.engine.theory import free_fall_error
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -33,6 +32,7 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
 MASS = 1.0  # kg
@@ -339,10 +339,7 @@ TEST = ScalarTest(
             description="position error after 20 s against ½ g t²",
             unit="m",
             time_steps=(0.1, 0.05, 0.025, 0.0125, 0.00625, 0.003125),
-            configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=1.0),
-                Configuration(name="half-step", method=HALF_STEP, expected_order=None),
-            ),
+            configurations=configured({"plain": 1.0, "half-step": None}),
             error=position_error,
             target_error=1.0,
             target_seconds=1e-3,

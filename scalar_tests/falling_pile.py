@@ -27,8 +27,6 @@ from spook_tracker.engine.method import PLAIN
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
-    Curve,
     Drawing,
     Example,
     Figure,
@@ -39,7 +37,9 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.pile import energy_rise
+from spook_tracker.scalar_tests.sweep import line
 
 RADIUS = 0.3  # m, of balls
 EDGES = (0.6, 0.5, 0.4)  # m, of boxes
@@ -193,8 +193,7 @@ def _draw(simulate: Simulate) -> Drawing:
     curves = (("deepest overlap", fall.depth, "line"), ("what turning may add in a step", fall.bent, "limit"))
     return Drawing(
         curves=tuple(
-            Curve(name=name, x=times, y=tuple(1e3 * float(d) for d in depths), style=style)  # type: ignore[arg-type]
-            for name, depths, style in curves
+            line(name, times, (1e3 * float(d) for d in depths), style) for name, depths, style in curves
         ),
         x_label="time [s]",
         y_label="overlap [mm]",
@@ -283,10 +282,7 @@ TEST = ScalarTest(
             description="deepest overlap of any two bodies in two seconds",
             unit="m",
             time_steps=(1.0 / 30.0, 1.0 / 60.0, 1.0 / 120.0, 1.0 / 240.0),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(name="iterative, 200 sweeps", method=SWEEPS, expected_order=None),
-            ),
+            configurations=configured({"direct": None, "iterative, 200 sweeps": None}),
             error=ladder_error,
             target_error=1e-6,
             target_seconds=0.1,

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     WORLD,
     AngularVelocity,
     Box,
@@ -27,7 +26,6 @@ from spook_tracker.engine import (
 from spook_tracker.scalar_tests.bracket import break_point, cell, table
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -39,6 +37,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityMap,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
 GRAVITY = 9.81  # m/s²
@@ -393,15 +392,7 @@ TEST = ScalarTest(
             description="largest distance from z₀ cos ω t in 2 s",
             unit="m",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480, 960)),
-            configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 960, 1 / 240)),
-                Configuration(
-                    name="half-step",
-                    method=Method(half_step_velocities=True),
-                    expected_order=2.0,
-                    order_range=(1 / 960, 1 / 240),
-                ),
-            ),
+            configurations=configured({"plain": 1.0, "half-step": 2.0}, (1 / 960, 1 / 240)),
             error=ladder_error,
             target_error=5e-3,
             target_seconds=0.01,

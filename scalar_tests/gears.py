@@ -8,7 +8,6 @@ from dataclasses import replace
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     WORLD,
     AngularVelocity,
     ConstraintForce,
@@ -31,7 +30,6 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -42,6 +40,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
 SUN, PLANET, RING = 20.0, 30.0, 80.0  # teeth; ring = sun + 2 planets
@@ -341,17 +340,7 @@ TEST = ScalarTest(
             description="angle of the carrier after 1 s from rest against ½ (T i/J) t²",
             unit="rad",
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 480, 960, 1920, 3840)),
-            configurations=(
-                Configuration(
-                    name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 3840, 1 / 960)
-                ),
-                Configuration(
-                    name="half-step",
-                    method=Method(half_step_velocities=True),
-                    expected_order=2.0,
-                    order_range=(1 / 3840, 1 / 960),
-                ),
-            ),
+            configurations=configured({"plain": 1.0, "half-step": 2.0}, (1 / 3840, 1 / 960)),
             error=ladder_error,
             target_error=0.1,
             target_seconds=0.05,

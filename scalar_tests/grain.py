@@ -7,7 +7,6 @@ import math
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     Box,
     ContactForce,
     Final,
@@ -24,7 +23,6 @@ from spook_tracker.engine import (
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -34,6 +32,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
 GRAVITY = 10.0  # m/s²
@@ -382,10 +381,7 @@ TEST = ScalarTest(
             description="place of rest of the thrown box, against two integrals",
             unit="m",
             time_steps=tuple(1.0 / n for n in (20, 40, 80, 160, 320)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=1.0),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
-            ),
+            configurations=configured({"direct": 1.0, "iterative": 1.0}),
             error=ladder_error,
             target_error=0.01,
             target_seconds=0.01,

@@ -26,7 +26,6 @@ from spook_tracker.engine import (
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -38,6 +37,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, sweep, told
 
 GRAVITY = 9.81  # m/s²
@@ -266,10 +266,7 @@ TEST = ScalarTest(
             description="how far the capsule sinks in a second, pressed with 1.1 of the least force: not at all is right",
             unit="m",
             time_steps=tuple(1.0 / n for n in (20, 60, 180)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
-            ),
+            configurations=configured({"direct": None, "iterative": None}),
             error=sunk,
             target_error=1e-9,
             target_seconds=0.01,

@@ -6,7 +6,6 @@ import functools
 import math
 
 from spook_tracker.engine import (
-    PLAIN,
     WORLD,
     Ball,
     Capsule,
@@ -21,7 +20,6 @@ from spook_tracker.engine import (
 from spook_tracker.scalar_tests.bracket import break_count, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -32,6 +30,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.heavier import heavier
 from spook_tracker.scalar_tests.sweep import line, told
 
@@ -247,12 +246,7 @@ TEST = ScalarTest(
             description="relative error of the horizontal force at an end after a second, ten links",
             unit="1",
             time_steps=tuple(1.0 / n for n in (30, 60, 120)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(
-                    name="half-step", method=Method(half_step_velocities=True), expected_order=None
-                ),
-            ),  # exact
+            configurations=configured({"direct": None, "half-step": None}),  # exact
             error=pull_error,
             target_error=1e-9,
             target_seconds=0.01,

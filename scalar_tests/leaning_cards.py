@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     Capsule,
     Compound,
     ContactForce,
@@ -26,7 +25,6 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -36,6 +34,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
 GRAVITY = 9.81  # m/s²
@@ -233,10 +232,7 @@ TEST = ScalarTest(
             description="relative error of a foot's friction after half a second",
             unit="1",
             time_steps=tuple(1.0 / n for n in (30, 60, 120)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
-            ),
+            configurations=configured({"direct": None, "iterative": None}),
             error=ladder_error,
         ),
     ),

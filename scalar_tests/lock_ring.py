@@ -12,7 +12,6 @@ import math
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     WORLD,
     Box,
     ConstraintForce,
@@ -28,8 +27,6 @@ from spook_tracker.engine import (
 from spook_tracker.scalar_tests.bracket import break_count, break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
-    Curve,
     Drawing,
     Example,
     Figure,
@@ -40,7 +37,8 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
-from spook_tracker.scalar_tests.sweep import told
+from spook_tracker.scalar_tests.configurations import configured
+from spook_tracker.scalar_tests.sweep import line, told
 
 COUNT = 24
 PIECE = 0.5  # m, length of a box along the ring
@@ -118,8 +116,7 @@ def _draw(simulate: Simulate) -> Drawing:
     boxes = tuple(float(i + 1) for i in range(COUNT))
     return Drawing(
         curves=tuple(
-            Curve(name=f"along {axis}", x=boxes, y=tuple(map(float, 1e12 * moved[:, i])))
-            for i, axis in enumerate("xyz")
+            line(f"along {axis}", boxes, 1e12 * moved[:, i], "both") for i, axis in enumerate("xyz")
         ),
         x_label="box",
         y_label="largest displacement [pm]",
@@ -248,14 +245,8 @@ TEST = ScalarTest(
             description="largest displacement of a ring of 12 over 1 s, of its diameter",
             unit="%",
             time_steps=tuple(1.0 / n for n in (30, 60, 120)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(
-                    name="direct, no refinement", method=Method(refinements=0), expected_order=None
-                ),
-                Configuration(
-                    name="iterative, 50 sweeps", method=Method(solver="iterative"), expected_order=None
-                ),
+            configurations=configured(
+                {"direct": None, "direct, no refinement": None, "iterative, 50 sweeps": None}
             ),
             error=ladder_error,
             target_error=None,

@@ -34,7 +34,6 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -44,6 +43,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.heavier import heavier
 from spook_tracker.scalar_tests.slider_crank import (
     CRANK,
@@ -382,14 +382,7 @@ TEST = ScalarTest(
             description="largest error of the slider's place",
             unit="m",
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 480)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=2.0),
-                Configuration(
-                    name="half-step, curved twice",
-                    method=Method(half_step_velocities=True, corrections=2),
-                    expected_order=None,
-                ),
-            ),
+            configurations=configured({"direct": 2.0, "half-step, curved twice": None}),
             error=ladder_error,
             target_error=5e-4,
             target_seconds=0.02,

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     WORLD,
     AngularVelocity,
     Final,
@@ -26,7 +25,6 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -37,6 +35,7 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import apart, line
 
 INERTIA = 2.0  # kg m², about the axle
@@ -237,17 +236,7 @@ TEST = ScalarTest(
             description="angle after 10 s against the closed form",
             unit="rad",
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 480, 960, 1920, 3840, 7680)),
-            configurations=(
-                Configuration(
-                    name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 7680, 1 / 1920)
-                ),
-                Configuration(
-                    name="iterative",
-                    method=Method(solver="iterative"),
-                    expected_order=1.0,
-                    order_range=(1 / 7680, 1 / 1920),
-                ),
-            ),
+            configurations=configured({"plain": 1.0, "iterative": 1.0}, (1 / 7680, 1 / 1920)),
             error=ladder_error,
             target_error=0.1,
             target_seconds=0.1,

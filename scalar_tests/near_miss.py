@@ -22,7 +22,6 @@ from spook_tracker.engine.bodies import Material
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Curve,
     Drawing,
     Example,
     Figure,
@@ -32,6 +31,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.sweep import line
 
 TIME_STEP = 1.0 / 60.0  # s
 SIZE = 0.05  # m, radius of balls and capsules, half an edge of boxes
@@ -171,11 +171,7 @@ def _draw(simulate: Simulate) -> Drawing:
     for name in SLIDES:
         off = slide_changes(simulate, name)
         times = tuple(TIME_STEP * k for k in range(len(off)))
-        curves.append(
-            Curve(
-                name=name.replace("_", " "), x=times, y=tuple(max(float(o), 1e-18) for o in off), style="line"
-            )
-        )
+        curves.append(line(name.replace("_", " "), times, (max(float(o), 1e-18) for o in off)))
     return Drawing(
         curves=tuple(curves), x_label="time [s]", y_label="largest change so far [m/s]", y_scale="log"
     )

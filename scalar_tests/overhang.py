@@ -7,7 +7,6 @@ import functools
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     AngularVelocity,
     Box,
     Energy,
@@ -25,7 +24,6 @@ from spook_tracker.engine.bodies import Material
 from spook_tracker.scalar_tests.bracket import break_count, break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Curve,
     Drawing,
     Example,
@@ -38,6 +36,8 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
+from spook_tracker.scalar_tests.sweep import line
 
 TIME_STEP = 1.0 / 60.0  # s
 LENGTH, THICKNESS = 1.0, 0.1  # m
@@ -130,9 +130,7 @@ def _draw(simulate: Simulate) -> Drawing:
     return Drawing(
         curves=(
             Curve(name="simulation", x=shares, y=tuple(rates), style="points"),
-            Curve(
-                name="g d/i²", x=shares, y=tuple(max(0.0, tipping_rate(s)) for s in shares), style="reference"
-            ),
+            line("g d/i²", shares, (max(0.0, tipping_rate(s)) for s in shares), "reference"),
         ),
         x_label="overhang over its limit",
         y_label="angular acceleration of the upper plate [rad/s²]",
@@ -245,10 +243,7 @@ TEST = ScalarTest(
             description="deepest overlap while three plates fall and lie",
             unit="m",
             time_steps=(1.0 / 30.0, 1.0 / 60.0),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
-            ),
+            configurations=configured({"direct": None, "iterative": None}),
             error=ladder_error,
         ),
     ),

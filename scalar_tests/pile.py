@@ -30,7 +30,6 @@ from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
-    Curve,
     Drawing,
     Example,
     Figure,
@@ -42,6 +41,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
     Unobserved,
 )
+from spook_tracker.scalar_tests.sweep import line
 
 COUNT = 1000
 EXAMPLE = 40  # spheres of the page's replay
@@ -160,9 +160,7 @@ def _draw(simulate: Simulate) -> Drawing:
     pile = read(simulate, COUNT, SWEEPS)
     times = tuple(TIME_STEP * k for k in range(len(pile.depth)))
     return Drawing(
-        curves=(
-            Curve(name="deepest overlap", x=times, y=tuple(1e3 * float(d) for d in pile.depth), style="line"),
-        ),
+        curves=(line("deepest overlap", times, (1e3 * float(d) for d in pile.depth)),),
         x_label="time [s]",
         y_label="overlap [mm]",
     )

@@ -19,7 +19,6 @@ from spook_tracker.engine.bodies import Material
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Example,
     Ladder,
     Measurement,
@@ -28,6 +27,7 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.configurations import configured
 
 RADIUS = 0.5  # m
 MASS = 1.0  # kg
@@ -137,12 +137,7 @@ TEST = ScalarTest(
             description="how far the force under the ball is from its weight, over its weight, after 2 s",
             unit="1",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(
-                    name="iterative, 50 sweeps", method=Method(solver="iterative"), expected_order=None
-                ),
-            ),
+            configurations=configured({"direct": None, "iterative, 50 sweeps": None}),
             error=ladder_error,
             target_error=1e-3,
             target_seconds=0.1,

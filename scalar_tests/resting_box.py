@@ -12,7 +12,6 @@ from spook_tracker.engine.shapes import Shape
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Example,
     Ladder,
     Measurement,
@@ -21,6 +20,7 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.configurations import configured
 
 EDGE = 0.5  # m
 MASS = 1.0  # kg
@@ -134,12 +134,7 @@ TEST = ScalarTest(
             description="how deep the box lies in the box it stands on after 2 s",
             unit="m",
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 500)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(
-                    name="iterative, 50 sweeps", method=Method(solver="iterative"), expected_order=None
-                ),
-            ),
+            configurations=configured({"direct": None, "iterative, 50 sweeps": None}),
             error=ladder_error,
             target_error=1e-3,
             target_seconds=0.1,

@@ -27,7 +27,6 @@ from spook_tracker.engine.shapes import Shape
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Example,
     Ladder,
     Measurement,
@@ -37,6 +36,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
     Unobserved,
 )
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.heavier import heavier
 
 EDGE, RADIUS = 1.0, 0.5  # m
@@ -232,12 +232,7 @@ TEST = ScalarTest(
             description=description,
             unit=unit,
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(
-                    name="iterative, 50 sweeps", method=Method(solver="iterative"), expected_order=None
-                ),
-            ),
+            configurations=configured({"direct": None, "iterative, 50 sweeps": None}),
             error=error,
             run=Unobserved(ladder_load),
             target_error=target,

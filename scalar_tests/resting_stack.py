@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     Box,
     ContactForce,
     Energy,
@@ -29,8 +28,6 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_count, break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
-    Curve,
     Drawing,
     Example,
     Figure,
@@ -41,6 +38,8 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.configurations import configured
+from spook_tracker.scalar_tests.sweep import line
 
 COUNT = 20
 EDGE = 1.0  # m
@@ -122,8 +121,8 @@ def _draw_loads(simulate: Simulate) -> Drawing:
     contacts = tuple(float(i + 1) for i in range(COUNT))
     return Drawing(
         curves=(
-            Curve(name="simulation", x=contacts, y=tuple(map(float, loads(simulate))), style="points"),
-            Curve(name="(N − i + 1) m g", x=contacts, y=tuple(map(float, expected())), style="reference"),
+            line("simulation", contacts, loads(simulate), "points"),
+            line("(N − i + 1) m g", contacts, expected(), "reference"),
         ),
         x_label="contact, from the floor up",
         y_label="force [N]",
@@ -272,16 +271,8 @@ TEST = ScalarTest(
             description="largest relative error of a contact's load in a stack of eight after 2 s",
             unit="1",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(
-                    name="iterative, 50 sweeps", method=Method(solver="iterative"), expected_order=None
-                ),
-                Configuration(
-                    name="iterative, 200 sweeps",
-                    method=Method(solver="iterative", iterations=200),
-                    expected_order=None,
-                ),
+            configurations=configured(
+                {"direct": None, "iterative, 50 sweeps": None, "iterative, 200 sweeps": None}
             ),
             error=ladder_error,
             target_error=0.1,

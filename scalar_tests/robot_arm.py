@@ -28,7 +28,6 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -39,6 +38,7 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s²
@@ -420,14 +420,7 @@ TEST = ScalarTest(
             description="largest error of a driving torque",
             unit="N m",
             time_steps=(1e-2, 5e-3, 2.5e-3, 1.25e-3, 6.25e-4, 3.125e-4),
-            configurations=(
-                Configuration(
-                    name="plain", method=PLAIN, expected_order=1.0, order_range=(3.125e-4, 1.25e-3)
-                ),
-                Configuration(
-                    name="half-step", method=Method(half_step_velocities=True), expected_order=None
-                ),
-            ),
+            configurations=configured({"plain": 1.0, "half-step": None}, (3.125e-4, 1.25e-3)),
             error=ladder_error,
             run=ladder_run,
             target_error=0.1,

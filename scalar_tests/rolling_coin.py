@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     Cylinder,
     Energy,
     Final,
@@ -26,7 +25,6 @@ from spook_tracker.engine import (
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -38,6 +36,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
 GRAVITY = 9.81  # m/s²
@@ -309,17 +308,7 @@ TEST = ScalarTest(
             description="distance of the coin's centre from its place on the circle after about half a turn",
             unit="m",
             time_steps=tuple(1.0 / n for n in (240, 480, 960, 1920, 3840)),
-            configurations=(
-                Configuration(
-                    name="direct", method=PLAIN, expected_order=1.0, order_range=(1 / 3840, 1 / 480)
-                ),
-                Configuration(
-                    name="half-step",
-                    method=Method(half_step_velocities=True),
-                    expected_order=1.0,
-                    order_range=(1 / 3840, 1 / 480),
-                ),
-            ),
+            configurations=configured({"direct": 1.0, "half-step": 1.0}, (1 / 3840, 1 / 480)),
             error=ladder_error,
             target_error=0.01,
             target_seconds=0.1,

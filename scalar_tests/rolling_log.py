@@ -11,7 +11,6 @@ from spook_tracker.engine import PLAIN, Method, Orientation, Trace
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -21,6 +20,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.floating_box import (
     DURATION,
     GRAVITY,
@@ -185,10 +185,7 @@ TEST = ScalarTest(
             description="relative error of the roll's frequency against √(m g GM/I)",
             unit="1",
             time_steps=tuple(1.0 / n for n in (15, 30, 60, 120)),
-            configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=2.0),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=2.0),
-            ),
+            configurations=configured({"plain": 2.0, "iterative": 2.0}),
             error=ladder_error,
             target_error=1e-4,
             target_seconds=0.01,

@@ -21,7 +21,6 @@ from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
-    Curve,
     Drawing,
     Example,
     Figure,
@@ -32,7 +31,7 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
-from spook_tracker.scalar_tests.sweep import apart
+from spook_tracker.scalar_tests.sweep import apart, line
 
 RADIUS = 0.5  # m
 MASS = 1.0  # kg
@@ -121,19 +120,10 @@ def _draw(simulate: Simulate) -> Drawing:
     right = [accelerations(slope) for slope in slopes]
     return Drawing(
         curves=(
-            Curve(name="speed", x=slopes, y=tuple(speed for speed, _ in found), style="points"),
-            Curve(
-                name="radius × spin", x=slopes, y=tuple(RADIUS * spin for _, spin in found), style="points"
-            ),
-            Curve(
-                name="speed, closed form", x=slopes, y=tuple(a * seconds for a, _ in right), style="reference"
-            ),
-            Curve(
-                name="radius × spin, closed form",
-                x=slopes,
-                y=tuple(RADIUS * b * seconds for _, b in right),
-                style="reference",
-            ),
+            line("speed", slopes, (speed for speed, _ in found), "points"),
+            line("radius × spin", slopes, (RADIUS * spin for _, spin in found), "points"),
+            line("speed, closed form", slopes, (a * seconds for a, _ in right), "reference"),
+            line("radius × spin, closed form", slopes, (RADIUS * b * seconds for _, b in right), "reference"),
         ),
         x_label="tan θ",
         y_label="speed after two seconds [m/s]",

@@ -30,7 +30,6 @@ from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
-    Curve,
     Drawing,
     Example,
     Figure,
@@ -41,6 +40,7 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.sweep import line
 
 INERTIA = (0.9144, 1.098, 1.66)  # kg m²
 SPIN = (0.05, 1.0, 0.05)  # rad/s, body axes
@@ -125,10 +125,7 @@ def _draw_spin(simulate: Simulate) -> Drawing:
     every = slice(None, None, 10)
     x = tuple(map(float, times[every]))
     return Drawing(
-        curves=tuple(
-            Curve(name=f"axis {i + 1}", x=x, y=tuple(map(float, spin[every, i])), style="line")
-            for i in range(3)
-        ),
+        curves=tuple(line(f"axis {i + 1}", x, spin[every, i]) for i in range(3)),
         x_label="time [s]",
         y_label="angular velocity in body axes [rad/s]",
         note=f"The spin about the middle axis turns over {turned} times.",

@@ -9,7 +9,6 @@ from dataclasses import replace
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     AngularVelocity,
     Box,
     Final,
@@ -26,7 +25,6 @@ from spook_tracker.engine import (
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -36,6 +34,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line
 
 GRAVITY = 9.81  # m/s²
@@ -217,10 +216,7 @@ TEST = ScalarTest(
             description="distance rolled in a second less ½ a t²",
             unit="m",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=1.0),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
-            ),
+            configurations=configured({"direct": 1.0, "iterative": None}),
             error=ladder_error,
         ),
     ),

@@ -26,7 +26,6 @@ from spook_tracker.engine import (
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -36,6 +35,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.rocking_block import (
     DEPTH,
     GRAVITY,
@@ -365,10 +365,7 @@ TEST = ScalarTest(
             description="relative error of the largest lean after the blow, which falls on the middle of a step",
             unit="1",
             time_steps=STEPS,
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=1.0),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
-            ),
+            configurations=configured({"direct": 1.0, "iterative": 1.0}),
             error=ladder_error,
             target_error=1e-2,
             target_seconds=0.05,

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     WORLD,
     Final,
     Fluid,
@@ -26,7 +25,6 @@ from spook_tracker.engine import (
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -37,6 +35,7 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.floating_box import period
 from spook_tracker.scalar_tests.sweep import line, told
 
@@ -279,15 +278,7 @@ TEST = ScalarTest(
             description="speed after 0.5 s against v_t tanh(t/τ)",
             unit="m/s",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480, 960)),
-            configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 960, 1 / 240)),
-                Configuration(
-                    name="half-step",
-                    method=Method(half_step_velocities=True),
-                    expected_order=1.0,
-                    order_range=(1 / 960, 1 / 240),
-                ),
-            ),
+            configurations=configured({"plain": 1.0, "half-step": 1.0}, (1 / 960, 1 / 240)),
             error=ladder_error,
             target_error=0.02,
             target_seconds=0.01,

@@ -26,7 +26,6 @@ from spook_tracker.engine import (
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -36,6 +35,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
 CRANK, ROD = 0.15, 0.45  # m
@@ -345,14 +345,7 @@ TEST = ScalarTest(
             description="largest error of the slider's place in a turn",
             unit="m",
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 480)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=2.0),
-                Configuration(
-                    name="half-step, curved twice",
-                    method=Method(half_step_velocities=True, corrections=2),
-                    expected_order=4.0,
-                ),
-            ),
+            configurations=configured({"direct": 2.0, "half-step, curved twice": 4.0}),
             error=ladder_error,
             target_error=2e-4,
             target_seconds=0.02,

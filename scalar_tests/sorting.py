@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     Box,
     Final,
     Material,
@@ -25,7 +24,6 @@ from spook_tracker.engine import (
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -36,6 +34,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
 GRAVITY = 10.0  # m/s²
@@ -360,10 +359,7 @@ TEST = ScalarTest(
             description="lane of the smoothest box, against |s| s/(2 µ g)",
             unit="m",
             time_steps=tuple(1.0 / n for n in (20, 40, 80, 160, 320)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=1.0),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
-            ),
+            configurations=configured({"direct": 1.0, "iterative": 1.0}),
             error=ladder_error,
             target_error=0.01,
             target_seconds=0.01,

@@ -21,7 +21,6 @@ from spook_tracker.engine import (
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -32,6 +31,7 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, sweep, told
 
 GRAVITY = 9.81  # m/s²
@@ -348,12 +348,7 @@ TEST = ScalarTest(
             description="sinking of the third stone under 0.99 of its limit load in 0.1 s: none is right",
             unit="m",
             time_steps=tuple(1.0 / n for n in (30, 60, 120)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(
-                    name="half-step", method=Method(half_step_velocities=True), expected_order=None
-                ),
-            ),
+            configurations=configured({"direct": None, "half-step": None}),
             error=lambda simulate, time_step, method: sinking(
                 simulate, 2, LESS * LIMIT[2], time_step, method, SHORT
             ),

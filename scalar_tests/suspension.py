@@ -24,7 +24,6 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -34,6 +33,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import apart, line, told
 from spook_tracker.scalar_tests.swing import phase
 
@@ -285,10 +285,7 @@ TEST = ScalarTest(
             description="relative error of the bounce's frequency against √(Σk/m)",
             unit="1",
             time_steps=tuple(1.0 / n for n in (15, 30, 60, 120, 240)),
-            configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=2.0),
-                Configuration(name="order4", method=Method(composition="order4"), expected_order=4.0),
-            ),
+            configurations=configured({"plain": 2.0, "order4": 4.0}),
             error=ladder_error,
             target_error=1e-3,
             target_seconds=0.01,

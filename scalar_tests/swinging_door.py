@@ -32,7 +32,6 @@ from spook_tracker.scalar_tests.bracket import break_point, cell, table
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
     Configuration,
-    Curve,
     Drawing,
     Example,
     Figure,
@@ -45,6 +44,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
     Unobserved,
 )
+from spook_tracker.scalar_tests.sweep import line
 
 HALF_STEP_CURVED = Method(half_step_velocities=True, corrections=2)
 ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")
@@ -169,14 +169,7 @@ def _draw(simulate: Simulate) -> Drawing:
     times, angle = angles(simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=OBSERVE))
     shown = times <= 12.0
     return Drawing(
-        curves=(
-            Curve(
-                name="angle",
-                x=tuple(map(float, times[shown])),
-                y=tuple(map(float, np.degrees(angle[shown]))),
-                style="line",
-            ),
-        ),
+        curves=(line("angle", times[shown], np.degrees(angle[shown])),),
         x_label="time [s]",
         y_label="angle from the lowest position [degrees]",
     )

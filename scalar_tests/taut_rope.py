@@ -25,7 +25,6 @@ from spook_tracker.engine import (
 from spook_tracker.scalar_tests.bracket import break_count, break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -35,6 +34,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, sweep, told
 from spook_tracker.scalar_tests.swing import phase
 
@@ -227,10 +227,7 @@ TEST = ScalarTest(
             description="relative error of the third mode's frequency of the taut rope against that of links",
             unit="1",
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 480)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=2.0),
-                Configuration(name="half-step", method=Method(half_step_velocities=True), expected_order=2.0),
-            ),
+            configurations=configured({"direct": 2.0, "half-step": 2.0}),
             error=wave_error,
             target_error=1e-3,
             target_seconds=0.02,

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     Box,
     Final,
     Material,
@@ -24,7 +23,6 @@ from spook_tracker.engine import (
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -34,6 +32,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
 GRAVITY = 9.81  # m/s²
@@ -270,10 +269,7 @@ TEST = ScalarTest(
             description="distance from the circle after 2 s",
             unit="m",
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 480, 960)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=1.0),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=1.0),
-            ),
+            configurations=configured({"direct": 1.0, "iterative": 1.0}),
             error=ladder_error,
             target_error=0.005,
             target_seconds=0.05,

@@ -8,7 +8,6 @@ import math
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     AngularVelocity,
     Box,
     ContactForce,
@@ -29,7 +28,6 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -39,6 +37,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import ask, error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
 GRAVITY = 9.81  # m/s²
@@ -370,12 +369,7 @@ TEST = ScalarTest(
             description="stopping way from 5 m/s against v²/(2 µ g)",
             unit="m",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=1.0),
-                Configuration(
-                    name="half-step", method=Method(half_step_velocities=True), expected_order=None
-                ),
-            ),
+            configurations=configured({"direct": 1.0, "half-step": None}),
             error=ladder_error,
             target_error=0.03,
             target_seconds=0.1,

@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from spook_tracker.engine import (
-    PLAIN,
     WORLD,
     ConstraintForce,
     Energy,
@@ -32,7 +31,6 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -43,6 +41,7 @@ from spook_tracker.scalar_tests.case import (
     StabilityStudy,
 )
 from spook_tracker.scalar_tests.closed_form import error
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
 GRAVITY = 9.81  # m/s²
@@ -416,14 +415,7 @@ TEST = ScalarTest(
             description="sum of the heavy weight's velocities in 1 s over the drum against ½ a t²",
             unit="m",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480)),
-            configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 480, 1 / 120)),
-                Configuration(
-                    name="half-step",
-                    method=Method(half_step_velocities=True),
-                    expected_order=None,
-                ),
-            ),
+            configurations=configured({"plain": 1.0, "half-step": None}, (1 / 480, 1 / 120)),
             error=ladder_error,
             target_error=1e-2,
             target_seconds=0.01,

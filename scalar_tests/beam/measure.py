@@ -15,8 +15,8 @@ from spook_tracker.scalar_tests.beam.scene import (
     sag_of_compliant_beam,
     scene,
 )
-from spook_tracker.scalar_tests.case import Curve, Drawing, Simulate
-from spook_tracker.scalar_tests.sweep import told
+from spook_tracker.scalar_tests.case import Drawing, Simulate
+from spook_tracker.scalar_tests.sweep import line, told
 
 LADDER_COUNT = 20
 HIDDEN = 2.3e-15  # m/N in every lock row: sags by the printed limit
@@ -46,7 +46,7 @@ def draw_against_time_step(simulate: Simulate) -> Drawing:
     steps = tuple(float(h) for h in np.geomspace(1e-4, 1e-1, 13))
     values = tuple(deviation(simulate, time_step=h) for h in steps)
     return Drawing(
-        curves=(Curve(name="80 boxes", x=steps, y=values),),
+        curves=(line("80 boxes", steps, values, "both"),),
         x_label="time step [s]",
         y_label="largest height deviation over length [%]",
         x_scale="log",
@@ -67,7 +67,7 @@ def draw_against_time(simulate: Simulate) -> Drawing:
     lowest = 100.0 * drops.min(axis=1) / (COUNT * SIZE[0])
     times = tuple(float(t) for t in result.sample_times["height"])
     return Drawing(
-        curves=(Curve(name="80 boxes, h = 9.8e-5 s", x=times, y=tuple(map(float, lowest)), style="line"),),
+        curves=(line("80 boxes, h = 9.8e-5 s", times, lowest),),
         x_label="time [s]",
         y_label="lowest height deviation over length [%]",
         note="The thesis' beam rings at this time step (about −1e-6 %).",
@@ -81,8 +81,8 @@ def draw_along_the_beam(simulate: Simulate) -> Drawing:
     boxes = tuple(float(i + 1) for i in range(COUNT))
     return Drawing(
         curves=(
-            Curve(name="compliance 0", x=boxes, y=tuple(map(float, 1e6 * rigid))),
-            Curve(name="compliance 2.3e-15", x=boxes, y=tuple(map(float, 1e6 * soft)), style="line"),
+            line("compliance 0", boxes, 1e6 * rigid, "both"),
+            line("compliance 2.3e-15", boxes, 1e6 * soft),
         ),
         x_label="box",
         y_label="height deviation [µm]",
@@ -97,13 +97,8 @@ def draw_against_count(simulate: Simulate) -> Drawing:
     hidden = tuple(-100.0 * sag_of_compliant_beam(n, HIDDEN) / (n * SIZE[0]) for n in counts)
     return Drawing(
         curves=(
-            Curve(name="compliance 0", x=tuple(map(float, counts)), y=values),
-            Curve(
-                name="statics with compliance 2.3e-15",
-                x=tuple(map(float, counts)),
-                y=hidden,
-                style="reference",
-            ),
+            line("compliance 0", counts, values, "both"),
+            line("statics with compliance 2.3e-15", counts, hidden, "reference"),
         ),
         x_label="boxes",
         y_label="largest height deviation over length [%]",

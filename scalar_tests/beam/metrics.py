@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from spook_tracker.engine import PLAIN, Method
 from spook_tracker.scalar_tests.beam.measure import (
     _measure_gate,
     _measure_long,
@@ -11,7 +10,8 @@ from spook_tracker.scalar_tests.beam.measure import (
     ladder_error,
 )
 from spook_tracker.scalar_tests.beam.scene import COUNT, SAG, TIME_STEP
-from spook_tracker.scalar_tests.case import Configuration, Ladder, LimitKind, Measurement, Metric
+from spook_tracker.scalar_tests.case import Ladder, LimitKind, Measurement, Metric
+from spook_tracker.scalar_tests.configurations import configured
 
 WOULD_CATCH = "thesis, section 4.2; it would catch a hidden compliance of 2.3e-15 in the locks"
 
@@ -99,17 +99,13 @@ LADDERS = (
         description="largest height deviation of 20 boxes over 2 s, of their length",
         unit="%",
         time_steps=tuple(1.0 / n for n in (15, 30, 60)),
-        configurations=(
-            Configuration(name="direct", method=PLAIN, expected_order=None),
-            Configuration(name="direct, no refinement", method=Method(refinements=0), expected_order=None),
-            Configuration(
-                name="iterative, 50 sweeps", method=Method(solver="iterative"), expected_order=None
-            ),
-            Configuration(
-                name="iterative, 200 sweeps",
-                method=Method(solver="iterative", iterations=200),
-                expected_order=None,
-            ),
+        configurations=configured(
+            {
+                "direct": None,
+                "direct, no refinement": None,
+                "iterative, 50 sweeps": None,
+                "iterative, 200 sweeps": None,
+            }
         ),
         error=ladder_error,
         target_error=None,

@@ -7,7 +7,7 @@ import numpy as np
 from spook_tracker.scalar_tests.cantilever.measure import settled_nodes
 from spook_tracker.scalar_tests.cantilever.scene import COUNT, COUNTS, LENGTH, LOAD, SMALL, deflection
 from spook_tracker.scalar_tests.case import Curve, Drawing, Simulate
-from spook_tracker.scalar_tests.sweep import apart, told
+from spook_tracker.scalar_tests.sweep import apart, line, told
 
 
 def draw_shape(simulate: Simulate) -> Drawing:
@@ -16,13 +16,8 @@ def draw_shape(simulate: Simulate) -> Drawing:
     places = tuple(map(float, x))
     return Drawing(
         curves=(
-            Curve(name="simulation", x=places, y=tuple(map(float, -nodes)), style="points"),
-            Curve(
-                name="P x² (3l − x)/(6EI)",
-                x=places,
-                y=tuple(map(float, -deflection(x))),
-                style="reference",
-            ),
+            line("simulation", places, -nodes, "points"),
+            line("P x² (3l − x)/(6EI)", places, -deflection(x), "reference"),
         ),
         x_label="position on the beam [m]",
         y_label="height [m]",
@@ -34,13 +29,7 @@ def draw_difference(simulate: Simulate) -> Drawing:
     x = (np.arange(COUNT) + 0.5) * LENGTH / COUNT
     nodes = settled_nodes(simulate, COUNT, LOAD)
     return Drawing(
-        curves=(
-            Curve(
-                name="simulation − formula",
-                x=tuple(map(float, x)),
-                y=tuple(map(float, deflection(x) - nodes)),
-            ),
-        ),
+        curves=(line("simulation − formula", x, deflection(x) - nodes, "both"),),
         x_label="position on the beam [m]",
         y_label="difference in height [m]",
         note=f"At most {apart(deflection(x), nodes)} m. The linear formula does not know how a strongly bent beam shortens.",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from spook_tracker.engine import PLAIN, Method
 from spook_tracker.scalar_tests.cantilever.measure import (
     _measure_nodes,
     _measure_tip,
@@ -10,7 +9,8 @@ from spook_tracker.scalar_tests.cantilever.measure import (
     ladder_error,
 )
 from spook_tracker.scalar_tests.cantilever.scene import COUNT, LARGE_DEFLECTION, TIME_STEP, TIP
-from spook_tracker.scalar_tests.case import Configuration, Ladder, Measurement, Metric
+from spook_tracker.scalar_tests.case import Ladder, Measurement, Metric
+from spook_tracker.scalar_tests.configurations import configured
 
 MEASUREMENTS = (
     Measurement(
@@ -107,10 +107,7 @@ LADDERS = (
         description="settled tip of 20 pieces against their statics",
         unit="1",
         time_steps=tuple(1.0 / n for n in (15, 30, 60, 120)),
-        configurations=(
-            Configuration(name="direct", method=PLAIN, expected_order=None),
-            Configuration(name="direct, no refinement", method=Method(refinements=0), expected_order=None),
-        ),
+        configurations=configured({"direct": None, "direct, no refinement": None}),
         error=ladder_error,
         target_error=1e-6,
         target_seconds=1.0,

@@ -7,7 +7,7 @@ import numpy as np
 from spook_tracker.engine import ConstraintForce, Method, Trace
 from spook_tracker.scalar_tests.case import Curve, Drawing, Simulate
 from spook_tracker.scalar_tests.door.scene import TIME_STEP, forces, least_norm_forces, scene, weight_error
-from spook_tracker.scalar_tests.sweep import told
+from spook_tracker.scalar_tests.sweep import line, told
 
 LADDER_COUNT = 5
 
@@ -70,8 +70,8 @@ def draw_against_count(simulate: Simulate) -> Drawing:
         curves=(
             Curve(name="printed damping 1e-13 s", x=counts, y=tuple(printed)),
             Curve(name="damping 2 h, settled", x=counts, y=tuple(damped)),
-            Curve(name="limit", x=(1.0, 80.0), y=(0.02, 0.02), style="limit"),
-            Curve(name="what 32 bits resolve", x=(1.0, 80.0), y=(SINGLE, SINGLE), style="reference"),
+            line("limit", (1.0, 80.0), (0.02, 0.02), "limit"),
+            line("what 32 bits resolve", (1.0, 80.0), (SINGLE, SINGLE), "reference"),
         ),
         x_label="hinges",
         y_label="largest deviation of the vertical force [% of weight]",
@@ -87,7 +87,7 @@ def draw_sideways(simulate: Simulate) -> Drawing:
         held = forces(simulate, steps=200, mass=mass, damping=2.0 * TIME_STEP)[-1]
         values.append(1e6 * abs(abs(held[0, 0]) - abs(held[1, 0])))
     return Drawing(
-        curves=(Curve(name="two hinges", x=MASSES, y=tuple(map(float, values))),),
+        curves=(line("two hinges", MASSES, values, "both"),),
         x_label="mass of the door [kg]",
         y_label="difference of the horizontal forces [µN]",
         note=f"At most {told(max(values))} µN. In theory F₁ₓ = −F₂ₓ; the thesis reads up to 0.2 µN at 600 kg.",
@@ -106,10 +106,8 @@ def draw_against_mass(simulate: Simulate) -> Drawing:
         curves=(
             Curve(name="printed damping 1e-13 s", x=MASSES, y=tuple(printed)),
             Curve(name="damping 2 h, settled", x=MASSES, y=tuple(damped)),
-            Curve(name="limit", x=(MASSES[0], MASSES[-1]), y=(0.02, 0.02), style="limit"),
-            Curve(
-                name="what 32 bits resolve", x=(MASSES[0], MASSES[-1]), y=(SINGLE, SINGLE), style="reference"
-            ),
+            line("limit", (MASSES[0], MASSES[-1]), (0.02, 0.02), "limit"),
+            line("what 32 bits resolve", (MASSES[0], MASSES[-1]), (SINGLE, SINGLE), "reference"),
         ),
         x_label="mass of the door [kg]",
         y_label="largest deviation of the vertical force [% of weight]",

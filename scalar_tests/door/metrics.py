@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from spook_tracker.engine import PLAIN, Method
-from spook_tracker.scalar_tests.case import Configuration, Ladder, Measurement, Metric
+from spook_tracker.scalar_tests.case import Ladder, Measurement, Metric
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.door.measure import (
     _measure_balance,
     _measure_damped,
@@ -150,12 +150,8 @@ LADDERS = (
         description="largest deviation of the vertical force from the weight in the second second, five hinges",
         unit="%",
         time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
-        configurations=(
-            Configuration(name="direct", method=PLAIN, expected_order=None),
-            Configuration(name="direct, no refinement", method=Method(refinements=0), expected_order=None),
-            Configuration(
-                name="iterative, 50 sweeps", method=Method(solver="iterative"), expected_order=None
-            ),
+        configurations=configured(
+            {"direct": None, "direct, no refinement": None, "iterative, 50 sweeps": None}
         ),
         error=ladder_error,
         target_error=1e-6,

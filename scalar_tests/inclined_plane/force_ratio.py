@@ -5,12 +5,10 @@ from __future__ import annotations
 import functools
 import math
 
-from spook_tracker.engine import PLAIN, ContactForce, Final, Method
+from spook_tracker.engine import ContactForce, Final, Method
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
-    Curve,
     Drawing,
     Example,
     Figure,
@@ -21,8 +19,9 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.inclined_plane.scene import FRICTION, TIME_STEP, force_ratio, scene, slide
-from spook_tracker.scalar_tests.sweep import told
+from spook_tracker.scalar_tests.sweep import line, told
 
 LADDER_SLOPE = 0.3
 MASSES = (1.0, 10.0, 1e2, 1e3, 1e4)  # kg
@@ -43,17 +42,16 @@ def _measure(simulate: Simulate) -> dict[str, float]:
 
 def _draw(simulate: Simulate) -> Drawing:
     curves = [
-        Curve(
-            name=f"{mass:g} kg",
-            x=SLOPES,
-            y=tuple(force_ratio(slide(simulate, slope, mass=mass)) for slope in SLOPES),
+        line(
+            f"{mass:g} kg",
+            SLOPES,
+            (force_ratio(slide(simulate, slope, mass=mass)) for slope in SLOPES),
+            "both",
         )
         for mass in MASSES
     ]
     off = max(abs(y - min(s, FRICTION)) for curve in curves for s, y in zip(SLOPES, curve.y, strict=True))
-    curves.append(
-        Curve(name="min(tan θ, µ)", x=SLOPES, y=tuple(min(s, FRICTION) for s in SLOPES), style="reference")
-    )
+    curves.append(line("min(tan θ, µ)", SLOPES, (min(s, FRICTION) for s in SLOPES), "reference"))
     return Drawing(
         curves=tuple(curves),
         x_label="tan θ",
@@ -137,10 +135,7 @@ TEST = ScalarTest(
             description="error of F_t/F_n at tan θ = 0.3 after 1 s",
             unit="1",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
-            ),
+            configurations=configured({"direct": None, "iterative": None}),
             error=ladder_error,
             target_error=1e-9,
             target_seconds=0.01,

@@ -37,7 +37,7 @@ from spook_tracker.scalar_tests.inclined_plane.scene import (
     slide,
     unloaded,
 )
-from spook_tracker.scalar_tests.sweep import told
+from spook_tracker.scalar_tests.sweep import line, told
 
 DIRECTIONS = tuple(2.0 * math.pi * i / 36.0 for i in range(36))
 LADDER_DIRECTIONS = DIRECTIONS[:9:3] + DIRECTIONS[1:9:3]
@@ -108,7 +108,7 @@ def _draw_polar(slope: float) -> object:
         for name, method in MODELS.items():
             values = ratios(simulate, slope, method)
             said.append(f"{name}: {told(min(values), 3)} to {told(max(values), 3)}")
-            curves.append(Curve(name=name, x=angles, y=(*values, values[0])))
+            curves.append(line(name, angles, (*values, values[0]), "both"))
         curves.append(Curve(name="Coulomb", x=angles, y=(FRICTION,) * len(angles), style="reference"))
         return Drawing(
             curves=tuple(curves),
@@ -129,7 +129,7 @@ def draw_unloaded(simulate: Simulate) -> Drawing:
     for name, method in MODELS.items():
         values = [force_ratio(unloaded(simulate, STEEP, alpha, PRESSED, method)) for alpha in DIRECTIONS]
         said.append(f"{name}: {told(min(values), 3)} to {told(max(values), 3)}")
-        curves.append(Curve(name=name, x=angles, y=(*values, values[0])))
+        curves.append(line(name, angles, (*values, values[0]), "both"))
     return Drawing(
         curves=tuple(curves),
         x_label="direction of the slope [degrees]",

@@ -5,12 +5,10 @@ from __future__ import annotations
 import functools
 import math
 
-from spook_tracker.engine import PLAIN, AngularVelocity, Final, Method, Velocity
+from spook_tracker.engine import AngularVelocity, Final, Method, Velocity
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
-    Curve,
     Drawing,
     Example,
     Figure,
@@ -21,6 +19,7 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.inclined_plane.scene import (
     FRICTION,
     GRAVITY,
@@ -30,7 +29,7 @@ from spook_tracker.scalar_tests.inclined_plane.scene import (
     slip_slope,
     slips,
 )
-from spook_tracker.scalar_tests.sweep import apart
+from spook_tracker.scalar_tests.sweep import apart, line
 
 LADDER_SLOPE = 0.51
 STEEPER = 1.1  # times µ: the slope that the box is to slide down
@@ -52,13 +51,8 @@ def _draw_angle(simulate: Simulate) -> Drawing:
     found = tuple(math.atan(slip_slope(simulate, mu, resolution=1e-3)) for mu in COEFFICIENTS)
     return Drawing(
         curves=(
-            Curve(name="simulation", x=COEFFICIENTS, y=found, style="points"),
-            Curve(
-                name="θ = atan µ",
-                x=COEFFICIENTS,
-                y=tuple(math.atan(mu) for mu in COEFFICIENTS),
-                style="reference",
-            ),
+            line("simulation", COEFFICIENTS, found, "points"),
+            line("θ = atan µ", COEFFICIENTS, (math.atan(mu) for mu in COEFFICIENTS), "reference"),
         ),
         x_label="friction coefficient µ",
         y_label="angle at which the box slides [rad]",
@@ -183,10 +177,7 @@ TEST = ScalarTest(
             description="speed after 1 s at tan θ = 0.51 against g (sin θ − µ cos θ) t, µ = 0.5",
             unit="m/s",
             time_steps=tuple(1.0 / n for n in (15, 30, 60, 120, 240)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
-            ),
+            configurations=configured({"direct": None, "iterative": None}),
             error=ladder_error,
             target_error=1e-3,
             target_seconds=0.01,

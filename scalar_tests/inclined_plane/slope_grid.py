@@ -12,7 +12,6 @@ from spook_tracker.engine import PLAIN, Final, Method, Position, Trace, Velocity
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import (
     BreakPoint,
-    Configuration,
     Example,
     Ladder,
     Measurement,
@@ -21,6 +20,7 @@ from spook_tracker.scalar_tests.case import (
     Simulate,
     StabilityStudy,
 )
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.inclined_plane.scene import FRICTION, GRAVITY, scene
 
 FRICTIONS = (0.2, 0.5, 0.8)
@@ -171,10 +171,7 @@ TEST = ScalarTest(
             description="velocity after 1 s at tan θ = 0.6 and 22.5° to an edge against g (sin θ − µ cos θ) t, µ = 0.5",
             unit="m/s",
             time_steps=tuple(1.0 / n for n in (15, 30, 60, 120, 240)),
-            configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
-            ),
+            configurations=configured({"direct": None, "iterative": None}),
             error=ladder_error,
             target_error=1e-3,
             target_seconds=0.01,

@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Method, Position, Trace
+from spook_tracker.engine import Method, Position, Trace
 from spook_tracker.scalar_tests.case import (
-    Configuration,
     Drawing,
     Example,
     Figure,
@@ -19,6 +18,7 @@ from spook_tracker.scalar_tests.case import (
     ScalarTest,
     Simulate,
 )
+from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.oscillator.scene import (
     MASS,
     START,
@@ -198,10 +198,7 @@ TEST = ScalarTest(
             description="largest distance from the damped oscillator over 2 s",
             unit="m",
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 480, 960, 1920)),
-            configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=1.0),
-                Configuration(name="half-step", method=Method(half_step_velocities=True), expected_order=1.0),
-            ),
+            configurations=configured({"plain": 1.0, "half-step": 1.0}),
             error=ladder_error,
             target_error=0.01,
             target_seconds=1e-3,
