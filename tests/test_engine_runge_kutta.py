@@ -43,9 +43,10 @@ from spook_tracker.engine import (
     Universal,
     Velocity,
     simulate,
+    start,
 )
 from tests import rigid_scenes
-from tests.test_engine_joint_trees import floating, hung
+from tests.test_engine_joint_trees import floating, hung, rigid
 
 RK8 = Method(runge_kutta="order8")
 ORDER8 = Method(composition="order8")
@@ -225,6 +226,19 @@ def test_armature_and_springs_of_joints_either_way_round(backwards: bool) -> Non
 
     for name in seen:
         assert np.abs(runs[0][name] - runs[1][name]).max() < 1e-8 * np.abs(runs[1][name]).max(), name
+
+
+def test_what_is_locked_stays_and_a_load_that_is_set_acts_from_there_on() -> None:
+    bodies = hung("lock", "hinge").bodies
+    held = rigid(dataclasses.replace(hung("lock"), bodies=bodies[:1]))
+    assert np.array_equal(state(held, 0.1, 5, RK8)[:3], bodies[0].position)
+
+    push = Load(name="push", body="cart", force=(0.0, 0.0, 0.0))
+    with start(rail(forces=(push,)), time_step=0.1, method=RK8, observe={"x": Position("cart")}) as run:
+        run.step(10)
+        run.set_load("push", force=(4.0, 0.0, 0.0))
+        run.step(10)
+        assert run["x"][0] == pytest.approx(1.0, abs=1e-12)  # 2 m/s² for 1 s
 
 
 def test_it_says_how_it_steps() -> None:

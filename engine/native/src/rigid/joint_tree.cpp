@@ -136,8 +136,8 @@ bool JointTree::hang(std::span<const BodyConstants> constants, const JointSet& j
     if (!hang_up(bodies, true) || !has_all_rotors()) return false;
     const auto attaches = [](const Node& node) { return node.joint >= 0; };
     const auto holds = [](const JointBlock& block) { return !block.axial; };
-    return coordinates_ > 0 && std::count_if(nodes_.begin(), nodes_.end(), attaches) ==
-                                   std::count_if(joints.blocks().begin(), joints.blocks().end(), holds);
+    return std::count_if(nodes_.begin(), nodes_.end(), attaches) ==
+           std::count_if(joints.blocks().begin(), joints.blocks().end(), holds);
 }
 
 bool JointTree::attach(std::span<const int> tied) {

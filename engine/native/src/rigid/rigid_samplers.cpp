@@ -75,9 +75,11 @@ bool of_places(Quantity quantity) {
 
 Sampler sampler_of(RigidSystem& system, const QuantityRequest& request) {
     const RigidReadings* s = &system.read();
-    if (!of_places(from_text<Quantity>(request.kind, "quantity"))) system.see_velocities();
+    const Quantity quantity = from_text<Quantity>(request.kind, "quantity");
+    if (quantity == Quantity::constraint_force) system.see_forces();
+    if (!of_places(quantity)) system.see_velocities();
     const int index = request.index, other = request.other, count = s->bodies();
-    switch (from_text<Quantity>(request.kind, "quantity")) {
+    switch (quantity) {
         case Quantity::position:
             return one_or_all(index, count, 3, [s, point = request.point](int i, double* out) {
                 put(out, s->position_of(i) + arm(*s, i, point));

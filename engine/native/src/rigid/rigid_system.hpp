@@ -80,8 +80,9 @@ public:
 
     /// What can be observed.
     const RigidReadings& read() const noexcept { return readings_; }
-    /// Samples will read velocities or forces: where those live between the samples they are looked up for it.
-    void see_velocities() noexcept { velocities_seen_ = true; }
+    /// Samples will read velocities, or forces: where those live between the samples they are looked up for it.
+    void see_velocities() noexcept { velocities_seen_ = velocities_seen_ || !model_.method.runge_kutta; }
+    void see_forces() noexcept { velocities_seen_ = true; }
     /// From now on the turns of this hinge are counted.
     void track(int joint) noexcept { joints_.track(joint); }
 
