@@ -53,6 +53,7 @@ TGS, PGS = ("sapien", "tgs"), ("sapien", "pgs")
 MOTRIX, MOTRIX_MANY, MOTRIX_LOOSE = (
     ("motrixsim", name) for name in ("defaults", "many-iterations", "equalities")
 )
+MERSON, HELD_STEP = ("simbody", "merson"), ("simbody", "held-step")
 P2, P2_AS_IT_COMES = ("p2", "accurate"), ("p2", "defaults")
 CANNON = ("cannon", "accurate")
 JOINTS = (Ball, Hinge, Lock, Prismatic)
@@ -88,7 +89,7 @@ EULER = pytest.approx(G * STEP, rel=1e-12)  # g T h / 2 of a semi-implicit step,
 @rows(
     {
         **dict.fromkeys((DART, DART_LOOSE, BULLET, BULLET_LOOSE, SAP), EULER),
-        RK3: pytest.approx(0.0, abs=1e-11),
+        **dict.fromkeys((RK3, MERSON, HELD_STEP), pytest.approx(0.0, abs=1e-11)),
         **dict.fromkeys((TGS, PGS, JOLT), pytest.approx(G * STEP, abs=1e-4)),
         **dict.fromkeys((MOTRIX, MOTRIX_MANY, MOTRIX_LOOSE), pytest.approx(G * STEP, rel=1e-4)),
         RAPIER: pytest.approx(G * STEP / 4, abs=2e-3),  # its iterations are substeps
@@ -111,6 +112,7 @@ def test_a_fall_has_the_error_of_its_step(asked: Asked, owed: Any) -> None:
         RAPIER_MANY: (1e-6, JOINTS),
         TGS: (1e-6, JOINTS),
         PGS: (1e-6, JOINTS),
+        MERSON: (1e-12, JOINTS),
     }
 )
 def test_a_joint_holds_its_body(asked: Asked, kind: Any, owed: float) -> None:
@@ -131,6 +133,7 @@ def test_a_joint_holds_its_body(asked: Asked, kind: Any, owed: float) -> None:
         PGS: (1e-3, JOINTS),
         MOTRIX: (2e-3, EVERY_JOINT),
         MOTRIX_LOOSE: (1e-3, JOINTS[:3]),
+        MERSON: (3e-3, EVERY_JOINT),
     }
 )
 def test_joints_between_moving_bodies_move_as_in_our_engine(asked: Asked, kind: Any, owed: float) -> None:
@@ -147,6 +150,7 @@ def test_joints_between_moving_bodies_move_as_in_our_engine(asked: Asked, kind: 
         SAP: (1e-9, JOINTS[:3]),
         RK3: (1e-9, JOINTS[:3]),
         JOLT: (1e-4, JOINTS[:2]),
+        MERSON: (1e-9, JOINTS[:3]),
     }
 )
 def test_the_force_of_a_joint_is_the_weight_it_holds(
@@ -158,7 +162,7 @@ def test_the_force_of_a_joint_is_the_weight_it_holds(
     assert found["force"] == pytest.approx(peer_scenes.load_on_joint(kind, backwards), abs=owed)
 
 
-@rows({DART: 1e-9, BULLET: 1e-9, SAP: 1e-9, RK3: 1e-9, JOLT: 1e-6})
+@rows(dict.fromkeys((DART, BULLET, SAP, RK3, MERSON), 1e-9) | {JOLT: 1e-6})
 def test_the_tension_of_a_rod_at_rest_is_all_that_hangs_on_it(asked: Asked, owed: float) -> None:
     weights = tuple(Particle(name=f"{k}", mass=1.0 + k, position=(0.0, 0.0, -1.0 - k)) for k in range(2))
     rods = peer_scenes.chain(2).constraints
@@ -170,7 +174,7 @@ def test_the_tension_of_a_rod_at_rest_is_all_that_hangs_on_it(asked: Asked, owed
 
 
 @rows(
-    dict.fromkeys((DART, DART_LOOSE, BULLET, BULLET_LOOSE, SAP, RK3, DRAKE_LOOSE), 1e-12)
+    dict.fromkeys((DART, DART_LOOSE, BULLET, BULLET_LOOSE, SAP, RK3, DRAKE_LOOSE, MERSON, HELD_STEP), 1e-12)
     | dict.fromkeys((MOTRIX, MOTRIX_MANY, MOTRIX_LOOSE), 1e-6)
 )
 def test_spins_at_the_start_are_those_of_the_scene(asked: Asked, owed: float) -> None:
@@ -190,7 +194,7 @@ def test_speeds_at_the_start_are_those_of_the_scene(asked: Asked, owed: float) -
 @rows(
     {
         **dict.fromkeys((DART, DART_LOOSE, BULLET, BULLET_LOOSE, P2), (1 / 1000, 1e-4)),
-        RK3: (1 / 240, 3e-5),
+        **dict.fromkeys((RK3, MERSON, HELD_STEP), (1 / 240, 3e-5)),
         JOLT: (1 / 1000, 4e-3),  # of first order, and in single precision
         RAPIER: (1 / 1000, 2e-4),
         TGS: (1 / 1000, 5e-4),
@@ -229,6 +233,7 @@ UNSEEN = 0.5 * 0.2 * G * 2.0 * (2.0 + STEP)  # m, of a cube pulled by .7 of its 
         SAP: (1e-3, pytest.approx(0.4 * G, rel=0.03)),
         JOLT: (1e-6, pytest.approx(0.4 * G, rel=0.02)),
         RAPIER_MANY: (1e-3, pytest.approx(0.4 * G, rel=2e-3)),
+        MERSON: (2e-4, pytest.approx(0.4 * G, rel=0.01)),  # springs that stick: it yields
         **dict.fromkeys((TGS, PGS), (1e-3, pytest.approx(0.4 * G, rel=0.01))),
         **dict.fromkeys((MOTRIX, MOTRIX_MANY, MOTRIX_LOOSE), (1e-3, pytest.approx(0.4 * G, rel=0.02))),
     }
@@ -249,6 +254,7 @@ TALL = {"box": None, "slim capsule": Capsule(0.2, 0.6), "cylinder": Cylinder(0.2
             *((one, -1e-4, 1e-4, SOLIDS) for one in (DART, BULLET)),
             *((one, -1e-3, 1e-3, SOLIDS) for one in (SAP, JOLT)),
             (TGS, -1e-5, 1e-5, TALL),
+            (MERSON, -1e-4, 1e-12, {"box": None, "sphere": SOLIDS["sphere"]}),
             (RAPIER, -1e-3, 1e-3, {"cylinder": TALL["cylinder"]}),
             *((one, -1e-3, 0.0, SOLIDS | TALL) for one in (MOTRIX, MOTRIX_MANY, MOTRIX_LOOSE)),
         )
@@ -261,7 +267,7 @@ def test_a_body_rests_where_it_touches(asked: Asked, kind: str, owed: tuple[floa
     assert low < peer_scenes.sunk(engine(asked), shape) < high
 
 
-@rows({DART: (1e-5, (4, 4)), BULLET: (1e-3, (3, 4)), SAP: (1e-2, None)})
+@rows({DART: (1e-5, (4, 4)), BULLET: (1e-3, (3, 4)), SAP: (1e-2, None), MERSON: (2e-3, None)})
 def test_the_ground_carries_the_weight_and_the_pull(
     asked: Asked, owed: tuple[float, tuple[int, int] | None]
 ) -> None:
@@ -293,6 +299,7 @@ def test_a_ball_comes_back_by_the_square_of_its_restitution(asked: Asked, owed: 
         BULLET: (1e-3, 1e-6, 1e-3),
         SAP: (1e-3, 1e-6, 1e-3),
         RK3: (1e-9, 1e-6, 1e-3),
+        MERSON: (1e-8, 1e-9, 1e-8),
         JOLT: (1e-3, 1e-5, 2e-3),
         CANNON: (1e-3, 1e-9, None),
     }
@@ -338,7 +345,7 @@ def test_dry_friction_in_a_joint_brakes_it_until_it_stands_and_holds_it_then(
 
 @rows(
     {
-        **dict.fromkeys((DART, BULLET, SAP), (-1e-12, 1e-12)),  # merged into one body
+        **dict.fromkeys((DART, BULLET, SAP, MERSON), (-1e-12, 1e-12)),  # merged into one body
         **dict.fromkeys((BULLET_LOOSE, JOLT_AS_IT_COMES), (1.1, 1.3)),  # ½ g t² is 1.23 m
         **dict.fromkeys((DRAKE_LOOSE, P2_AS_IT_COMES), (1.0, 1.3)),
     }
@@ -366,9 +373,9 @@ ROUGH = tuple(
             ("a slide as a constraint", lambda: peer_scenes.hung(Prismatic)),
             *ROUGH,
         ),
-        **dict.fromkeys((DART, SAP), (("different friction", peer_scenes.unlike),)),
+        **dict.fromkeys((DART, SAP, MERSON), (("different friction", peer_scenes.unlike),)),
         ("mujoco", "equalities"): ROUGH,
-        RK3: (("the shape box", lambda: peer_scenes.box_on_ground(0.0)),),
+        **dict.fromkeys((RK3, HELD_STEP), (("the shape box", lambda: peer_scenes.box_on_ground(0.0)),)),
     }
 )
 def test_what_it_lacks_is_not_supported_by_name(asked: Asked, owed: Any) -> None:

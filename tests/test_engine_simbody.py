@@ -15,7 +15,6 @@ from spook_tracker.engine import (
     Ball,
     Box,
     CentralGravity,
-    ConstraintForce,
     ContactForce,
     Distance,
     Final,
@@ -26,17 +25,15 @@ from spook_tracker.engine import (
     Particle,
     Plane,
     Position,
-    Prismatic,
     RigidBody,
     Scene,
     Sphere,
     Spring,
-    Universal,
     Violation,
 )
 from spook_tracker.engine.find import find
 from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.scalar_tests import loaded_rods
+from spook_tracker.scalar_tests import loaded_rods, lock_ring
 from tests import peer_scenes
 
 pytest.importorskip(
@@ -104,11 +101,6 @@ def test_a_spring_swings_and_a_planet_comes_round(configuration: str) -> None:
     assert (x, y) == pytest.approx((1.0, 0.0), abs=1e-4)
 
 
-@pytest.mark.parametrize("kind", [Ball, Hinge, Lock, Prismatic, Universal])
-def test_joints_move_two_bodies_as_ours_do(kind: type) -> None:
-    assert peer_scenes.parted_from_ours(run("merson"), kind.kind) < 3e-3  # type: ignore[attr-defined]
-
-
 @pytest.mark.parametrize("configuration", SETTINGS)
 def test_bodies_start_with_the_speeds_of_the_scene(configuration: str) -> None:
     assert max(peer_scenes.started(run(configuration))) < 1e-12
@@ -116,24 +108,6 @@ def test_bodies_start_with_the_speeds_of_the_scene(configuration: str) -> None:
     line = Distance(name="line", between=((0.0, 0.0, 0.0), "rod"), compliance=0.0)
     found = peer_scenes.set_going(run(configuration), bodies=(rod,), joints=(line,))
     assert found[0] == pytest.approx(np.array([(0.0, 2.0, 0.0), (3.0, 0.0, 0.0), rod.velocity]), abs=1e-12)
-
-
-@pytest.mark.parametrize("backwards", [False, True])
-@pytest.mark.parametrize("kind", [Ball, Hinge, Lock])
-def test_the_force_of_a_joint_is_the_weight_it_holds(kind: Any, backwards: bool) -> None:
-    force = {"force": Final(quantity=ConstraintForce("joint"))}
-    found = run("merson")(peer_scenes.hung(kind, backwards), time_step=STEP, duration=0.5, observe=force)
-
-    assert found["force"] == pytest.approx(peer_scenes.load_on_joint(kind, backwards), abs=1e-9)
-
-
-def test_the_tension_of_a_rod_is_all_that_hangs_on_it() -> None:
-    weights = tuple(Particle(name=f"{k}", mass=1.0 + k, position=(0.0, 0.0, -1.0 - k)) for k in range(2))
-    scene = Scene(bodies=weights, constraints=peer_scenes.chain(2).constraints, gravity=peer_scenes.GRAVITY)
-    observe = {f"{k}": Final(quantity=ConstraintForce(f"rod {k}")) for k in range(2)}
-    found = run("merson")(scene, time_step=STEP, duration=0.5, observe=observe)
-
-    assert [float(found["0"]), float(found["1"])] == pytest.approx([29.43, 19.62], rel=1e-9)
 
 
 @pytest.mark.parametrize("kind", [Ball, Hinge, Lock])
@@ -229,3 +203,7 @@ def test_what_it_cannot_be_asked_is_said() -> None:
     assert (late.status, late.failure[:23]) == ("timed_out", "the time limit of 0.1 s")
     stuck = run("cpodes")(loaded_rods.scene(), time_step=STEP, steps=10)
     assert (stuck.status, stuck.failure[:14]) == ("diverged", "std::exception")
+    ring = run("merson")(
+        lock_ring.scene(12), time_step=STEP, steps=10
+    )  # turns once too often for its projection
+    assert (ring.status, "initialize" in ring.failure) == ("diverged", True)

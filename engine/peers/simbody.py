@@ -81,6 +81,8 @@ class _Run(Model):
 
     def step(self, count: int) -> None:
         """On to the end of `count` more steps."""
+        if self.refused is not None:
+            raise self.refused
         self.done += count
         self.state = self.manager.integrate(self.done * self.task.time_step)
 

@@ -88,7 +88,11 @@ class Model:
         self._start()
         self.manager = opensim.Manager(self.model)
         self._integrator()
-        self.manager.initialize(self.state)
+        self.refused: RuntimeError | None = None  # a start that cannot be projected
+        try:
+            self.manager.initialize(self.state)
+        except RuntimeError as error:
+            self.refused = error
 
     def _add(self, node: Node) -> None:
         """A body with the joint that it hangs by, or free."""
