@@ -50,7 +50,7 @@ What cannot be simulated is refused with one sentence, and a run that goes wrong
     spook_tracker.engine.errors.SceneError: particle 'ghost': mass must be positive, not 0
 """
 
-from spook_tracker.engine.bodies import WORLD, Body, Material, Particle, RigidBody
+from spook_tracker.engine.bodies import WORLD, Body, Material, PairFriction, Particle, RigidBody
 from spook_tracker.engine.build_info import BuildInfo, build_info
 from spook_tracker.engine.compiler import compile, explain
 from spook_tracker.engine.couplings import Relation, Wire
@@ -163,6 +163,7 @@ __all__ = [
     "Momentum",
     "Motor",
     "Orientation",
+    "PairFriction",
     "Part",
     "Particle",
     "Penetration",

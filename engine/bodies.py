@@ -37,6 +37,23 @@ class Particle:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
+class PairFriction:
+    """How two bodies rub on each other, whatever their materials say of friction."""
+
+    between: tuple[str, str]
+    friction: float = 0.0  # Coulomb's mu, 1
+    rolling_friction: float = 0.0  # m
+    torsional_friction: float = 0.0  # m
+
+    def __post_init__(self) -> None:
+        one, two = self.between
+        if one == two:
+            raise SceneError(f"pair friction: {one!r} does not rub on itself; name two bodies")
+        for name in ("friction", "rolling_friction", "torsional_friction"):
+            object.__setattr__(self, name, check.not_negative("pair friction", name, getattr(self, name)))
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
 class Material:
     """How a surface behaves in contact.
 

@@ -166,6 +166,8 @@ def _of_scene(can: Capabilities, scene: Scene) -> Iterator[str]:
             yield from _of_surface(can, body)
     for constraint in scene.constraints:
         yield from _of_constraint(can, constraint)
+    if touching and scene.pair_frictions:
+        yield "friction of a pair of bodies"
     if scene.follows_time():
         yield "functions of time"
     if not can.loops and _has_loop(scene):

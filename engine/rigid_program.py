@@ -141,6 +141,18 @@ def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> 
         "colliders": table(surfaces(scene, hulls) if scene.contacts else []),
         **hull_tables(hulls),
         "no_contact": table(apart),
+        "pair_frictions": table(
+            [
+                {
+                    "first": bodies[pair.between[0]],
+                    "second": bodies[pair.between[1]],
+                    "friction": pair.friction,
+                    "rolling_friction": pair.rolling_friction,
+                    "torsional_friction": pair.torsional_friction,
+                }
+                for pair in scene.pair_frictions
+            ]
+        ),
         "contacts": scene.contacts,
         "gravity": scene.gravity,
         "loads_change": held and any(isinstance(force, Load) for force in scene.forces),

@@ -8,7 +8,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from spook_tracker.engine import check
-from spook_tracker.engine.bodies import WORLD, Body, Particle, RigidBody
+from spook_tracker.engine.bodies import WORLD, Body, PairFriction, Particle, RigidBody
 from spook_tracker.engine.check import Vector
 from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.display import display, framed
@@ -41,9 +41,12 @@ class Scene:
     gravity: Vector = (0.0, 0.0, 0.0)  # m/s²
     contacts: bool = True
     no_contact: tuple[tuple[str, str], ...] = ()
+    pair_frictions: tuple[
+        PairFriction, ...
+    ] = ()  # of two bodies, in place of what their materials make of it
 
     def __post_init__(self) -> None:
-        for field in ("bodies", "constraints", "forces", "no_contact"):
+        for field in ("bodies", "constraints", "forces", "no_contact", "pair_frictions"):
             given = check.entries(getattr(self, field))
             if given is None:
                 raise SceneError(f"scene: {field} must be a sequence, not {getattr(self, field)!r}")
@@ -79,6 +82,7 @@ class Scene:
         for force in self.forces:
             self._check_force(force, known)
         object.__setattr__(self, "no_contact", tuple(self._pair(pair, known) for pair in self.no_contact))
+        self._check_pair_frictions(known)
         self._check_directions()
 
     def _repr_html_(self) -> str | None:
@@ -87,6 +91,25 @@ class Scene:
             return framed(display().scene(self), height=420)
         except EngineError:
             return None
+
+    def _check_pair_frictions(self, known: dict[str, Body]) -> None:
+        seen: set[frozenset[str]] = set()
+        for pair in self.pair_frictions:
+            if not isinstance(pair, PairFriction):
+                raise SceneError(f"pair_frictions: {pair!r} is not a PairFriction")
+            for name in pair.between:
+                body = known.get(name)
+                if not isinstance(body, RigidBody):
+                    raise SceneError(f"pair_frictions: there is no rigid body named {name!r}")
+                if body.material.oriented:
+                    raise SceneError(
+                        f"pair_frictions: {name!r} has a friction that differs with the direction"
+                    )
+            if frozenset(pair.between) in seen:
+                raise SceneError(
+                    f"pair_frictions: {pair.between[0]!r} and {pair.between[1]!r} stand there twice"
+                )
+            seen.add(frozenset(pair.between))
 
     def _check_directions(self) -> None:
         """One ellipse of friction meets any surface; two that cross have no law that is generally agreed on."""

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from spook_tracker.engine import Method, Scene, _core
+from spook_tracker.engine import Method, PairFriction, Scene, _core
 from spook_tracker.engine.particle_program import _pack as pack_particle_tables
 from spook_tracker.engine.rigid_program import pack
 from tests import particle_scenes, rigid_scenes
 
 SCENE = rigid_scenes.everything(np.random.default_rng(7))
+SCENE = replace(
+    SCENE, pair_frictions=(PairFriction(between=tuple(b.name for b in SCENE.bodies[:2]), friction=0.5),)
+)  # type: ignore[arg-type]
 
 
 def pack_particles(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
@@ -49,6 +53,7 @@ def test_an_index_is_a_whole_number(table: str, column: str, value: float) -> No
         ("springs", "first", 99, "bodies"),
         ("no_contact", "second", 99, "bodies"),
         ("no_contact", "first", -1, "bodies"),
+        ("pair_frictions", "second", 99, "bodies"),
         ("motors", "joint", 99, "joints"),
         ("joint_springs", "joint", -1, "joints"),
         ("joint_springs", "joint", 99, "joints"),

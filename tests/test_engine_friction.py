@@ -16,9 +16,11 @@ from spook_tracker.engine import (
     Final,
     Material,
     Method,
+    PairFriction,
     Plane,
     RigidBody,
     Scene,
+    SceneError,
     Sphere,
     Trace,
     Velocity,
@@ -233,3 +235,70 @@ def test_the_box_never_gives_more_than_its_corners(edge: tuple[float, float, flo
     )["f"][1:]
 
     assert np.all(np.hypot(force[:, 0], force[:, 1]) <= math.sqrt(2.0) * mu * force[:, 2] * (1.0 + 1e-9))
+
+
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
+@pytest.mark.parametrize("model", ["cone", "box", "scaled_box"])
+@pytest.mark.parametrize(("own", "mu"), [(0.0, 0.3), (0.9, 0.3), (0.9, 0.0), (0.0, 0.6)])
+def test_a_pair_rubs_as_it_is_told_whatever_its_materials_say(
+    own: float, mu: float, model: Model, solver: Any
+) -> None:
+    """To the bit as surfaces that both say so: it stands on 0.5, or loses µ g cos a every second. A third body is as before."""
+    pair = PairFriction(between=("box", "ground"), friction=mu)
+    told = replace(slope(0.5, 0.3, Material(friction=own)), pair_frictions=(pair,))
+    of_two = slope(0.5, 0.3, Material(friction=mu))
+    method = Method(friction=model, solver=solver)
+    (v, f), (wanted, carried) = (slide(one, method=method) for one in (told, of_two))
+
+    assert np.array_equal(v, wanted)
+    assert np.array_equal(f, carried)
+    assert (np.linalg.norm(v[-1]) < 1e-9) == (mu > 0.5)
+    beside = replace(told.bodies[1], name="beside", position=(0.0, 5.0, 0.1))  # type: ignore[arg-type]
+    both = replace(told, bodies=(*told.bodies, beside))
+    found = simulate(
+        both, time_step=H, steps=90, method=method, observe={"v": Final(quantity=Velocity("beside"))}
+    )
+    assert found["v"] == pytest.approx(
+        slide(slope(0.5, 0.3, Material(friction=own)), method=method)[0][-1], abs=1e-9
+    )
+
+
+def test_a_pair_may_roll_with_friction_and_a_ball_without_it_goes_on() -> None:
+    """A ball slows by 5/7 g µ_r / r; of two on one ground the pair alone has it."""
+    ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
+    balls = [
+        RigidBody(
+            name=name, mass=MASS, shape=Sphere(0.5), position=(0.0, y, 0.5),
+            velocity=(1.0, 0.0, 0.0), angular_velocity=(0.0, 2.0, 0.0),
+        )
+        for name, y in (("braked", 0.0), ("free", 3.0))
+    ]  # fmt: skip
+    pairs = (
+        PairFriction(between=("ground", "braked"), friction=0.5, rolling_friction=0.01),
+        PairFriction(between=("free", "ground"), friction=0.5),
+    )
+    scene = Scene(bodies=(ground, *balls), gravity=(0.0, 0.0, -G), pair_frictions=pairs)
+    found = simulate(scene, time_step=H, steps=60, observe={"v": Final(quantity=Velocity())})["v"]
+
+    assert found[1, 0] == pytest.approx(1.0 - 5.0 / 7.0 * G * 0.01 / 0.5, abs=1e-3)
+    assert found[2, 0] == pytest.approx(1.0, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("pairs", "said"),
+    [
+        (("box",), "'box' is not a PairFriction"),
+        ((PairFriction(between=("box", "wall")),), "no rigid body named 'wall'"),
+        (
+            (PairFriction(between=("box", "ground")), PairFriction(between=("ground", "box"))),
+            "stand there twice",
+        ),
+    ],
+)
+def test_a_pair_that_is_none_is_refused(pairs: Any, said: str) -> None:
+    with pytest.raises(SceneError, match=said):
+        replace(slope(0.0, 0.0, Material()), pair_frictions=pairs)
+    with pytest.raises(SceneError, match="does not rub on itself"):
+        PairFriction(between=("box", "box"))
+    with pytest.raises(SceneError, match="friction must"):
+        PairFriction(between=("box", "ground"), friction=-0.1)

@@ -273,8 +273,8 @@ FLOOR = """<mujoco><option>{option}</option><default>{default}</default><worldbo
     [
         ("default", '<joint damping="1"/>', r"a free joint with springs, damping or friction \(joint 'root' in line 3\)"),
         ("default", '<joint armature="1"/>', r"a free joint with armature \(joint 'root' in line 3\)"),
-        ("pair", '<pair name="p" geom1="floor" geom2="box" friction=".1 .1 .1 .1 .1"/>', r"friction of its own \(pair 'p' in line 5\)"),
-        ("pair", '<pair geom1="floor" geom2="box" condim="1"/>', r"friction of its own \(pair 'floor and box'\)"),
+        ("pair", '<pair name="p" geom1="floor" geom2="box" friction=".1 .2 .1 .1 .1"/>', r"differs with the direction \(pair 'p' in line 5\)"),
+        ("pair", '<pair geom1="floor" geom2="box" friction="1 1 1 .1 .2"/>', r"differs with the direction \(pair 'floor and box'\)"),
         ("option", '<flag override="enable"/>', "for all contacts"),
         ("floor", 'surfacevel="1 0 0"', r"a surface that moves along itself \(geom 'floor' in line 2\)"),
         ("floor", 'adhesion="1"', r"a surface that clings \(geom 'floor' in line 2\)"),
@@ -297,11 +297,37 @@ def test_what_would_move_a_model_is_never_passed_over(
         find("spook").simulate(ModelRun(model=model), time_step=0.002, duration=0.1)
 
 
-def test_a_pair_that_rubs_as_its_geoms_do_is_taken(tmp_path: Path) -> None:
-    parts = dict.fromkeys(("option", "default", "floor", "joint", "pair", "actuator"), "")
-    model = _model(tmp_path, FLOOR.format(**parts | {"pair": '<pair geom1="floor" geom2="box"/>'}))
+RUBBING = {
+    "the larger": ("", "", "", 0.2),
+    "the condim that says more": ('condim="1"', "", "", 0.2),
+    "neither's": ('condim="1"', 'condim="1"', "", 0.0),
+    "of higher priority": ('priority="1"', "", "", 0.1),
+    "of higher priority, with its condim": ("", 'condim="1" priority="2"', "", 0.0),
+    "of their pair": ("", "", '<pair geom1="floor" geom2="box" friction=".15 .15 0 0 0"/>', 0.15),
+    "of their pair, whatever their bits": (
+        'contype="0"',
+        'contype="0"',
+        '<pair geom1="box" geom2="floor" condim="1"/>',
+        0.0,
+    ),
+}
 
-    assert find("spook").simulate(ModelRun(model=model), time_step=0.002, duration=0.1).completed
+
+@pytest.mark.parametrize("of", RUBBING)
+def test_two_surfaces_rub_as_mujoco_has_it(of: str, tmp_path: Path) -> None:
+    """A box slides a second on a floor that is tilted: ½ (3 − 9.81 µ) m, of 0.1 and 0.2 the µ that MuJoCo takes."""
+    floor, box, pair, friction = RUBBING[of]
+    text = (
+        '<mujoco><option gravity="3 0 -9.81"/><worldbody>'
+        f'<geom name="floor" type="plane" size="9 9 .1" friction=".1" {floor}/>'
+        '<body name="b" pos="0 0 .1"><freejoint/>'
+        f'<geom name="box" type="box" size=".2 .2 .1" friction=".2" {box}/></body></worldbody><contact>{pair}</contact></mujoco>'
+    )
+    ours, theirs, apart = _both(_model(tmp_path, text), 1.0)
+
+    assert ours["position"][-1, 0, 0] == pytest.approx(0.5 * (3.0 - 9.81 * friction), abs=2e-3)
+    assert apart < 0.01  # their contacts are soft
+    assert theirs.completed
 
 
 def test_a_tie_that_is_open_at_the_start_is_refused(tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from spook_tracker.engine.bodies import WORLD, RigidBody
+from spook_tracker.engine.bodies import WORLD, PairFriction, RigidBody
 from spook_tracker.engine.check import Rotation
 from spook_tracker.engine.couplings import Relation
 from spook_tracker.engine.joints import Ball, Constraint, Hinge, JointSpring, Limit, Lock, Motor, Prismatic
@@ -122,9 +122,10 @@ class _Translation:
                     self.tie(tie)
         fixed: list[RigidBody] = []
         apart: list[tuple[str, str]] = []
+        rubbing: list[PairFriction] = []
         touching = self.has("CONTACT") and self.has("CONSTRAINT")
         if touching:
-            covered, fixed, apart = surfaces(m, self.d, self.weld, self.main, self.tied, self.lacks)
+            covered, fixed, apart, rubbing = surfaces(m, self.d, self.weld, self.main, self.tied, self.lacks)
             self.bodies = [part for one in self.bodies for part in covered.get(one.name, [one])]
             self.constraints += [
                 Lock(name=f"{part.name} to {name}", between=(name, part.name), compliance=0.0)
@@ -141,6 +142,7 @@ class _Translation:
             gravity=tuple(np.asarray(m.opt.gravity) if self.has("GRAVITY") else np.zeros(3)),
             contacts=touching,
             no_contact=tuple(apart),
+            pair_frictions=tuple(rubbing),
         )
         return Translated(
             scene,

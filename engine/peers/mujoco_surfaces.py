@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from itertools import combinations
@@ -12,7 +13,7 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from spook_tracker.engine.bodies import Material, RigidBody
+from spook_tracker.engine.bodies import Material, PairFriction, RigidBody
 from spook_tracker.engine.errors import SceneError
 from spook_tracker.engine.meshes import HeightField
 from spook_tracker.engine.peers.lacking import Lacks
@@ -34,6 +35,9 @@ KIND = {int(getattr(mujoco.mjtGeom, f"mjGEOM_{name}")): name.lower() for name in
     "PLANE", "SPHERE", "CAPSULE", "CYLINDER", "BOX", "ELLIPSOID", "MESH", "HFIELD", "SDF")}  # fmt: skip
 
 
+Found = tuple[dict[str, list[RigidBody]], list[RigidBody], list[tuple[str, str]], list[PairFriction]]
+
+
 def surfaces(
     model: Any,
     data: Any,
@@ -41,8 +45,9 @@ def surfaces(
     main: Mapping[int, RigidBody],
     tied: set[frozenset[str]],
     lacks: Lacks,
-) -> tuple[dict[str, list[RigidBody]], list[RigidBody], list[tuple[str, str]]]:
-    """Moving bodies with their surfaces by name, a static body for each geom that stands still, and pairs kept apart.
+) -> Found:
+    """Moving bodies with their surfaces by name, a static body for each geom that stands still, pairs kept apart, and pairs
+    that rub otherwise than their materials would.
 
     Geoms of one body that rub differently, or meet others, are surfaces of bodies of their own at the same place, which
     share its mass and are to be locked to the first.
@@ -62,7 +67,20 @@ class _Surfaces:
     ) -> None:
         self.m, self.d, self.main, self.lacks = model, data, main, lacks
         self.weld = weld[np.asarray(model.geom_bodyid)]
+        self.pairs = {
+            frozenset((int(one), int(two))): pair
+            for pair, (one, two) in enumerate(zip(model.pair_geom1, model.pair_geom2, strict=True))
+        }
         self.meets = self.meeting(tied)
+        self.rubs_as = [
+            (
+                *model.geom_friction[geom].tolist(),
+                int(model.geom_condim[geom]),
+                int(model.geom_priority[geom]),
+            )
+            for geom in range(model.ngeom)
+        ]
+        self.known: dict[Any, Material | None] = {}
         self.refuse_what_we_lack()
 
     def label(self, geom: int) -> str:
@@ -82,20 +100,30 @@ class _Surfaces:
         if m.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE):
             self.lacks.add("one friction and softness for all contacts (flag override)")
         for pair, (one, two) in enumerate(zip(m.pair_geom1, m.pair_geom2, strict=True)):
-            if not self.as_its_geoms(pair, int(one), int(two)):
+            if self.is_odd(pair):
                 name = (
                     mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_PAIR, pair)
                     or f"{self.label(int(one))} and {self.label(int(two))}"
                 )
-                self.lacks.add("a pair with friction of its own", "pair", name)
+                self.lacks.add(
+                    "a pair that clings or whose friction differs with the direction", "pair", name
+                )
 
-    def as_its_geoms(self, pair: int, one: int, two: int) -> bool:
-        """Whether a pair rubs as MuJoCo lets its two geoms rub where none is said of them: as the one that rubs more."""
+    def is_odd(self, pair: int) -> bool:
+        """Whether a pair has what no friction of ours can say."""
+        one, other, _, rolling, crosswise = self.m.pair_friction[pair]
+        clings = bool(np.any(getattr(self.m, "pair_adhesion", np.zeros(self.m.npair))[pair]))
+        return clings or one != other or rolling != crosswise
+
+    def rubbing(self, one: int, two: int) -> Material:
+        """Friction of two geoms as MuJoCo has it: their pair's, else of the one of higher priority, else the larger."""
         m = self.m
-        sliding, _, spin, rolling, _ = m.pair_friction[pair]
-        alike = np.allclose((sliding, spin, rolling), np.maximum(*m.geom_friction[[one, two]]), rtol=1e-6)
-        clings = bool(np.any(getattr(m, "pair_adhesion", np.zeros(m.npair))[pair]))
-        return alike and not clings and int(m.pair_dim[pair]) == int(np.max(m.geom_condim[[one, two]]))
+        if (pair := self.pairs.get(frozenset((one, two)))) is not None:
+            sliding, _, spin, roll, _ = m.pair_friction[pair]
+            return _friction(int(m.pair_dim[pair]), (sliding, spin, roll))
+        ahead = int(m.geom_priority[one]) - int(m.geom_priority[two])
+        both = [one, two] if ahead == 0 else [one] if ahead > 0 else [two]
+        return _friction(int(np.max(m.geom_condim[both])), np.max(m.geom_friction[both], axis=0))
 
     def meeting(self, tied: set[frozenset[str]]) -> npt.NDArray[np.bool_]:
         """Which geoms may touch, by bits, bodies, exclusions and pairs."""
@@ -120,7 +148,7 @@ class _Surfaces:
             found[one, two] = found[two, one] = True
         return found
 
-    def found(self) -> tuple[dict[str, list[RigidBody]], list[RigidBody], list[tuple[str, str]]]:
+    def found(self) -> Found:
         bodies: dict[str, list[RigidBody]] = {}
         fixed: list[RigidBody] = []
         geoms: dict[str, int] = {}  # of every surface one geom
@@ -149,12 +177,35 @@ class _Surfaces:
                 bodies[self.main[body].name] = made
             else:
                 fixed += made
-        apart = [
-            (one, two)
-            for one, two in combinations(geoms, 2)
-            if not self.meets[geoms[one], geoms[two]] and self.weld[[geoms[one], geoms[two]]].any()
-        ]
-        return bodies, fixed, apart
+        apart: list[tuple[str, str]] = []
+        rubbing: list[PairFriction] = []
+        for first, second in combinations(geoms, 2):
+            if not self.weld[[geoms[first], geoms[second]]].any():
+                continue
+            if not self.meets[geoms[first], geoms[second]]:
+                apart.append((first, second))
+            elif (pair := self.pair_friction(first, second, geoms)) is not None:
+                rubbing.append(pair)
+        return bodies, fixed, apart, rubbing
+
+    def pair_friction(self, one: str, two: str, geoms: Mapping[str, int]) -> PairFriction | None:
+        """What is to be said of two surfaces; nothing where their materials say the same."""
+        first, second = geoms[one], geoms[two]
+        key = (self.rubs_as[first], self.rubs_as[second], self.pairs.get(frozenset((first, second))))
+        if key not in self.known:
+            wanted, given = self.rubbing(first, second), [self.material(geom) for geom in (first, second)]
+            same = (
+                math.isclose(wanted.friction, math.sqrt(given[0].friction * given[1].friction), rel_tol=1e-12)
+                and wanted.rolling_friction == max(of.rolling_friction for of in given)
+                and wanted.torsional_friction == max(of.torsional_friction for of in given)
+            )
+            self.known[key] = None if same else wanted
+        if (found := self.known[key]) is None:
+            return None
+        return PairFriction(
+            between=(one, two), friction=found.friction, rolling_friction=found.rolling_friction,
+            torsional_friction=found.torsional_friction,
+        )  # fmt: skip
 
     def alike(self) -> dict[int, list[list[int]]]:
         """Geoms that touch anything, by body, together where they rub alike and meet the same; those that stand still alone."""
@@ -163,7 +214,8 @@ class _Surfaces:
             body = int(self.weld[geom])
             if body and body not in self.main:
                 continue
-            key = (self.material(geom), self.meets[geom].tobytes()) if body else geom
+            paired = tuple(pair for both, pair in self.pairs.items() if geom in both)
+            key = (self.rubs_as[geom], self.meets[geom].tobytes(), paired) if body else geom
             groups.setdefault(body, {}).setdefault(key, []).append(geom)
         return {body: list(alike.values()) for body, alike in groups.items()}
 
@@ -206,13 +258,7 @@ class _Surfaces:
 
     def material(self, geom: int) -> Material:
         """Friction of the kinds that its condim has."""
-        m, kinds = self.m, int(self.m.geom_condim[geom])
-        sliding, spin, roll = (float(x) for x in m.geom_friction[geom])
-        return Material(
-            friction=sliding if kinds > 1 else 0.0,
-            torsional_friction=spin if kinds > 3 else 0.0,
-            rolling_friction=roll if kinds > 4 else 0.0,
-        )
+        return _friction(int(self.m.geom_condim[geom]), self.m.geom_friction[geom])
 
     def shape(self, geom: int) -> Shape | None:
         m = self.m
@@ -247,6 +293,16 @@ class _Surfaces:
         )
         spacing = (2.0 * half_x / (columns - 1), 2.0 * half_y / (rows - 1))
         return HeightField(spacing, tuple(map(tuple, data.T.tolist())))
+
+
+def _friction(kinds: int, numbers: Any) -> Material:
+    """Of the kinds that a condim has: sliding, turning and rolling."""
+    sliding, spin, roll = (float(number) for number in numbers)
+    return Material(
+        friction=sliding if kinds > 1 else 0.0,
+        torsional_friction=spin if kinds > 3 else 0.0,
+        rolling_friction=roll if kinds > 4 else 0.0,
+    )
 
 
 def _spread(count: int) -> Array:

@@ -335,6 +335,18 @@ void read_no_contact(const nb::dict& no_contact, RigidScene& scene) {
     table.expect_all_read();
 }
 
+void read_pair_frictions(const nb::dict& pairs, RigidScene& scene) {
+    Columns table(pairs, "pair_frictions");
+    const Numbers first = table.numbers("first"), second = table.numbers("second");
+    const Numbers friction = table.numbers("friction"), rolling = table.numbers("rolling_friction"),
+                  torsional = table.numbers("torsional_friction");
+    const Range bodies{scene.bodies.size(), "bodies"};
+    for (std::size_t i = 0; i < table.rows(); ++i)
+        scene.pair_frictions.push_back(
+            {first.index(i, bodies), second.index(i, bodies), friction[i], rolling[i], torsional[i]});
+    table.expect_all_read();
+}
+
 RigidMethod to_method(const nb::dict& method) {
     RigidMethod out;
     Options options(method);
@@ -373,8 +385,8 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
           const nb::dict& wire_points, const nb::dict& eyes, const nb::dict& tyres, const nb::dict& fields,
           const nb::dict& fluids, const nb::dict& floaters, const nb::dict& drives, const nb::dict& knots,
           const nb::dict& colliders, const nb::dict& outline_corners, const nb::dict& outline_faces,
-          const nb::dict& no_contact, bool contacts, const Point& gravity, const nb::dict& method,
-          bool loads_change, const std::vector<QuantityRequest>& quantities,
+          const nb::dict& no_contact, const nb::dict& pair_frictions, bool contacts, const Point& gravity,
+          const nb::dict& method, bool loads_change, const std::vector<QuantityRequest>& quantities,
           const std::vector<Observation>& observations, double time_left) {
     RigidScene scene;
     scene.gravity = to_vec(gravity);
@@ -400,6 +412,7 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
     scene.floaters = read_colliders(floaters, outlines, scene.bodies.size(), "floaters");
     scene.colliders = read_colliders(colliders, outlines, scene.bodies.size(), "colliders");
     read_no_contact(no_contact, scene);
+    read_pair_frictions(pair_frictions, scene);
     make_in_time(self, scene, quantities, observations, time_left);
 }
 
@@ -412,9 +425,9 @@ void bind_rigid(nb::module_& m) {
         nb::arg("joint_frictions"), nb::arg("armatures"), nb::arg("springs"), nb::arg("terms"),
         nb::arg("wire_points"), nb::arg("eyes"), nb::arg("tyres"), nb::arg("fields"), nb::arg("fluids"),
         nb::arg("floaters"), nb::arg("drives"), nb::arg("knots"), nb::arg("colliders"),
-        nb::arg("outline_corners"), nb::arg("outline_faces"), nb::arg("no_contact"), nb::arg("contacts"),
-        nb::arg("gravity"), nb::arg("method"), nb::arg("loads_change"), nb::arg("quantities"),
-        nb::arg("observations"), nb::arg("time_left") = 0.0,
+        nb::arg("outline_corners"), nb::arg("outline_faces"), nb::arg("no_contact"),
+        nb::arg("pair_frictions"), nb::arg("contacts"), nb::arg("gravity"), nb::arg("method"),
+        nb::arg("loads_change"), nb::arg("quantities"), nb::arg("observations"), nb::arg("time_left") = 0.0,
         "Tables are dicts of columns, a row each, in the names of RigidBodySpec, JointSpec and Primitive;\n"
         "outlines of hulls and meshes are numbered in the order they come;\n"
         "springs and fields as for ParticleProgram. A body is an index, -1 the world; motors, limits,\n"

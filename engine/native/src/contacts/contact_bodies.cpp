@@ -35,13 +35,32 @@ double ContactBodies::gap(const Contact& contact) const noexcept {
     return std::abs(gap) <= rounding * (norm(contact.point.position) + size(contact)) ? 0.0 : gap;
 }
 
-ContactSurfaces::ContactSurfaces(const std::vector<SurfaceMaterial>& materials) : of(materials) {
+ContactSurfaces::ContactSurfaces(const std::vector<SurfaceMaterial>& materials,
+                                 std::vector<PairFriction> given)
+    : of(materials), pairs(std::move(given)) {
+    for (PairFriction& pair : pairs) {
+        if (pair.second < pair.first) std::swap(pair.first, pair.second);
+        resists_turning = resists_turning || pair.resists_turning();
+    }
+    std::sort(pairs.begin(), pairs.end(), [](const PairFriction& a, const PairFriction& b) {
+        return std::pair{a.first, a.second} < std::pair{b.first, b.second};
+    });
     for (const SurfaceMaterial& material : of.distinct()) {
         conveys = conveys || norm(material.surface_velocity) > 0.0;
         oriented = oriented || material.is_oriented();
         resists_turning = resists_turning || material.resists_turning();
         rebounds = rebounds || material.restitution > 0.0;
     }
+}
+
+void ContactSurfaces::rub(PairMaterial& material, const Contact& contact) const noexcept {
+    const std::pair wanted{contact.first, contact.second};  // the lower first
+    const auto at = std::lower_bound(pairs.begin(), pairs.end(), wanted,
+                                     [](const PairFriction& pair, const std::pair<int, int>& key) {
+                                         return std::pair{pair.first, pair.second} < key;
+                                     });
+    if (at == pairs.end() || std::pair{at->first, at->second} != wanted) return;
+    material.friction = at->friction, material.rolling = at->rolling, material.torsional = at->torsional;
 }
 
 }  // namespace spook

@@ -58,12 +58,16 @@ struct ContactBodies {
 };
 
 struct ContactSurfaces {
-    explicit ContactSurfaces(const std::vector<SurfaceMaterial>& materials);
+    ContactSurfaces(const std::vector<SurfaceMaterial>& materials, std::vector<PairFriction> pairs);
 
     const SurfaceMaterial& operator[](int body) const noexcept { return of[body]; }
     PairMaterial pair(const Contact& contact) const noexcept {
-        return combined(of[contact.first], of[contact.second]);
+        PairMaterial found = combined(of[contact.first], of[contact.second]);
+        if (!pairs.empty()) rub(found, contact);
+        return found;
     }
+    /// As the pair does where a friction of its own is given.
+    void rub(PairMaterial& material, const Contact& contact) const noexcept;
     /// Whether a surface of the contact moves along itself.
     bool is_conveyed(const Contact& contact) const noexcept {
         return conveys && (norm(of[contact.first].surface_velocity) > 0.0 ||
@@ -71,6 +75,7 @@ struct ContactSurfaces {
     }
 
     SharedValues<SurfaceMaterial> of;                // by body
+    std::vector<PairFriction> pairs;                 // lower body first, in order
     bool conveys = false;                            // some surface moves along itself
     bool oriented = false;                           // some friction differs with the direction
     bool resists_turning = false, rebounds = false;  // some surface does

@@ -43,4 +43,12 @@ inline PairMaterial combined(const SurfaceMaterial& a, const SurfaceMaterial& b)
             std::max(a.torsional, b.torsional)};
 }
 
+/// How two bodies' surfaces rub on each other, whatever each says of itself.
+struct PairFriction {
+    int first = 0, second = 0;
+    double friction = 0.0, rolling = 0.0, torsional = 0.0;
+
+    bool resists_turning() const noexcept { return rolling > 0.0 || torsional > 0.0; }
+};
+
 }  // namespace spook

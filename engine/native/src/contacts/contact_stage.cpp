@@ -29,9 +29,10 @@ void note_initial_penetrations(const ContactModel& model, const ContactPoints& p
 
 ContactStage::ContactStage(Detection detection, const std::vector<SurfaceMaterial>& materials,
                            std::vector<int> unknown, const ContactOptions& options,
-                           std::vector<IndexPair> joints, std::vector<char> yielding)
+                           std::vector<IndexPair> joints, std::vector<char> yielding,
+                           std::vector<PairFriction> pair_frictions)
     : model_(std::make_shared<ContactModel>(ContactBodies{detection, std::move(unknown), std::move(joints)},
-                                            ContactSurfaces{materials}, options)),
+                                            ContactSurfaces{materials, std::move(pair_frictions)}, options)),
       motion_(model_),
       search_(std::move(detection)),
       projector_(model_, std::move(yielding)) {}

@@ -66,7 +66,7 @@ public:
     /// `yielding` tells of each block of those rows whether it gives way while overlaps are parted, as springs do.
     ContactStage(Detection detection, const std::vector<SurfaceMaterial>& materials, std::vector<int> unknown,
                  const ContactOptions& options, std::vector<IndexPair> joints = {},
-                 std::vector<char> yielding = {});
+                 std::vector<char> yielding = {}, std::vector<PairFriction> pair_frictions = {});
 
     /// Whether any contact can ever be; if not, the stage can be left out.
     bool possible() const noexcept { return search_.detection.possible(); }

@@ -186,12 +186,13 @@ struct RigidScene {
     std::vector<SpringForce> springs;
     std::vector<CentralField> fields;
     std::vector<Fluid> fluids;
-    std::vector<Collider> floaters;     // surfaces that displace fluid
-    std::vector<TimeDrive> drives;      // what follows the time
-    std::vector<Collider> colliders;    // of all bodies that can touch
-    std::vector<IndexPair> no_contact;  // pairs of bodies that never touch
-    bool contacts = true;               // false: the scene switches them off
-    bool loads_change = false;          // loads are set while it runs, whatever they are at the start
+    std::vector<Collider> floaters;            // surfaces that displace fluid
+    std::vector<TimeDrive> drives;             // what follows the time
+    std::vector<Collider> colliders;           // of all bodies that can touch
+    std::vector<IndexPair> no_contact;         // pairs of bodies that never touch
+    std::vector<PairFriction> pair_frictions;  // of two bodies, in place of what their surfaces make of it
+    bool contacts = true;                      // false: the scene switches them off
+    bool loads_change = false;                 // loads are set while it runs, whatever they are at the start
     Vec3 gravity;
     RigidMethod method;
 };

@@ -54,7 +54,12 @@ void look_at_bodies(const RigidScene& scene, Facts& facts) {
         facts.rolling |= body.material.resists_turning();
     }
     facts.contacts = Detection(scene.colliders, dynamic, scene.no_contact).possible();
-    facts.rubbing = facts.contacts && rubbing >= 2;
+    bool rubs = rubbing >= 2;
+    for (const PairFriction& pair : scene.pair_frictions) {
+        rubs |= pair.friction > 0.0;
+        facts.rolling |= pair.resists_turning();
+    }
+    facts.rubbing = facts.contacts && rubs;
     facts.no_contact = !scene.contacts    ? "the scene switches contacts off"
                        : with_surface < 2 ? "fewer than two bodies have a surface"
                                           : "every pair of surfaces is tied, excluded or cannot move";

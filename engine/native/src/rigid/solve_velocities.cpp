@@ -51,6 +51,11 @@ void MixedRows::take_contacts(const RigidScene& scene) {
         if (!model_.stages.runs(Stage::move_surfaces)) materials.back().surface_velocity = {};
         if (!model_.stages.runs(Stage::roll)) materials.back().rolling = materials.back().torsional = 0.0;
     }
+    std::vector<PairFriction> pairs = scene.pair_frictions;
+    for (PairFriction& pair : pairs) {
+        if (!model_.stages.runs(Stage::friction)) pair.friction = 0.0;
+        if (!model_.stages.runs(Stage::roll)) pair.rolling = pair.torsional = 0.0;
+    }
     const SolverKind solver =
         model_.stages.runs(Stage::solve_iterative) ? SolverKind::iterative : SolverKind::direct;
     fresh_contacts_.emplace(
@@ -58,7 +63,7 @@ void MixedRows::take_contacts(const RigidScene& scene) {
         ContactOptions{model_.h, model_.method.friction, solver, model_.method.iterations,
                        model_.method.residual_tolerance, model_.method.floor, model_.method.refinements,
                        model_.method.impacts, model_.method.unsettled_residual},
-        joint_pairs, yielding);
+        joint_pairs, yielding, std::move(pairs));
     for (const JointBlock& block : joints_.blocks())
         for (const int body : {block.first, block.second})
             if (body >= 0 && joints_.may_stop(block)) fresh_contacts_->leave_at_start(body);
