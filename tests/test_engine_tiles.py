@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import functools
 import importlib.util
 import math
 import sys
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -56,9 +58,10 @@ SLIDERS: dict[
 }
 
 
-def floor(raised: float = 0.0, restitution: float = 0.0, size: float = 1.0) -> list[RigidBody]:
+@functools.cache
+def floor(raised: float = 0.0, restitution: float = 0.0, size: float = 1.0) -> tuple[RigidBody, ...]:
     """8 × 8 tiles of `size` [m], their tops at z = 0; those of the third row `raised` [m]."""
-    return [
+    return tuple(
         RigidBody(
             name=f"tile {i} {j}",
             motion="static",
@@ -68,10 +71,10 @@ def floor(raised: float = 0.0, restitution: float = 0.0, size: float = 1.0) -> l
         )
         for i in range(8)
         for j in range(8)
-    ]
+    )
 
 
-def loose(tiles: list[RigidBody], mass: float) -> list[RigidBody]:
+def loose(tiles: Iterable[RigidBody], mass: float) -> list[RigidBody]:
     """The same on a plane, each free to move."""
     ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, -0.5))
     return [ground, *(replace(tile, motion="dynamic", mass=mass) for tile in tiles)]
