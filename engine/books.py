@@ -75,7 +75,7 @@ def kept(scene: Scene, method: Method, result: Result) -> Result:
     kinetic, potential = seen["T"].ravel(), seen["V"].ravel()
     steps = min(len(kinetic), len(potential), len(seen["touching"])) - 1
     kinetic, potential, h = kinetic[: steps + 1], potential[: steps + 1], result.time_step
-    loads, motors = _work_of_loads(scene, seen, steps, h), _work_of_motors(scene, seen, steps, h)
+    loads, motors = _work_of_loads(scene, method, seen, steps, h), _work_of_motors(scene, seen, steps, h)
     rest = np.diff(kinetic + potential) - loads - motors
     takes = (seen["touching"].ravel()[1 : steps + 1] > 0) | _takes(scene, method)
     gives = np.full(steps, _gives(scene))
@@ -123,15 +123,20 @@ def _judged(result: Result, scene: Scene, running: Array, kinetic: Array, begun:
     )
 
 
-def _work_of_loads(scene: Scene, seen: Mapping[str, Array], steps: int, h: float) -> Array:
-    """[J] a step."""
-    work = np.zeros(steps)
+def _work_of_loads(scene: Scene, method: Method, seen: Mapping[str, Array], steps: int, h: float) -> Array:
+    """[J] a step. A load is that of where the step begins, but for a method that follows the time within it."""
+    work, follows = np.zeros(steps), method.runge_kutta != "none"
     for load in _loads(scene):
-        factors = [load.factor(h * k) if load.factor else 1.0 for k in range(steps)]
-        power = _mean(seen[f"v {load.body}"][: steps + 1]) @ np.array(load.force)
+        factors = np.array([load.factor(h * k) if load.factor else 1.0 for k in range(steps + 1)])
+
+        def speeds(name: str, body: str = load.body) -> Array:
+            told = seen[f"{name} {body}"][: steps + 1]
+            return told if follows else _mean(told)
+
+        power = speeds("v") @ np.array(load.force)
         if any(load.torque):
-            power = power + _mean(seen[f"w {load.body}"][: steps + 1]) @ np.array(load.torque)
-        work += h * np.array(factors) * power
+            power = power + speeds("w") @ np.array(load.torque)
+        work += h * (_mean(factors * power) if follows else factors[:-1] * power)
     return work
 
 

@@ -210,6 +210,18 @@ def test_forces_that_compositions_refuse_are_forces(name: str) -> None:
         assert [float(run["x"][0]), float(run["v"][0])] == pytest.approx(there, abs=1e-10), method
 
 
+def test_books_take_a_load_as_it_was_within_the_step() -> None:
+    """By the trapezoidal rule, so that what they cannot explain falls with the square of the step."""
+    scene, _ = forced("a load in time")
+    left = []
+    for steps in (20, 40):
+        books = simulate(scene, time_step=1 / steps, steps=steps, method=RK8, books=True).books
+        assert books is not None
+        left.append(abs(books.unexplained) / books.energy_in)
+    assert left[0] < 1e-3
+    assert left[0] / left[1] == pytest.approx(4.0, rel=0.01)
+
+
 @pytest.mark.parametrize("backwards", [False, True])
 def test_armature_and_springs_of_joints_either_way_round(backwards: bool) -> None:
     scene = hung("ball", "ball")
