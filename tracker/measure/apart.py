@@ -247,10 +247,13 @@ def serve() -> None:
     what, source, request, more = pickle.loads(base64.b64decode(order.readline()))
     from spook_tracker.tracker.measure import again, workers
     from spook_tracker.tracker.measure import run as here
+    from spook_tracker.tracker.measure.catalogues import import_ours
     from spook_tracker.tracker.measure.fitting import written
 
     if what == "run" and request.workers and request.executor == PROCESS:
-        workers.fork_ahead()  # nothing that is asked for is imported yet
+        if not request.tests:
+            import_ours(source.catalogue)
+        workers.fork_ahead()  # nothing of a team's own is imported yet
 
     def tell(news: News) -> None:
         if isinstance(news, Done):

@@ -12,11 +12,12 @@ from __future__ import annotations
 
 import importlib
 from collections.abc import Callable, Iterator, Mapping
+from contextlib import suppress
 from importlib.util import find_spec
 
 from spook_tracker.engine.find import look_beside, thrown
 from spook_tracker.scalar_tests.case import ScalarTest
-from spook_tracker.scalar_tests.catalogue import Catalogue
+from spook_tracker.scalar_tests.catalogue import CATALOGUE, Catalogue
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.measure.bounds import STANDARD as STANDARD
 from spook_tracker.tracker.measure.model_files import catalogue as catalogue_of_models
@@ -78,6 +79,13 @@ def find(names: str) -> Mapping[str, ScalarTest]:
     if len(asked_for) == 1:
         return _one(asked_for[0])
     return Several({name: _one(name) for name in asked_for})
+
+
+def import_ours(names: str) -> None:
+    """Import every test of our own catalogue, if it is among those named: processes forked after that need not."""
+    if {"standard", STANDARD} & {part.strip() for part in names.split(",")}:
+        with suppress(ImportError):  # what is missing is said when the catalogue is looked for
+            tuple(CATALOGUE.values())
 
 
 def _one(name: str) -> Mapping[str, ScalarTest]:
