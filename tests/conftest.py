@@ -141,9 +141,14 @@ def in_process(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture
-def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """An empty folder to stand in, the toys importable, and nothing of the environment that commands would listen to."""
+def toys(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The toys beside this file can be imported, by the processes that a test starts as well."""
     monkeypatch.syspath_prepend(str(Path(__file__).parent))
+
+
+@pytest.fixture
+def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, toys: None) -> None:
+    """An empty folder to stand in, the toys importable, and nothing of the environment that commands would listen to."""
     monkeypatch.chdir(tmp_path)
     for name in (
         "TRACKER_DB",
@@ -153,3 +158,10 @@ def desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         "GITHUB_ACTIONS",
     ):
         monkeypatch.delenv(name, raising=False)
+
+
+@pytest.fixture
+def toy_desk(desk: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same with the toy engine and its questions on the table."""
+    monkeypatch.setenv("TRACKER_ENGINE", "toy_engine")
+    monkeypatch.setenv("TRACKER_CATALOGUE", "toy_questions:CATALOGUE")

@@ -197,7 +197,6 @@ USELESS = [damaged, no_database, of_a_later_tracker, of_another_program, with_an
 
 
 def ci(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Result:
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
     monkeypatch.chdir(folder)
     for name in ("TRACKER_DB", "GITHUB_STEP_SUMMARY", "GITHUB_ACTIONS"):
         monkeypatch.delenv(name, raising=False)
@@ -205,7 +204,7 @@ def ci(folder: Path, monkeypatch: pytest.MonkeyPatch) -> Result:
     return CliRunner().invoke(main, ["ci", "night", "--quick", *toys], prog_name="tracker")
 
 
-@pytest.mark.usefixtures("in_process")
+@pytest.mark.usefixtures("in_process", "toys")
 @pytest.mark.parametrize("how", USELESS, ids=lambda how: how.__name__)
 def test_a_database_of_no_use_stops_no_night_whose_history_is_whole(
     how: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

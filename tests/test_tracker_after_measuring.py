@@ -13,14 +13,7 @@ from spook_tracker.tracker.store.database import session_on
 from spook_tracker.tracker.store.history import History
 from tests.test_tracker_cli import tracker
 
-
-@pytest.fixture(autouse=True)
-def _desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_process: None) -> None:
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("TRACKER_ENGINE", "toy_engine")
-    monkeypatch.setenv("TRACKER_CATALOGUE", "toy_questions:CATALOGUE")
-    monkeypatch.delenv("TRACKER_DB", raising=False)
+pytestmark = pytest.mark.usefixtures("toy_desk", "in_process")
 
 
 def runs() -> int:

@@ -40,15 +40,7 @@ COMMANDS = [
 ]  # the contract
 
 
-@pytest.fixture(autouse=True)
-def _desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_process: None) -> None:
-    """A folder of one's own, with the toy engine on the table."""
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("TRACKER_ENGINE", "toy_engine")
-    monkeypatch.setenv("TRACKER_CATALOGUE", "toy_questions:CATALOGUE")
-    monkeypatch.setenv("COLUMNS", "120")
-    monkeypatch.delenv("TRACKER_DB", raising=False)
+pytestmark = pytest.mark.usefixtures("toy_desk", "in_process")
 
 
 def tracker(*arguments: str) -> Result:

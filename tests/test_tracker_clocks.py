@@ -21,14 +21,8 @@ DATABASE = "sqlite:///tracker.db"
 
 
 @pytest.fixture(autouse=True)
-def _desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_process: None) -> None:
-    monkeypatch.syspath_prepend(str(HERE))
-    monkeypatch.chdir(tmp_path)
-    for name in ("TRACKER_DB", "GITHUB_ACTIONS"):
-        monkeypatch.delenv(name, raising=False)
+def _desk(monkeypatch: pytest.MonkeyPatch, toy_desk: None, in_process: None) -> None:
     monkeypatch.setenv("GITHUB_STEP_SUMMARY", "summary.md")
-    monkeypatch.setenv("TRACKER_ENGINE", "toy_engine")
-    monkeypatch.setenv("TRACKER_CATALOGUE", "toy_questions:CATALOGUE")
 
 
 def tracker(*arguments: str) -> Result:

@@ -26,12 +26,8 @@ SOURCE = Questions(catalogue="toy_stuck:CATALOGUE", engine="toy_engine")
 
 
 @pytest.fixture(autouse=True)
-def _desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.setenv("TRACKER_ENGINE", "toy_engine")
+def _desk(monkeypatch: pytest.MonkeyPatch, toy_desk: None) -> None:
     monkeypatch.setenv("TRACKER_CATALOGUE", "toy_stuck:CATALOGUE")
-    monkeypatch.delenv("TRACKER_DB", raising=False)
 
 
 def time_of_processor(pids: set[int]) -> float:

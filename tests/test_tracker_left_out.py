@@ -17,9 +17,7 @@ TOY = ("--workers", "0", "--catalogue", "toy_questions:CATALOGUE")
 
 
 @pytest.fixture
-def tracker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, in_process: None) -> Any:
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(str(HERE))
+def tracker(desk: None, in_process: None) -> Any:
     return lambda *arguments: CliRunner().invoke(main, [*arguments, "--db", "sqlite:///tracker.db"])
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from functools import cache
-from pathlib import Path
 
 import pytest
 from click import unstyle
@@ -30,9 +29,7 @@ REACHED = "fall/{}/ladder:end-error:time-to-error"
 HERE = 0.05  # s, the time step at which it fails
 
 
-@pytest.fixture(autouse=True)
-def _toys(monkeypatch: pytest.MonkeyPatch, in_process: None) -> None:
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+pytestmark = pytest.mark.usefixtures("toys", "in_process")
 
 
 def failing(patch: pytest.MonkeyPatch, fault: str, step: float = HERE) -> None:

@@ -39,14 +39,7 @@ WRONG = {
 READABLE = {"text that is none": "dataclasses.replace(result, state_hash='\\ud800x')", "an answer": "result"}
 
 
-@pytest.fixture
-def _desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(HERE))
-    monkeypatch.chdir(tmp_path)
-    monkeypatch.delenv("TRACKER_DB", raising=False)
-
-
-@pytest.mark.usefixtures("_desk")
+@pytest.mark.usefixtures("desk")
 def test_an_answer_of_the_wrong_form_costs_its_own_sample_and_text_that_can_be_made_readable_none() -> None:
     """All of them in one run, each to a question of its own."""
     answers = WRONG | READABLE

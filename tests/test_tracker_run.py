@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from pathlib import Path
 
 import pytest
 
@@ -17,9 +16,7 @@ from spook_tracker.tracker.measure.run import Questions, Request, RunError, ci_a
 SOURCE = Questions(catalogue="toy_questions:CATALOGUE", engine="toy_engine")
 
 
-@pytest.fixture(autouse=True)
-def _toys(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+pytestmark = pytest.mark.usefixtures("toys")
 
 
 def alone(**options) -> RunDocument:
@@ -162,8 +159,7 @@ def test_a_failed_rung_is_a_point_of_its_own_class(monkeypatch):
     assert samples["fall/plain/ladder:end-error:time-to-error"].value == math.inf
 
 
-def test_rungs_finer_than_one_that_ran_out_of_time_are_not_tried_and_say_so(monkeypatch):
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+def test_rungs_finer_than_one_that_ran_out_of_time_are_not_tried_and_say_so():
     from toy_questions import CATALOGUE
 
     ladder, asked = CATALOGUE["fall"].ladders[0], []

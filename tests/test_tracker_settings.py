@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gc
 import re
-import sys
 import traceback
 from pathlib import Path
 
@@ -25,12 +24,7 @@ from spook_tracker.tracker.measure.run import Questions
 TOY = 'engine = "toy_engine"\ncatalogue = "toy_questions"\n'
 
 
-@pytest.fixture(autouse=True)
-def _desk(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys, "path", [str(Path(__file__).parent), *sys.path])
-    monkeypatch.chdir(tmp_path)
-    for name in ("TRACKER_ENGINE", "TRACKER_CATALOGUE", "TRACKER_DB"):
-        monkeypatch.delenv(name, raising=False)
+pytestmark = pytest.mark.usefixtures("desk")
 
 
 def tracker(*words: str) -> Result:
