@@ -1,4 +1,5 @@
-"""What does a smooth arm cost to an error, beside MuJoCo's Runge-Kutta in the same run? Exit code 1 where it is dearer.
+"""What does a smooth arm cost to an error, beside MuJoCo's Runge-Kutta in the same run? Exit code 1 where it is dearer,
+2 without MuJoCo.
 
     python bench/arms.py [--rounds 5]
 
@@ -167,6 +168,11 @@ def main() -> int:
     )
     parser.add_argument("--rounds", type=int, default=5)
     rounds = parser.parse_args().rounds
+    try:
+        find.find("mujoco")
+    except find.EngineMissing as missing:
+        print(missing, file=sys.stderr)
+        return 2
     dearer = 0
     for name, scene, last in (
         ("arm of six hinges", arm(), "l5"),
@@ -179,7 +185,9 @@ def main() -> int:
                     f"{name:18s} to {target:g} m  {way:23s} {1e3 * seconds:8.3f} ms, {at} (error {error:.1e} m)",
                     flush=True,
                 )
-            ours = min(seconds for way, (seconds, _, _) in found.items() if way != "mujoco rk4")
+            ours = min(
+                (seconds for way, (seconds, _, _) in found.items() if way != "mujoco rk4"), default=math.inf
+            )
             dearer += "mujoco rk4" in found and ours > found["mujoco rk4"][0]
     return 1 if dearer else 0
 

@@ -53,6 +53,7 @@ def _chain(facts: Columns) -> bool:
         and math.isinf(facts[0]["drake (rk3)"])
         and facts[1]["exudyn (generalised-alpha)"] > 0.5
         and 0.55 < facts[0]["simbody (held-step)"] < 0.65
+        and facts[1]["simbody (held-step)"] < 0.5
     )
 
 

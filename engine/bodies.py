@@ -46,6 +46,15 @@ class PairFriction:
     torsional_friction: float = 0.0  # m
 
     def __post_init__(self) -> None:
+        pair = self.between
+        if (
+            isinstance(pair, str)
+            or not isinstance(pair, Sequence)
+            or len(pair) != 2
+            or not all(isinstance(name, str) for name in pair)
+        ):
+            raise SceneError(f"pair friction: {pair!r} is not a pair of names")
+        object.__setattr__(self, "between", tuple(pair))
         one, two = self.between
         if one == two:
             raise SceneError(f"pair friction: {one!r} does not rub on itself; name two bodies")

@@ -56,7 +56,7 @@ def check_trees(scene: Scene, method: Method) -> None:
             f"method: runge_kutta moves up to {MOST_IN_TREES} bodies, not {moving}; use composition='order8'"
         )
     for body in scene.bodies:
-        if isinstance(body, RigidBody) and body.follows_time:
+        if isinstance(body, RigidBody) and body.motion == "kinematic":
             raise MethodError(
                 f"method: runge_kutta takes loads and springs in time, but {body.name!r} moves as it is told; use "
                 f"half_step_velocities"
@@ -91,6 +91,12 @@ def check_trees(scene: Scene, method: Method) -> None:
         first, second = sorted(roots, key=lambda name: name == WORLD)
         tree[first] = second
         _check_held(row, 0.0, "runge_kutta")
+        spring = row.spring if isinstance(row, AxialJoint) else None
+        if spring is not None and spring.damping and not isinstance(spring.rest, float):
+            raise MethodError(
+                f"method: runge_kutta does not know how fast the rest of {row.name!r} moves, which its damping opposes; "
+                f"leave the damping out or use half_step_velocities"
+            )
 
 
 def check_wide_rows(scene: Scene, method: Method) -> None:

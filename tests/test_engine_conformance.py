@@ -65,6 +65,8 @@ def engine(asked: Asked) -> Callable[..., Any]:
     try:
         found = find(asked[0])
     except EngineMissing as missing:
+        if "is not installed" not in str(missing):
+            raise
         pytest.skip(str(missing))
     return functools.partial(found.simulate, configuration=asked[1]) if asked[1] else found.simulate
 
@@ -230,7 +232,7 @@ UNSEEN = 0.5 * 0.2 * G * 2.0 * (2.0 + STEP)  # m, of a cube pulled by .7 of its 
     {
         DART: (1e-5, pytest.approx(UNSEEN, rel=1e-4)),  # friction on a box, solved exactly
         BULLET: (4e-3, pytest.approx(0.4 * G, rel=0.1)),  # few points: it creeps, and tilts where it slides
-        SAP: (1e-3, pytest.approx(0.4 * G, rel=0.03)),
+        SAP: (1e-3, pytest.approx(0.4 * G, rel=0.01)),
         JOLT: (1e-6, pytest.approx(0.4 * G, rel=0.02)),
         RAPIER_MANY: (1e-3, pytest.approx(0.4 * G, rel=2e-3)),
         MERSON: (2e-4, pytest.approx(0.4 * G, rel=0.01)),  # springs that stick: it yields

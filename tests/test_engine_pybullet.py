@@ -30,7 +30,6 @@ pytest.importorskip(
     "pybullet", reason="the extra pybullet is not installed: pip install 'spook-tracker[pybullet]'"
 )
 STEP = 1.0 / 60.0  # s
-BOTH = ("joints", "constraints")
 
 
 def run(configuration: str) -> Any:

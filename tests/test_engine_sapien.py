@@ -22,7 +22,6 @@ from spook_tracker.engine.protocol import NotSupported
 from tests import peer_scenes
 
 pytest.importorskip("sapien", reason="the extra sapien is not installed: pip install 'spook-tracker[sapien]'")
-BOTH = ("tgs", "pgs")
 
 
 def run(configuration: str) -> Any:

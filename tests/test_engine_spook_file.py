@@ -303,6 +303,7 @@ RUBBING = {
     "neither's": ('condim="1"', 'condim="1"', "", 0.0),
     "of higher priority": ('priority="1"', "", "", 0.1),
     "of higher priority, with its condim": ("", 'condim="1" priority="2"', "", 0.0),
+    "of a pair that says nothing: one": ("", "", '<pair geom1="floor" geom2="box"/>', 1.0),
     "of their pair": ("", "", '<pair geom1="floor" geom2="box" friction=".15 .15 0 0 0"/>', 0.15),
     "of their pair, whatever their bits": (
         'contype="0"',
@@ -325,7 +326,7 @@ def test_two_surfaces_rub_as_mujoco_has_it(of: str, tmp_path: Path) -> None:
     )
     ours, theirs, apart = _both(_model(tmp_path, text), 1.0)
 
-    assert ours["position"][-1, 0, 0] == pytest.approx(0.5 * (3.0 - 9.81 * friction), abs=2e-3)
+    assert ours["position"][-1, 0, 0] == pytest.approx(0.5 * max(0.0, 3.0 - 9.81 * friction), abs=2e-3)
     assert apart < 0.01  # their contacts are soft
     assert theirs.completed
 

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 import pytest
 
-from spook_tracker.engine import PLAIN, simulate
+from spook_tracker.engine import PLAIN, Method, simulate
 from spook_tracker.scalar_tests.case import Configuration, Ladder, Simulate, Unobserved
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.document.order import in_range, observed_order
@@ -112,7 +112,8 @@ def test_running_and_measuring_simulate_the_same(name: str) -> None:
                 assert len(set(timed)) == 1
 
 
-def test_what_is_timed_is_what_the_error_simulates_with_nothing_observed() -> None:
+@pytest.mark.parametrize("method", [PLAIN, Method(half_step_velocities=True)], ids=["plain", "half-step"])
+def test_what_is_timed_is_what_the_error_simulates_with_nothing_observed(method: Method) -> None:
     ladder = CATALOGUE["falling_object"].ladders[0]
     asked: list[dict[str, Any]] = []
 
@@ -120,11 +121,11 @@ def test_what_is_timed_is_what_the_error_simulates_with_nothing_observed() -> No
         asked.append(how)
         return simulate(scene, **how)
 
-    measured, timed = (call(engine, 0.1, PLAIN) for call in (ladder.error, ladder.run))
+    measured, timed = (call(engine, 0.1, method) for call in (ladder.error, ladder.run))
     with_observables, without = asked
 
     assert isinstance(measured, float) and timed.completed and timed.observables == {}
-    assert with_observables.pop("observe") and with_observables == without
+    assert with_observables.pop("observe") and with_observables == without and without["method"] == method
     assert ladder.run == Unobserved(ladder.error) != Unobserved(simulate)  # equal runs share their times
 
 

@@ -70,6 +70,18 @@ def test_without_valgrind_it_says_what_to_install(monkeypatch: pytest.MonkeyPatc
         callgrind.count_instructions("spook", "standard", "pendulum", 10)
 
 
+def test_the_engine_that_was_told_is_looked_for(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A valgrind that counts nothing: what it is given to run, runs."""
+    (fake := tmp_path / "valgrind").write_text('#!/bin/sh\nshift 2\nexec "$@"\n')
+    fake.chmod(0o755)
+    monkeypatch.setattr(shutil, "which", lambda name: str(fake))
+
+    with pytest.raises(
+        TrackerError, match=r"pendulum cannot be counted: .*there is no engine 'no_such_engine'"
+    ):
+        callgrind.count_instructions("no_such_engine", "standard", "pendulum", 10)
+
+
 @pytest.mark.skipif(shutil.which("valgrind") is None, reason="no valgrind here")
 def test_what_goes_wrong_under_valgrind_is_said(tmp_path: Path) -> None:
     """It goes wrong where NumPy would be imported, which takes eight seconds under valgrind."""

@@ -39,7 +39,7 @@ def ended(
 
 
 def sends(signal: str, to: str) -> str:
-    return f"import os, signal, time\nos.{to}, signal.{signal})\ntime.sleep(0.5)\n"
+    return f"import os, signal, time\nos.{to}, signal.{signal})\ntime.sleep(2)\n"
 
 
 @pytest.mark.parametrize(

@@ -253,7 +253,8 @@ def serve() -> None:
     if what == "run" and request.workers and request.executor == PROCESS:
         if not request.tests:
             import_ours(source.catalogue)
-        workers.fork_ahead()  # nothing of a team's own is imported yet
+        with suppress(OSError):  # then the first worker is spawned as all others are
+            workers.fork_ahead()  # nothing of a team's own is imported yet
 
     def tell(news: News) -> None:
         if isinstance(news, Done):

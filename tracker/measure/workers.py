@@ -179,8 +179,8 @@ _ahead: list[_Process] = []  # forked before there was work for them
 
 
 def fork_ahead() -> None:
-    """Fork the first worker of this process' next `answers`, where that is safe: before anything but our own modules is
-    imported. Those it need not import once more; engines and questions it imports itself, as a spawned one does."""
+    """Fork the first worker of this process' next `answers`, where that is safe: before anything of a team's own is
+    imported. What is ours, and NumPy, it need not import once more; engines and questions it imports itself, as a spawned one does."""
     if sys.platform == "linux":
         _ahead.append(_Process(forked=True))
 
@@ -236,7 +236,7 @@ def _answer(
 
 
 def _close_all_but(ours: set[int]) -> None:
-    """What a new program would not have, a forked one must not keep: the channel that tells a run, others' lifelines."""
+    """What a new program would not have, no worker may keep: the channel that tells a run, others' lifelines."""
     for number in map(int, os.listdir("/dev/fd")) if os.name == "posix" else ():  # noqa: PTH208 - numbers, not paths
         with suppress(OSError):
             if number not in ours and not os.get_inheritable(number):

@@ -108,6 +108,18 @@ void ArticulatedTree::take(const JointTree& tree, std::span<const BodyConstants>
     along_.assign(coordinates_, {});
 }
 
+void ArticulatedTree::count(std::span<const int> joints) noexcept {
+    for (Link& link : links_)
+        link.counted = link.turns + link.slides == 1 &&
+                       std::find(joints.begin(), joints.end(), link.joint) != joints.end();
+}
+
+int ArticulatedTree::body_of(std::size_t coordinate) const noexcept {
+    const auto after = std::upper_bound(links_.begin(), links_.end(), coordinate,
+                                        [](std::size_t at, const Link& link) { return at < link.first; });
+    return after[-1].body;
+}
+
 void ArticulatedTree::begin(const LargeArray<BodyState>& bodies, JointSet& joints, double* rates) noexcept {
     static const BodyState world;
     for (std::size_t k = 0; k < links_.size(); ++k) {
@@ -156,7 +168,7 @@ void ArticulatedTree::begin(const LargeArray<BodyState>& bodies, JointSet& joint
         }
         // What a joint of the world has slid moves the point that screws are about: lengths are those of the tree.
         chart.offset = link.carrier == 0 ? Vec3{} : link.carrier_arm + chart.slid;
-        if (link.spring >= 0) {
+        if (link.spring >= 0 || link.counted) {
             double& angle = joints.states[link.joint].angle;
             chart.coordinate = angle = joints.coordinate(link.joint, bodies);
         }
@@ -380,6 +392,8 @@ void ArticulatedTree::place(const double* moved, const double* rates, LargeArray
                      cross(s.angular_velocity, carried(s.turn_less_one, link.arm));
         if (link.carrier == 0)
             s.velocity = speed - cross(s.angular_velocity, carried(s.turn_less_one, link.arm));
+        if (link.counted)
+            joints.states[link.joint].angle = chart.coordinate + (link.backwards ? -at[0] : at[0]);
         if (link.armature > 0.0) joints.states[link.joint].rotor = link.backwards ? -goes[0] : goes[0];
         if (link.particle) continue;
         const Vec3 w = s.angular_velocity;

@@ -18,6 +18,8 @@ class ArticulatedTree {
 public:
     void take(const JointTree& tree, std::span<const BodyConstants> constants, const JointSet& joints);
     std::size_t coordinates() const noexcept { return coordinates_; }
+    /// Joints whose turns are counted, by what they move: no step is too long for that.
+    void count(std::span<const int> joints) noexcept;
 
     /// The chart of a step from where the bodies are; how fast the coordinates go there, rad/s or m/s, into `rates`.
     void begin(const LargeArray<BodyState>& bodies, JointSet& joints, double* rates) noexcept;
@@ -32,6 +34,7 @@ public:
                const LargeArray<BodyConstants>& constants, JointStates& joints) noexcept;
     /// What a coordinate is measured in: 1 rad, or the size of its joint [m].
     double extent(std::size_t coordinate) const noexcept { return extents_[coordinate]; }
+    int body_of(std::size_t coordinate) const noexcept;
 
 private:
     struct
@@ -48,7 +51,7 @@ private:
         int carrier = 0;  // among poses_: 0 is the world
         int turns = 0, slides = 0;
         std::size_t first = 0;  // of its coordinates: turns before slides
-        bool backwards = false, particle = false;
+        bool backwards = false, particle = false, counted = false;
         double mass = 0.0, armature = 0.0;
         double inertia[6] = {};  // at the start of the run, world axes
         Vec3 carrier_arm, arm;   // from the centres to the joint, at the start of the run
@@ -62,7 +65,7 @@ private:
             turned_along;  // by a turn of the hinge: sine and 1 − cosine of it take the latter
         Vec3 offset;       // to the joint from the carrier's centre, in the latter's axes
         Vec3 slid;
-        double coordinate = 0.0;  // of a spring
+        double coordinate = 0.0;  // of a spring, or where turns are counted
     };
     struct Pose {
         Mat3 axes;

@@ -100,6 +100,7 @@ public:
     /// Counts the turns of tracked hinges after every step, whose rates tell how many there were.
     void follow(std::span<const BodyState> bodies) noexcept;
     bool follows() const noexcept { return !followed_.empty(); }
+    std::span<const int> followed() const noexcept { return followed_; }
     /// After a solve: a joint whose own rows carried more than its strength holds nothing from the next step on.
     void break_overloaded(int joint, std::int64_t step);
     /// Blocks that have a rotor, see rotors.hpp.

@@ -28,6 +28,8 @@ private:
     double first_guess() noexcept;
     void find_stage(int stage, double time);
     void stages(double time, double h);
+    double fastest() const noexcept;
+    bool is_a_jump() const noexcept;
     double error(double h) noexcept;
     void lose() noexcept;
 
@@ -39,6 +41,7 @@ private:
     ArticulatedTree tree_;
     // Coordinates, then their rates; per stage, how both change:
     std::vector<double> start_, there_, changes_;
+    std::size_t worst_ = 0;  // the coordinate with the largest error
 };
 
 }  // namespace spook
