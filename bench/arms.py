@@ -38,9 +38,8 @@ TARGETS = (1e-3, 1e-6, 1e-9)  # m
 STEPS = (16, 24, 32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024, 2048, 4096)  # a second
 TOLERANCES = tuple(10.0 ** (-k / 2) for k in range(4, 27))
 LONGER = 9
-Way = Callable[
-    [float], tuple[float, float, float]
-]  # of a step or tolerance: error [m], processor time [s] and what of it is no step's
+# Of a step or tolerance: error [m], processor time [s] and what of it is no step's.
+Way = Callable[[float], tuple[float, float, float]]
 
 
 def link(name: str, a: Sequence[float], b: Sequence[float], mass: float) -> RigidBody:

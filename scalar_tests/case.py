@@ -259,18 +259,13 @@ class Unobserved:
         raise ValueError("this error simulates nothing, so there is nothing to time: give its ladder a `run`")
 
 
-def _of_the_error(simulate: Simulate, time_step: float, method: Method) -> Result:
-    """Stands for `Unobserved(error)` where a ladder names no other run."""
-    raise NotImplementedError
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Ladder:
     """Error against run time: time steps from coarse to fine, run in each configuration.
 
-    `error(simulate, time_step, method)` measures; `run(simulate, time_step, method)` is what is timed, the same
-    simulation with nothing observed. It is found by itself, and given where the error works long before it simulates,
-    or shared: ladders with equal runs share their times.
+    `error(simulate, time_step, method)` measures; what is timed is the same simulation with nothing observed. That is
+    found by itself; a `run(simulate, time_step, method)` is given where the error works long before it simulates, or
+    to be shared: ladders with equal runs share their times.
     """
 
     name: str
@@ -279,16 +274,17 @@ class Ladder:
     time_steps: tuple[float, ...]  # s, coarse to fine
     configurations: tuple[Configuration, ...]
     error: Callable[[Simulate, float, Method], float]
-    run: Callable[[Simulate, float, Method], Result] = _of_the_error
+    run: Callable[[Simulate, float, Method], Result] | None = None
     target_error: float | None = None  # for "time to reach a given error", in `unit`
     target_seconds: float | None = None  # for "error reached in a given time", s
     time_tolerance: float = (
         0.0  # relative: a change of run time below is not told; 0 leaves it to the noise, 1 % at least
     )
 
-    def __post_init__(self) -> None:
-        if self.run is _of_the_error:
-            object.__setattr__(self, "run", Unobserved(self.error))
+    @property
+    def timed(self) -> Callable[[Simulate, float, Method], Result]:
+        """What is timed."""
+        return self.run or Unobserved(self.error)
 
     def steps_of(self, configuration: Configuration) -> tuple[float, ...]:
         """Time steps [s] of one configuration, coarse to fine."""

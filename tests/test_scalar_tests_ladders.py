@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, ClassVar
 
 import pytest
@@ -105,7 +106,7 @@ def test_running_and_measuring_simulate_the_same(name: str) -> None:
             def counted(_: Any, time_step: float, timed: list[int] = timed, **how: Any) -> Any:
                 timed.append(how["steps"] if "steps" in how else round(how["duration"] / time_step))
 
-            ladder.run(counted, h, configuration.method)  # takes none of them
+            ladder.timed(counted, h, configuration.method)  # takes none of them
             measured = rung(ladder, h, configuration)
             if not isinstance(measured.error, Exception):
                 assert set(measured.steps) == set(timed), (ladder.name, configuration.name)
@@ -121,12 +122,13 @@ def test_what_is_timed_is_what_the_error_simulates_with_nothing_observed(method:
         asked.append(how)
         return simulate(scene, **how)
 
-    measured, timed = (call(engine, 0.1, method) for call in (ladder.error, ladder.run))
+    measured, timed = (call(engine, 0.1, method) for call in (ladder.error, ladder.timed))
     with_observables, without = asked
 
     assert isinstance(measured, float) and timed.completed and timed.observables == {}
     assert with_observables.pop("observe") and with_observables == without and without["method"] == method
-    assert ladder.run == Unobserved(ladder.error) != Unobserved(simulate)  # equal runs share their times
+    assert ladder.timed == Unobserved(ladder.error) != Unobserved(simulate)  # equal runs share their times
+    assert replace(ladder, error=simulate).timed == Unobserved(simulate)  # not what the error was before
 
 
 def test_an_error_that_simulates_nothing_leaves_nothing_to_time() -> None:

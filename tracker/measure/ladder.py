@@ -165,13 +165,13 @@ Simulated = tuple[Callable[[Simulate, float, Method], Result], float, str]
 def _simulated(ladder: Ladder, place: Place) -> Simulated:
     """What a rung runs."""
     configuration = ladder.configurations[place[2]]
-    return ladder.run, ladder.steps_of(configuration)[place[3]], repr(configuration.method)
+    return ladder.timed, ladder.steps_of(configuration)[place[3]], repr(configuration.method)
 
 
 def _run_of(ladder: Ladder, place: Place) -> Timed:
     configuration = ladder.configurations[place[2]]
     step = ladder.steps_of(configuration)[place[3]]
-    return lambda simulate: ladder.run(simulate, step, configuration.method)
+    return lambda simulate: ladder.timed(simulate, step, configuration.method)
 
 
 def _all_pairs(

@@ -37,9 +37,7 @@ def held_to(tests: Mapping[str, ScalarTest], limits: Limits) -> Mapping[str, Sca
     found = Changed(tests, held)
     for name in found:
         if any(_may_match(pattern, name) for pattern, _ in limits):
-            _ = found[
-                name
-            ]  # now, not when it is asked for: a limit that cannot be applied is refused at the start
+            _ = found[name]  # a limit that cannot be applied is refused now, not when its test is asked
     for pattern, _ in limits:
         if pattern not in used:
             raise LimitError(

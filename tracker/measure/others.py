@@ -107,5 +107,5 @@ def _ladder(ladder: Ladder, one: Configuration) -> Ladder:
         time_steps=ladder.all_steps(),
         configurations=(case.Configuration(name=one.name, method=PLAIN, expected_order=None),),
         error=partial(in_configuration, ladder.error, one.name),
-        run=partial(in_configuration, ladder.run, one.name),
+        run=partial(in_configuration, ladder.timed, one.name),
     )
