@@ -57,8 +57,8 @@ class Method:
                        joint coordinates of trees; a free body is one. Rows, springs and forces as for compositions, and
                        no loop; neither time reversal nor energy is kept beyond the error. The cheapest way to an error
     tolerance          of runge_kutta: a step is taken in parts, each with an estimated error of at most this, in rad or in sizes of
-                       joints, or of the fastest rate; a pulse of a load shorter than a part may lie between its accelerations:
-                       let steps end there; 0: a step is one part, its error of order 8, if no body turns round in it
+                       joints, or of the fastest rate, and ends where a table of loads bends; 0: a step is one part, with an error
+                       of order 8 if loads bend between steps and no body turns round in one
     solver             direct; iterative (projected Gauss-Seidel); an impact
                        among up to 24 contacts that iterations do not settle is solved directly, since what it leaves stays;
                        so are up to 24 joints (and their contacts) that they do not settle, and up to 64 that

@@ -28,6 +28,8 @@ public:
     }
     /// The same, and loads and rests of springs as the time asks for, within a step.
     void find_at(double time);
+    /// When one of these bends next after a time.
+    double next_knot(double time) const noexcept;
     /// Whether they are others within a step.
     bool change_within_steps() const noexcept {
         return !force_.empty() || !load_follows_.empty() || !drives_.empty();

@@ -5,6 +5,9 @@
 // the speed of a motor and the rest of a spring where the step's velocities live: at its end, at mid-step with
 // half_step_velocities; a kinematic body's pace at mid-step, so that its place is second order; a path or an angle gives
 // the velocity that leads to where the step ends.
+#include <algorithm>
+#include <limits>
+
 #include "collision/submerged.hpp"
 #include "rigid/forces.hpp"
 
@@ -86,6 +89,12 @@ void Forces::find_at(double time) {
             joints_.drives().set_moving_rest(drive.index, drive.function.at(time), 0.0, 0.0);
     if (!load_follows_.empty()) find_loads(time);
     find();
+}
+
+double Forces::next_knot(double time) const noexcept {
+    double next = std::numeric_limits<double>::infinity();
+    for (const TimeDrive& drive : drives_) next = std::min(next, drive.function.next_knot(time));
+    return next;
 }
 
 void Forces::find_loads(double time) {

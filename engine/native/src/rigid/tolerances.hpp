@@ -85,9 +85,7 @@ namespace tolerances::tree_runge_kutta {
 inline constexpr double SAFE = 0.9;  // of the length whose error is estimated to be the tolerance
 inline constexpr double SHORTEST = 0.2, LONGEST = 6.0;  // times the length of the part before
 inline constexpr double LITTLE_MORE = 1.01;             // times a part: so much is left for one
-inline constexpr double SMALLEST = 1e-12;               // of a step: no smaller part is tried
-inline constexpr double JUMP =
-    1e-6;  // of the fastest rate: what a smallest part changes where a load jumps, not where it grows
+inline constexpr double SMALLEST = 1e-9;                // of a step: no smaller part is tried
 inline constexpr double RESTING =
     0.01;  // sizes a step: rates are measured by no less, which places cannot tell from rest
 }  // namespace tolerances::tree_runge_kutta

@@ -95,16 +95,6 @@ double TreeRungeKutta::fastest() const noexcept {
     return found;
 }
 
-/// Whether the step from start_ to there_ changes rates by no more than rounding would be worth: then what keeps its error from
-/// falling with its length is a load that jumps, and not one without bounds.
-bool TreeRungeKutta::is_a_jump() const noexcept {
-    const std::size_t n = tree_.coordinates();
-    const double most = JUMP * fastest();
-    for (std::size_t i = 0; i < n; ++i)
-        if (!(std::fabs(there_[n + i] - start_[n + i]) <= most * tree_.extent(i))) return false;
-    return true;
-}
-
 /// What the step from start_ to there_ may be off by, in tolerances.
 double TreeRungeKutta::error(double h) noexcept {
     const std::size_t n = tree_.coordinates();
@@ -147,10 +137,24 @@ void TreeRungeKutta::load() noexcept {
     });
 }
 
+/// Within a tolerance parts end where a load bends: no length is short enough for what jumps inside it, and none would see a pulse
+/// between its accelerations.
 void TreeRungeKutta::step(double time) {
+    const double end = time + model_.h;
+    double knot = model_.method.tolerance > 0.0 ? forces_.next_knot(time) : end;
+    if (!(knot < end)) return go_on(time, model_.h);
+    while (knot < end && live_.lost < 0) {
+        go_on(time, knot - time);
+        time = knot;
+        knot = forces_.next_knot(time);
+    }
+    if (live_.lost < 0 && time < end) go_on(time, end - time);
+}
+
+/// From a time on by `left`, over which loads do not bend.
+void TreeRungeKutta::go_on(double time, double left) {
     const std::size_t n = tree_.coordinates();
     const bool controlled = model_.method.tolerance > 0.0;
-    double left = model_.h;
     while (left > 0.0) {
         tree_.begin(live_.bodies, joints_, start_.data() + n);
         load();
@@ -165,7 +169,8 @@ void TreeRungeKutta::step(double time) {
             stages(time, h);
             if (controlled) {
                 const double off = error(h);
-                const bool fits = off <= 1.0;  // no NaN does
+                // No NaN does. Between knots that are nearer than that, times are rounded.
+                const bool fits = off <= 1.0 || (h <= SMALLEST * model_.h && std::isfinite(off));
                 const double stretch =
                     off > 0.0 ? std::clamp(SAFE / root_of_order(off), SHORTEST, again ? 1.0 : LONGEST)
                               : (off == 0.0 ? LONGEST : SHORTEST);
@@ -174,13 +179,7 @@ void TreeRungeKutta::step(double time) {
                 if (!fits) {
                     again = true;
                     ++live_.halved_steps;
-                    if (live_.part < SMALLEST * model_.h) {
-                        if (!is_a_jump()) return lose();
-                        left = last ? 0.0 : left - h;
-                        time += h;
-                        live_.part = 0.0;  // what follows is another law
-                        break;
-                    }
+                    if (live_.part < SMALLEST * model_.h) return lose();
                     Watch::look();
                     continue;
                 }

@@ -24,12 +24,12 @@ public:
 
 private:
     void step(double time);
+    void go_on(double time, double left);
     void load() noexcept;
     double first_guess() noexcept;
     void find_stage(int stage, double time);
     void stages(double time, double h);
     double fastest() const noexcept;
-    bool is_a_jump() const noexcept;
     double error(double h) noexcept;
     void lose() noexcept;
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 #include <vector>
 
 #include "linear/elementary.hpp"
@@ -26,6 +27,12 @@ struct TimeFunction {
             static_cast<std::size_t>(std::upper_bound(times.begin(), times.end(), time) - times.begin());
         const double part = (time - times[after - 1]) / (times[after] - times[after - 1]);
         return values[after - 1] + part * (values[after] - values[after - 1]);
+    }
+    /// When it bends next after a time; infinity if it does not.
+    double next_knot(double time) const noexcept {
+        const auto after =
+            kind == TimeKind::table ? std::upper_bound(times.begin(), times.end(), time) : times.end();
+        return after == times.end() ? std::numeric_limits<double>::infinity() : *after;
     }
 };
 
