@@ -53,14 +53,17 @@ ContactSurfaces::ContactSurfaces(const std::vector<SurfaceMaterial>& materials,
     }
 }
 
-void ContactSurfaces::rub(PairMaterial& material, const Contact& contact) const noexcept {
+/// As their surfaces combine, but where a friction of the pair's own is given.
+PairMaterial ContactSurfaces::pair_among_given(const Contact& contact) const noexcept {
+    PairMaterial material = combined(of[contact.first], of[contact.second]);
     const std::pair wanted{contact.first, contact.second};  // the lower first
     const auto at = std::lower_bound(pairs.begin(), pairs.end(), wanted,
                                      [](const PairFriction& pair, const std::pair<int, int>& key) {
                                          return std::pair{pair.first, pair.second} < key;
                                      });
-    if (at == pairs.end() || std::pair{at->first, at->second} != wanted) return;
+    if (at == pairs.end() || std::pair{at->first, at->second} != wanted) return material;
     material.friction = at->friction, material.rolling = at->rolling, material.torsional = at->torsional;
+    return material;
 }
 
 }  // namespace spook

@@ -62,12 +62,11 @@ struct ContactSurfaces {
 
     const SurfaceMaterial& operator[](int body) const noexcept { return of[body]; }
     PairMaterial pair(const Contact& contact) const noexcept {
-        PairMaterial found = combined(of[contact.first], of[contact.second]);
-        if (!pairs.empty()) rub(found, contact);
-        return found;
+        if (pairs.empty()) return combined(of[contact.first], of[contact.second]);
+        return pair_among_given(
+            contact);  // apart, so that of the common way only what is asked for is computed
     }
-    /// As the pair does where a friction of its own is given.
-    void rub(PairMaterial& material, const Contact& contact) const noexcept;
+    PairMaterial pair_among_given(const Contact& contact) const noexcept;
     /// Whether a surface of the contact moves along itself.
     bool is_conveyed(const Contact& contact) const noexcept {
         return conveys && (norm(of[contact.first].surface_velocity) > 0.0 ||
