@@ -37,6 +37,7 @@ from spook_tracker.engine.scene import Scene
 
 READS = ("MJCF", "URDF")
 ACCURATE = (  # from the best on: the first that a scene allows
+    Method(runge_kutta="order8", tolerance=1e-11),
     Method(composition="order6"),
     Method(half_step_velocities=True, corrections=2),
     Method(half_step_velocities=True),
