@@ -73,7 +73,8 @@ class ModelRun:
     (S, B, 4), both from the world; speed (B,) m/s of the end, size () m of what moves,
     energy (S, 2) J, potential and kinetic, where an engine tells it, violation (S,) of equality constraints and joint
     limits in m or rad, and of the last state overlap () m, load () N carried by contacts with what does not move over the weight of what moves. With
-    `until_settled` the run ends early: settled () is the time [s] it did, NaN if it did not, and creep (B,) m/s. With
+    `until_settled` the run ends early, but not before the last sample: settled () is since when [s] it has been calm, NaN if it
+    moves, and creep (B,) m/s. With
     `timed`: load_seconds, step_seconds and worst_step_seconds, real_time_factor, megabytes. With `shown`, of the bodies N that
     are seen body_place (S, N, 3) m and body_turn (S, N, 4), and of their shapes G at the start shape_kind (G,), a place in
     SHOWN_AS, shape_size (G, W) m, NaN beyond its numbers, shape_body (G,), a place among N, shape_fixed (G,), shape_place

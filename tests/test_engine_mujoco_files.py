@@ -26,6 +26,7 @@ from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result, SimulationFailed
 from spook_tracker.scalar_tests.model_file import books, cost, ladder, motion, rest
 from spook_tracker.scalar_tests.model_file.facts import Asked, turns
+from spook_tracker.tracker.measure import remembered
 from spook_tracker.tracker.measure.model_motion import model_trajectory
 from spook_tracker.tracker.measure.trajectory import values_of
 
@@ -93,6 +94,31 @@ def test_what_never_rests_is_said_to_be_unsettled(tmp_path: Path) -> None:
     assert (len(runs), found["ball.rest_z"].rounding) == (1, math.inf)
 
 
+def test_what_stands_on_its_head_for_a_while_does_not_rest_there(tmp_path: Path) -> None:
+    """It begins slower than what counts as rest, for more than half a second: 1e-5 rad grow to 1e-4 by then. Then it falls."""
+    standing = """<mujoco><worldbody><body name="rod" pos="0 0 1" euler="0 .0006 0"><joint axis="0 1 0" damping="2"/>
+    <geom type="capsule" fromto="0 0 0 0 0 1" size=".02" mass="1"/></body></worldbody></mujoco>"""
+    found = rest.measure(Asked(model=_model(tmp_path, standing), duration=5.0), _simulate())
+
+    assert found["rod.rest_turn"] == pytest.approx(math.pi, abs=1e-3)
+    assert 1.0 < found["settled"] < 10.0
+
+
+def test_motion_and_rest_are_read_off_the_same_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """One as the file has it, four with pushes, one with half the step; the second question makes none of its own."""
+    monkeypatch.setattr(remembered, "WORTH", 0.0)
+    made: list[ModelRun] = []
+    simulate = remembered.Remembered(
+        lambda run, **how: made.append(run) or _simulate()(run, **how), scenes=False
+    )
+    asked = Asked(model=_model(tmp_path, BOX), duration=1.0)
+
+    moved, rests = motion.measure(asked, simulate), rest.measure(asked, simulate)
+
+    assert [run.seed for run in made] == [0, 1, 2, 3, 4, 0]
+    assert 0.75 - rests["box.rest_z"] == pytest.approx(moved["box.place@1s"], abs=1e-9)
+
+
 def test_the_step_error_of_a_fall_is_half_its_error(tmp_path: Path) -> None:
     found = motion.measure(Asked(model=_model(tmp_path, FALL), duration=1.0), _simulate())
     place = found["ball.place@1s"]
@@ -110,13 +136,24 @@ def test_a_double_pendulum_can_be_predicted_for_some_time_only(tmp_path: Path) -
     class Longer(Asked):
         checkpoints = (1.0, 20.0)
 
-    found = motion.measure(Longer(model=_model(tmp_path, DOUBLE), duration=20.0), _simulate())
+    ends: dict[int, np.ndarray] = {}  # of the lower body, m, by seed
+
+    def seen(run: ModelRun, **how: float) -> Result:
+        result = _simulate()(run, **how)
+        ends[run.seed] = result["position"][-1, 0]
+        return result
+
+    model = _model(tmp_path, DOUBLE)
+    found = motion.measure(Longer(model=model, duration=20.0), seen)
+    start = _run(model, 0.1, samples=(0.0,))["position"][0, 0]
+    drawn = [np.linalg.norm(end - start) for seed, end in ends.items() if seed]
 
     assert 1.0 < found["predictable_time"] < 20.0
     assert found["lower.place@1s"].rounding < 1e-9
     assert math.isinf(found["lower.place@20s"].rounding)
     assert 0.05 < found["lower.mean_place"].rounding < 2.0  # of a distribution: by chance, and by no more
     assert found["lower.mean_place"].unsettled == ""
+    assert len(drawn) == 16 and found["lower.mean_place"] == pytest.approx(np.mean(drawn), rel=1e-12)
 
 
 def test_means_of_chaotic_runs_differ_by_chance_alone_and_a_shift_is_seen() -> None:

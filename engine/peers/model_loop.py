@@ -160,7 +160,7 @@ class LoadedModel(ABC):
         return {}
 
     def result(self, duration: float, load_seconds: float) -> Result:
-        """Run for `duration` [s], or until all is calm, and read what is asked for."""
+        """Run for `duration` [s], or until all is sampled and calm, and read what is asked for."""
         run, total = self.run, round(duration / self.step)
         shapes = self.shapes() if run.shown else {}
         marks = {min(total, round(at / self.step)) for at in run.samples}
@@ -169,7 +169,7 @@ class LoadedModel(ABC):
             every = max(1, round(LOOK / self.step))
             looks |= set(range(every, total, every))
         samples: dict[str, list[Any]] = {"position": [], "orientation": []}
-        calm = _Calm(self.step)
+        calm, last = _Calm(self.step), max(marks, default=0)
         for mark in sorted(marks | looks):
             self.advance(mark)
             if self.failure:
@@ -177,8 +177,10 @@ class LoadedModel(ABC):
             self.read()
             if mark in marks or (mark == total and not marks):
                 self.sample(samples)
-            if run.until_settled and calm.at(mark, self.poses()[0], self.is_calm()):
-                break
+            if run.until_settled and mark in looks:
+                settled = calm.at(mark, self.poses()[0], self.is_calm())
+                if settled and mark >= last:
+                    break
         return self.told(samples, calm, load_seconds, shapes)
 
     def sample(self, samples: dict[str, list[Any]]) -> None:
@@ -300,9 +302,9 @@ class _Calm:
         self.since = (mark if self.since is None else self.since) if calm else None
         while (mark - self.recent[0][0]) * self.step > CALM_FOR + 1e-9:
             self.recent.popleft()
-        if self.since is not None and (mark - self.since) * self.step >= CALM_FOR - 1e-9:
-            self.settled = self.since * self.step
-        return self.settled == self.settled
+        settled = self.since is not None and (mark - self.since) * self.step >= CALM_FOR - 1e-9
+        self.settled = self.since * self.step if settled and self.since is not None else float("nan")
+        return settled
 
     def creep(self, count: int) -> Array:
         """Speed [m/s] of each watched body over the last half second."""

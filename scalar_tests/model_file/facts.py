@@ -45,6 +45,31 @@ def simulated(simulate: Simulate, asked: Asked, duration: float, refined: float 
     return simulate(ModelRun(model=asked.model, **run), time_step=step, duration=duration)  # type: ignore[arg-type]
 
 
+def times_of(asked: Asked) -> tuple[float, ...]:
+    """When [s] the motion is read: at the checkpoints, and often enough to see pushes grow."""
+    end = asked.checkpoints[-1]
+    return tuple(sorted({*asked.checkpoints, *(end * k / GRID for k in range(GRID + 1))}))
+
+
+def watched(asked: Asked, simulate: Simulate, rests: bool = True, refined: float = 1, **push: Any) -> Result:
+    """The model as its file has it, read at all those times; where it `rests` on until it has settled. What is asked of its
+    motion and of its rest is read off the same runs: both ask for them in the same words, and where runs are remembered
+    they are made once."""
+    end = asked.checkpoints[-1]
+    lasts = max(end, LONGEST_REST) if rests else end
+    return simulated(simulate, asked, lasts, refined, samples=times_of(asked), until_settled=rests, **push)
+
+
+def pushed(asked: Asked, simulate: Simulate, run: Result, seed: int) -> Result:
+    """The same with pushes of the last bits in every step; until it has settled where `run` has."""
+    return watched(asked, simulate, settles(run), push=PUSH, seed=seed)
+
+
+def settles(run: Result) -> bool:
+    """Whether a run that was to go on until all rests did not end without."""
+    return math.isfinite(float(run.partial.get("settled", math.nan)))
+
+
 def turns(orientation: Array, start: Array) -> Array:
     """Angles [rad] between unit quaternions (…, 4) and those at the start; of two that differ by a sign none."""
     scalar = np.abs(np.sum(orientation * start, axis=-1))

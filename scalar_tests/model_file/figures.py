@@ -7,20 +7,22 @@ from functools import partial
 import numpy as np
 
 from spook_tracker.scalar_tests.case import Drawing, Figure, Simulate
-from spook_tracker.scalar_tests.model_file.facts import PUSH, UNPREDICTABLE, Asked, apart, simulated
+from spook_tracker.scalar_tests.model_file.facts import (
+    PUSH,
+    UNPREDICTABLE,
+    Asked,
+    apart,
+    pushed,
+    times_of,
+    watched,
+)
 from spook_tracker.scalar_tests.sweep import line
-
-SAMPLES = 201
-
-
-def _times(asked: Asked) -> tuple[float, ...]:
-    return tuple(asked.duration * k / (SAMPLES - 1) for k in range(SAMPLES))
 
 
 def places(asked: Asked, simulate: Simulate) -> Drawing:
     """Distance of each watched body from its start."""
-    times = _times(asked)
-    there = np.asarray(simulated(simulate, asked, asked.duration, samples=times).partial["position"])
+    times = times_of(asked)
+    there = np.asarray(watched(asked, simulate).partial["position"])
     moved = np.linalg.norm(there - there[:1], axis=-1)
     return Drawing(
         curves=tuple(
@@ -33,13 +35,9 @@ def places(asked: Asked, simulate: Simulate) -> Drawing:
 
 def growth(asked: Asked, simulate: Simulate) -> Drawing:
     """Distance between a run and the same with pushes of the last bits, of the body that is furthest off."""
-    times = _times(asked)
-    run, *pushed = (
-        simulated(simulate, asked, asked.duration, samples=times, push=push, seed=seed)
-        for push, seed in ((0.0, 0), (PUSH, 1), (PUSH, 2))
-    )
-    size = float(run["size"])
-    found = [(seed, apart(run, other, size)) for seed, other in enumerate(pushed, start=1)]
+    times, run = times_of(asked), watched(asked, simulate)
+    size = float(run.partial["size"])
+    found = [(seed, apart(run, pushed(asked, simulate, run, seed), size)) for seed in (1, 2)]
     shown = [
         line(f"seed {seed}", times[: len(grown)], np.where(grown > 0.0, grown, np.nan))
         for seed, grown in found

@@ -19,8 +19,12 @@ from spook_tracker.scalar_tests.model_file.facts import (
     Array,
     Asked,
     apart,
+    pushed,
+    settles,
     simulated,
+    times_of,
     turns,
+    watched,
 )
 
 DRAWN_SAMPLES = 240  # of a replay
@@ -76,17 +80,15 @@ def metrics(asked: Asked) -> tuple[Metric, ...]:
 
 def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
     """One run, the same with pushes of the last bits in every step, and one with half the time step."""
-    end = asked.checkpoints[-1]
-    times = sorted({*asked.checkpoints, *(end * k / GRID for k in range(GRID + 1))})
-    run = simulated(simulate, asked, end, samples=tuple(times))
+    end, times = asked.checkpoints[-1], times_of(asked)
+    run = watched(asked, simulate)
+    if not run.completed:  # which may be later than its motion is read
+        run = watched(asked, simulate, rests=False)
     place, turn, size = _read(run), _turned(run), float(run["size"])
-    pushed = [
-        simulated(simulate, asked, end, samples=tuple(times), push=PUSH, seed=seed)
-        for seed in range(1, PUSHED + 1)
-    ]
-    halved = simulated(simulate, asked, end, refined=2, samples=tuple(times))
+    others = [pushed(asked, simulate, run, seed) for seed in range(1, PUSHED + 1)]
+    halved = watched(asked, simulate, settles(run), refined=2)
     grown = np.max(
-        [_grown(run, other, size) for other in pushed], axis=0
+        [_grown(run, other, size) for other in others], axis=0
     )  # of any watched body, at each time, m
     lost = np.flatnonzero(grown > UNPREDICTABLE * size)
     known = times[int(lost[0])] if len(lost) else end
@@ -97,7 +99,7 @@ def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
             for name, values, unit in (("place", place, size), ("turn", turn, 1.0)):
                 read = _read if name == "place" else _turned
                 value = float(values[row, column])
-                moved = max(_apart(read(other), row, column, value) for other in pushed)
+                moved = max(_apart(read(other), row, column, value) for other in others)
                 found[f"{body.label}.{name}@{at:g}s"] = Estimate(
                     value,
                     rounding=math.inf if at >= known and len(lost) else BEYOND * max(moved, PUSH * unit),
@@ -106,11 +108,11 @@ def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
                 )
     chaotic = len(lost) > 0
     if chaotic:  # of the end only a distribution says anything: more of it
-        pushed += [
-            simulated(simulate, asked, end, samples=(end,), push=PUSH, seed=seed)
+        others += [
+            simulated(simulate, asked, end, samples=(0.0, end), push=PUSH, seed=seed)
             for seed in range(PUSHED + 1, DRAWN + 1)
         ]
-    ends = np.array([_read(other)[-1] for other in pushed if other.completed])
+    ends = np.array([_read(other)[-1] for other in others if other.completed])
     for column, body in enumerate(asked.model.watched):
         drawn = ends[:, column] if len(ends) else np.zeros(0)
         found[f"{body.label}.mean_place"] = mean_of(drawn, size, chaotic)

@@ -35,7 +35,12 @@ def test_of(
     may_rest = model.drive.kind in ("zero", "hold") and not model.push
 
     def part(
-        configuration: str, metrics: tuple[Metric, ...], measure: Measure, note: str, held: bool = True
+        configuration: str,
+        metrics: tuple[Metric, ...],
+        measure: Measure,
+        note: str,
+        held: bool = True,
+        with_previous: bool = False,
     ) -> Measurement:
         return Measurement(
             configuration=configuration,
@@ -43,6 +48,7 @@ def test_of(
             metrics=tuple(_held(metric, tolerance if held else 0.0) for metric in metrics),
             measure=partial(measure, asked),
             note=note,
+            with_previous=with_previous,
         )
 
     return ScalarTest(
@@ -79,6 +85,7 @@ def test_of(
                 rest.measure,
                 "as the file has it, until all rests",
                 held=may_rest,
+                with_previous=True,
             ),
             part(
                 "books",

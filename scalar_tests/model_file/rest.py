@@ -14,13 +14,15 @@ from spook_tracker.scalar_tests.model_file.facts import (
     BEYOND,
     LONGEST_REST,
     PUSH,
+    PUSHED,
     Asked,
-    simulated,
+    pushed,
+    settles,
     spread,
     turns,
+    watched,
 )
 
-PUSHED = 3  # runs
 CALM = 0.5  # s of calm that make a rest; creep is measured over it
 READ = {
     "settled": 0.04,
@@ -52,34 +54,24 @@ def metrics(asked: Asked, stands_free: bool) -> tuple[Metric, ...]:
 def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
     """Run until it rests; again with pushes of the last bits, and with half the time step. Of what does not rest nothing more
     is asked: where it is after so long is no rest, and its motion is compared elsewhere."""
-    run = simulated(simulate, asked, LONGEST_REST, samples=(0.0,), until_settled=True)
+    run = watched(asked, simulate)
     values, size = _rest(asked, run), float(run["size"])
     columns = {body.label: k for k, body in enumerate(asked.model.watched)}
-    if not math.isfinite(float(run["settled"])):
-        moves = f"still moves at {float(run['fastest']):.2g} m/s after {LONGEST_REST:g} s"
+    if not settles(run):
+        moves = f"still moves at {float(run['fastest']):.2g} m/s after {run.steps * run.time_step:g} s"
         return {
             name: Estimate(value, rounding=math.inf, scale=size, unsettled=moves)
             for name, value in values.items()
         }
-    pushed = [
-        _rest(
-            asked,
-            simulated(
-                simulate, asked, LONGEST_REST, samples=(0.0,), until_settled=True, push=PUSH, seed=seed
-            ),
-        )
-        for seed in range(1, PUSHED + 1)
-    ]
-    halved = _rest(
-        asked, simulated(simulate, asked, LONGEST_REST, refined=2, samples=(0.0,), until_settled=True)
-    )
+    others = [_rest(asked, pushed(asked, simulate, run, seed)) for seed in range(1, PUSHED + 1)]
+    halved = _rest(asked, watched(asked, simulate, refined=2))
     creep = np.asarray(run["creep"])
     found: dict[str, float] = {}
     for name, value in values.items():
         column = columns.get(name.rpartition(".")[0])
         unit = 1.0 if column is None or name.endswith("turn") else size
         crept = 0.0 if column is None else CALM * float(creep[column]) * (1.0 if unit == size else 2.0 / size)
-        rounded = BEYOND * max(spread(value, [other.get(name, math.nan) for other in pushed]), PUSH * unit)
+        rounded = BEYOND * max(spread(value, [other.get(name, math.nan) for other in others]), PUSH * unit)
         found[name] = Estimate(
             value,
             rounding=max(rounded, crept, READ.get(name, 0.0) * (size if name == "creep" else 1.0)),

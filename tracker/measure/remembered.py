@@ -1,8 +1,8 @@
 """What a test has simulated is not simulated again: equal input gives equal bits.
 
 A measurement and its figure, and ladders that read two errors off one run, ask for the same simulations. Of scenes in our
-engine alone, whose law that is, and of model files the finest runs, which are what others are measured by, in any engine; a
-run that was ended by a clock is asked again.
+engine alone, whose law that is, and of model files, in any engine, what is read at samples: motion, rest and figures are read
+off the same runs. A run that is timed, one of which its last bits alone are asked, and one that a clock ended are made again.
 """
 
 from __future__ import annotations
@@ -42,7 +42,9 @@ class Remembered:
 
     def __call__(self, scene: Scene | ModelRun, **options: Option) -> Result:
         known_again = (
-            self.scenes if isinstance(scene, Scene) else isinstance(scene, ModelRun) and scene.accurate
+            self.scenes
+            if isinstance(scene, Scene)
+            else isinstance(scene, ModelRun) and bool(scene.samples) and not scene.timed
         )
         if not known_again:
             return self.simulate(scene, **options)

@@ -77,7 +77,7 @@ Kind = Literal["measure", "figure", "trajectory", "study", "ladder"]
 
 @dataclass(frozen=True, order=True)
 class Task:
-    """One piece of work: the index says which measurement, figure, study or ladder configuration."""
+    """One piece of work: the index says which measurements, figure, study or ladder configuration."""
 
     position: int
     test: str
@@ -207,7 +207,7 @@ def _tasks(tests: Mapping[str, ScalarTest], request: Request) -> Iterator[Task]:
     position = 0
     for name, test in tests.items():
         wanted: list[tuple[Kind, tuple[int, ...]]] = []
-        wanted += [("measure", (i,)) for i in range(len(test.measurements))]
+        wanted += [("measure", together) for together in _together(test)]
         if request.figures:
             wanted += [("figure", (i,)) for i in range(len(test.figures))]
         if request.figures or test.seen is not None:
@@ -223,6 +223,17 @@ def _tasks(tests: Mapping[str, ScalarTest], request: Request) -> Iterator[Task]:
         for kind, index in wanted:
             yield Task(position, name, kind, index)
             position += 1
+
+
+def _together(test: ScalarTest) -> list[tuple[int, ...]]:
+    """Measurements that read the same simulations."""
+    found: list[tuple[int, ...]] = []
+    for i, measurement in enumerate(test.measurements):
+        if found and measurement.with_previous:
+            found[-1] += (i,)
+        else:
+            found.append((i,))
+    return found
 
 
 def _test_of(task: Task) -> str:
@@ -244,7 +255,7 @@ def _performed(source: Questions, task: Task) -> Parts:
     simulate = of_test(task.test, simulate, source.module() is ours)
     first = task.index[0]
     if task.kind == "measure":
-        return (measure(task.test, test, test.measurements[first], simulate),)
+        return tuple(measure(task.test, test, test.measurements[i], simulate) for i in task.index)
     if task.kind == "figure":
         return (draw(task.test, test.figures[first], simulate),)
     if task.kind == "trajectory":
@@ -347,9 +358,16 @@ def _lost(task: Task, test: ScalarTest, lost: crew.Lost) -> Parts:
     first = task.index[0]
     outcome = Outcome(None, lost.outcome, lost.failure)
     if task.kind == "measure":
-        measurement = test.measurements[first]
-        series = [(m, metric_series(task.test, test, measurement, m)) for m in measurement.metrics]
-        return (tuple((s, judged_sample(s.key, m, outcome, Witness(gone))) for m, s in series),)
+        return tuple(
+            tuple(
+                (
+                    series := metric_series(task.test, test, one, m),
+                    judged_sample(series.key, m, outcome, Witness(gone)),
+                )
+                for m in one.metrics
+            )
+            for one in (test.measurements[i] for i in task.index)
+        )
     if task.kind == "figure":
         return (draw(task.test, replace(test.figures[first], draw=gone), gone),)
     if task.kind == "trajectory":
