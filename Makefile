@@ -89,7 +89,7 @@ docs: develop
 	$(BIN)/python .ci/manual_pages.py build/man "$$($(BIN)/python -m spook_tracker --version | cut -d, -f1 | cut -d" " -f2)"
 
 crashes: develop
-	SPOOK_CRASH_ROUNDS=200 $(BIN)/pytest -q -n 2 --timeout 7200 tests/test_tracker_crashes.py  # a database each
+	SPOOK_CRASH_ROUNDS=200 $(BIN)/pytest -q -n 2 --timeout 7200 tests/tracker/store/test_crashes.py  # a database each
 
 # Every picture in docs/: of the website of $(DB), and of a red night that is measured once and kept in build/.
 RED := build/red-night
@@ -103,14 +103,14 @@ pictures: develop
 # Every page in every width and theme to axe; `make test` shows it each page in two of the eight.
 looks: develop
 	@! command -v clang++-19 >/dev/null || $(MAKE) --no-print-directory wasm
-	SPOOK_TEST_EVERY_LOOK=1 $(BIN)/pytest -q --timeout 1800 tests/test_site_access.py
+	SPOOK_TEST_EVERY_LOOK=1 $(BIN)/pytest -q --timeout 1800 tests/website/test_access.py
 	@! command -v clang++-19 >/dev/null || $(BIN)/python bench/live_tasks.py
 
 hostile: develop
-	SPOOK_HOSTILE_DOCUMENTS=10000 $(BIN)/pytest -q --timeout 7200 tests/test_tracker_hostile.py tests/test_tracker_damaged.py
+	SPOOK_HOSTILE_DOCUMENTS=10000 $(BIN)/pytest -q --timeout 7200 tests/tracker/store/test_hostile.py tests/tracker/store/test_damaged.py
 
 executors: develop
-	SPOOK_WHOLE_CATALOGUE=yes $(BIN)/pytest -q --timeout 7200 tests/test_tracker_executors.py -k "same_bits"
+	SPOOK_WHOLE_CATALOGUE=yes $(BIN)/pytest -q --timeout 7200 tests/tracker/measure/test_executors.py -k "same_bits"
 
 release:
 	@sh .ci/release --check "$(VERSION)"

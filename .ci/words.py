@@ -36,7 +36,7 @@ PERSONS = re.compile(
 INSTEAD = "it; which; none; no test; any reader; people"
 NATIVE = {".cpp", ".hpp", ".inl"}
 # Not written here: licences, libraries in one line, what a fuzzer found.
-OTHERS = re.compile(r"LICENSE|\.min\.|tests/fuzz/|fuzz/corpus/")
+OTHERS = re.compile(r"LICENSE|\.min\.|tests/fuzz/\w+/|fuzz/corpus/")
 
 
 def said_instead(word: str) -> str:

@@ -277,7 +277,7 @@ def place_of(kind: str, folder: Path) -> Iterator[Place]:
     if kind == "sqlite":
         yield Place(f"sqlite:///{folder}/bench.db")
         return
-    from tests.postgresql import MISSING, binaries, running_server
+    from tests.tracker.store.postgresql import MISSING, binaries, running_server
 
     if (programs := binaries()) is None:
         raise SystemExit(MISSING)

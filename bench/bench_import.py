@@ -2,7 +2,7 @@
 
     python bench/bench_import.py [--nights 1000]
 
-Synthetic runs (`tests/synthetic_history.py`) stand for the nights, 0.3 MB of JSON each, most of it figures. Times are of
+Synthetic runs (`tests/histories/synthetic.py`) stand for the nights, 0.3 MB of JSON each, most of it figures. Times are of
 the processor. Beside the import, between its goes, the same by hand: files read as plain JSON, each sample and each
 definition a row, each figure deflated, one transaction. Ends with 1 where the lesser of the goes is more than MOST times
 the lesser by hand.
@@ -26,7 +26,7 @@ import msgspec
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from spook_tracker.tracker.store.transfer import write_document
-from tests.synthetic_history import decade
+from tests.histories.synthetic import decade
 
 MOST = 2.0  # ×; 1.6 when it was set
 GOES = 2

@@ -2,7 +2,7 @@
 
     python bench/bench_months.py [--nights 365]
 
-Synthetic runs (`tests/synthetic_history.py`, 0.3 MB of JSON each, most of it figures) stand for the nights, one a day;
+Synthetic runs (`tests/histories/synthetic.py`, 0.3 MB of JSON each, most of it figures) stand for the nights, one a day;
 every run time and one value in fifty is another one each night, as those of a real night are.
 Times are of the processor, as `tracker ci night` spends them beside measuring: bringing the files in, with the database
 remembered from the night before (the usual case) and without, and writing the month again with one night more.
@@ -34,7 +34,7 @@ from spook_tracker.tracker.store.database import session_on
 from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.months import export_months, import_months
 from spook_tracker.tracker.store.record import record
-from tests.synthetic_history import decade
+from tests.histories.synthetic import decade
 
 AGAIN = 0.15  # ×; .07 when it was set, and 31 nights of 365 are .085
 REMEMBERED = 0.1  # ×; .04 when it was set

@@ -2,7 +2,7 @@
 
     make bench-publish
 
-Synthetic runs (`tests/synthetic_history.py`) stand for the nights; 51 series with every chart. Then the recorded night
+Synthetic runs (`tests/histories/synthetic.py`) stand for the nights; 51 series with every chart. Then the recorded night
 of ours beside all engines, without replays and the live page, which are more. Ends with 1 where a thousand
 nights take more than 1.5 s of the processor, one more night more than 0.5 s (on another machine as much more as Python
 takes there), a page weighs too much, or the recorded
@@ -26,8 +26,8 @@ from bench.floors import here
 from spook_tracker.tracker.website.options import SiteOptions
 from spook_tracker.tracker.website.publish import publish
 from spook_tracker.tracker.website.recorded import read_files
-from tests.page_weights import before_charts, too_heavy
-from tests.synthetic_history import DocumentHistory, decade
+from tests.histories.synthetic import DocumentHistory, decade
+from tests.website.page_weights import before_charts, too_heavy
 
 REPEATS = 3  # the least counts: others at work on the machine only make it longer
 MOST = (1.5, 0.5)  # s of the processor for a thousand nights, and for one more

@@ -22,7 +22,7 @@ from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from tests.browser import MISSING, browser, programs
+from tests.website.browser import MISSING, browser, programs
 
 STATIC = Path(__file__).parent.parent / "site" / "static"
 BODIES = 10_000

@@ -1,6 +1,6 @@
 """`make detectors`: what the judge of run times finds and what it cries over, beside asv's steps, Otava and ruptures.
 
-Synthetic noise and steps (tests/noise_battery.py), and histories that continuous integration of other projects has
+Synthetic noise and steps (tests/histories/noise.py), and histories that continuous integration of other projects has
 published (tests/data/recorded: each file says whose, at which commit). Alarms are starts of red stretches after
 sixty nights of learning; the other tools see each history whole, which favours them, and a step of theirs counts
 where it is upward, of asv's where it is above 5 %, its own threshold for a regression. Delays are of night after night
@@ -32,7 +32,7 @@ import itertools
 from spook_tracker.tracker.judge.run_times import judge_noisy
 from spook_tracker.tracker.judge.segments import NORMAL
 from spook_tracker.tracker.judge.shifts import RARE
-from tests import noise_battery as battery
+from tests.histories import noise as battery
 
 LEARNING, NIGHTS = 60, 560
 AFTER = 15  # nights looked at after a step
@@ -341,7 +341,7 @@ def main() -> None:
     lines = [
         "# Detectors of slower run times, scored", "",
         "Made by `make detectors`, not by hand; what is counted stands at the head of `bench/detectors.py`,",
-        f"the noise in `tests/noise_battery.py`. {given.series} series of {NIGHTS} nights of each kind.",
+        f"the noise in `tests/histories/noise.py`. {given.series} series of {NIGHTS} nights of each kind.",
         *([f"Beside ours: {others()}."] if len(found) > 1 else []), "",
         *false_alarms(found, range(given.first, given.first + given.series)),
         *steps(found, range(given.first, given.first + 2 * given.series)), *blamed(found, 20 * given.series), *WHAT_CAN_BE.splitlines(), "", *bounds(),

@@ -194,7 +194,7 @@ NEWCOMERS = (
     "a cube of a metre that is pulled by 0.3 of its weight yields by 0.04 mm, and then stays. Boxes on boxes, capsules, cylinders",
     "and restitution (what Hunt and Crossley's gives back depends on the speed) are not supported. OpenSim turns free bodies and",
     "ball joints by three angles: past the place where two of them turn about one axis a held step of 1/60 s loses two thousandths",
-    "of a spin of 3 rad/s (`tests/test_engine_simbody.py`), where Simbody has quaternions, too.",
+    "of a spin of 3 rad/s (`tests/engine/peers/test_simbody.py`), where Simbody has quaternions, too.",
     "",
 )
 NOT_ASKED = (

@@ -17,8 +17,8 @@ from typing import Any
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
 from spook_tracker.tracker.website.publish import publish
-from tests.browser import MISSING, arrive, browser, look, programs, wait_for
-from tests.test_site_causes import nights
+from tests.website.browser import MISSING, arrive, browser, look, programs, wait_for
+from tests.website.test_causes import nights
 
 LONG = 50.0  # ms
 RUNS = 5  # of the scene, each begun by a slider

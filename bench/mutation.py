@@ -20,9 +20,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 JUDGE = "tracker/judge"
 TESTS = (
-    "tests/test_judge_rules.py", "tests/test_judge_detection.py", "tests/test_tracker_verdict.py", "tests/test_tracker_noise.py",
-    "tests/test_tracker_compare.py", "tests/test_tracker_analyse.py", "tests/test_tracker_accepted.py",
-    "tests/test_judge_normal_nights.py", "tests/test_judge_segments.py",
+    "tests/tracker/judge/test_rules.py", "tests/tracker/judge/test_detection.py", "tests/tracker/judge/test_verdict.py", "tests/tracker/judge/test_noise.py",
+    "tests/tracker/judge/test_compare.py", "tests/tracker/judge/test_analyse.py", "tests/tracker/judge/test_accepted.py",
+    "tests/tracker/judge/test_normal_nights.py", "tests/tracker/judge/test_segments.py",
 )  # fmt: skip
 RUN = "import sys; sys.path[:0] = sys.argv[1:3]; import pytest; sys.exit(pytest.main(sys.argv[3:]))"
 

@@ -4,7 +4,7 @@
     python bench/pairs.py --processes 60 --busy 2       so many fresh processes beside two that only compute
     python bench/pairs.py --levels levels.json          those of an earlier call, not measured again
 
-Simulated: models of the noise between processes (tests/process_noise.py), the whole rule as `tracker ci change` applies
+Simulated: models of the noise between processes (tests/histories/process_noise.py), the whole rule as `tracker ci change` applies
 it to one run time. Real: fresh processes of one build of this engine take the run times of a few tests, one process
 after the other, so all differences between them are noise. Each unchanged change is a stretch of them at a random place
 with sides drawn as the rule draws them; a slower one is the same with the times of its change so much longer.
@@ -30,7 +30,7 @@ from spook_tracker.tracker.document.middle import median
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.judge.pairs import BLOCKS, ERROR, SMALLEST
 from spook_tracker.tracker.pairs import run_time_levels
-from tests.process_noise import NOISE, Process, decided
+from tests.histories.process_noise import NOISE, Process, decided
 
 CHANGES = (0.0, 0.02, 0.05, 0.10)
 SPIN = "while True: sum(i * i for i in range(10_000))"
@@ -137,7 +137,7 @@ def main() -> None:
         f"share of unchanged changes that are blocked by {100.0 * ERROR:g} %: the head of `tracker/judge/pairs.py`. A change up to",
         f"{100.0 * SMALLEST:g} % is none; blocks of {', '.join(map(str, BLOCKS))} processes of either side.\n",
         "## Simulated\n",
-        f"{asked.unchanged} unchanged changes each, {asked.changed} of every size (`tests/process_noise.py`).\n",
+        f"{asked.unchanged} unchanged changes each, {asked.changed} of every size (`tests/histories/process_noise.py`).\n",
         *HEAD,
         *(row(name, noise, asked.unchanged, asked.changed) for name, noise in NOISE.items()),
     ]

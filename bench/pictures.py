@@ -16,7 +16,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 
-from tests.browser import photograph
+from tests.website.browser import photograph
 
 DOCS = Path(__file__).parent.parent / "docs"
 GREEN, RED = "green", "red"

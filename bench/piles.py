@@ -4,7 +4,7 @@
 
 Each pile is asked what the nightly's pile of 1000 is asked (`scalar_tests/pile.py`): deepest overlap, load on the
 floor, energy that never rises. What the floor shall carry is found beside it on springs and dashpots
-(`tests/oracle_pile.py`). The ladder of each size runs over sweeps and substeps, that of 1000 over solvers, too; its
+(`tests/oracles/pile.py`). The ladder of each size runs over sweeps and substeps, that of 1000 over solvers, too; its
 errors are overlap and missing load, and each of its rungs must have an answer, a load as of springs, and no rise of the
 energy. Many sweeps must leave less overlap than few, and a direct solve next to none. Run times are CPU seconds per
 step of this process. Exit code 1 if any of it is missed.
@@ -24,7 +24,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from spook_tracker.engine import Method, SimulationFailed, simulate
 from spook_tracker.scalar_tests import pile
-from tests.oracle_pile import missing_loads
+from tests.oracles.pile import missing_loads
 
 SIZES = (1000, 10_000)
 STARTS = 2  # on springs

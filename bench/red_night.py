@@ -28,7 +28,7 @@ import spook_tracker.tracker as tracker
 from spook_tracker.engine.joints import Distance
 from spook_tracker.tracker.document.json_form import decode, encode
 from spook_tracker.tracker.document.run_document import EngineVersion, RunDocument
-from tests.broken_engines import off_by
+from tests.toys.broken_engines import off_by
 
 FIRST = datetime(2026, 11, 15, 3, 17, tzinfo=UTC)
 OLD = ("friction", "slip_angle", "force_ratio", "rolling_sphere")  # tests the friction fault is put to

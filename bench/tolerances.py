@@ -28,9 +28,9 @@ FACTORS = (10.0, 0.1)
 HEAPS = 6  # of bench/same_states.py, of each kind
 SLIDES = 60  # over tiles
 NEAR = {  # by part: the tests beside it
-    "contacts/internal_edges": ("test_engine_tiles",),
-    "contacts/position_projection": ("test_engine_position_projection", "test_engine_overlaps", "test_engine_piles"),
-    "contacts/overlap_search": ("test_engine_position_projection", "test_engine_overlaps", "test_engine_piles"),
+    "contacts/internal_edges": ("engine/collision/test_tiles",),
+    "contacts/position_projection": ("engine/contacts/test_position_projection", "engine/contacts/test_overlaps", "engine/contacts/test_piles"),
+    "contacts/overlap_search": ("engine/contacts/test_position_projection", "engine/contacts/test_overlaps", "engine/contacts/test_piles"),
 }  # fmt: skip
 FROM_ENVIRONMENT = r"""#pragma once
 #include <cmath>
@@ -161,7 +161,7 @@ def run(module: Path, asked: str, *arguments: str) -> tuple[int, str]:
 def red_test(module: Path, asked: str, tests: tuple[str, ...]) -> str:
     """The first test that fails, or nothing."""
     files = [f"tests/{name}.py" for name in tests]
-    code, told = run(module, asked, "-m", "pytest", "-q", "-x", "-p", "tests.watched_core", "-p", "no:cacheprovider", "--no-header", *files)  # fmt: skip
+    code, told = run(module, asked, "-m", "pytest", "-q", "-x", "-p", "tests.engine.watched_core", "-p", "no:cacheprovider", "--no-header", *files)  # fmt: skip
     if code == 0:
         return ""
     found = re.search(r"^FAILED tests/(\S+?)\.py::(\S+)", told, re.MULTILINE)
@@ -173,7 +173,7 @@ def red_test(module: Path, asked: str, tests: tuple[str, ...]) -> str:
 def states(module: Path, asked: str) -> list[str]:
     """What random heaps and slides end in, a line each."""
     program = (
-        "import sys; sys.path.insert(0, 'bench'); import tests.watched_core, same_states, tolerances; "
+        "import sys; sys.path.insert(0, 'bench'); import tests.engine.watched_core, same_states, tolerances; "
         f"same_states.main(['{HEAPS}']); tolerances.slides({SLIDES})"
     )
     return run(module, asked, "-c", program)[1].splitlines()
@@ -182,7 +182,7 @@ def states(module: Path, asked: str) -> list[str]:
 def slides(count: int) -> None:
     """Bodies that slide over tiles in one plane, by every solver: what each ends in."""
     from spook_tracker.engine import Method, Scene, simulate
-    from tests.test_engine_tiles import GRAVITY, SLIDERS, floor, loose, slider_at
+    from tests.engine.collision.test_tiles import GRAVITY, SLIDERS, floor, loose, slider_at
 
     chance = random.Random(0)
     for number in range(count):
@@ -212,7 +212,10 @@ def main(arguments: list[str]) -> int:
     parts, tests = [name for name in arguments if name != "--bits"], ()
     if "--tests" in parts:
         at = parts.index("--tests")
-        parts, tests = parts[:at], tuple(Path(name).stem for name in parts[at + 1 :])
+        parts, tests = (
+            parts[:at],
+            tuple(name.removeprefix("tests/").removesuffix(".py") for name in parts[at + 1 :]),
+        )
     unknown = [part for part in parts if part not in NEAR]
     if unknown and not (bits or tests):
         raise SystemExit(

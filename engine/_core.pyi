@@ -1,4 +1,4 @@
-"""The native module. Kept by hand; tests/test_engine_stub.py holds it to the compiled module."""
+"""The native module. Kept by hand; tests/engine/test_stub.py holds it to the compiled module."""
 
 import builtins
 from collections.abc import Sequence

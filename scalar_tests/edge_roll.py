@@ -42,7 +42,7 @@ DURATION = 0.9  # s
 PUSHED = 0.01  # of the level speed
 KEPT, COARSE = 0.8, 1e-3  # of a rolling ball's spin in flight; s
 # µ at which a ball of SLOW flies off with KEPT of that spin, less and more g COARSE/r: its equations of motion, integrated
-# in tests/test_scalar_tests_contact_breaks.py
+# in tests/scalar_tests/test_contact_breaks.py
 SMOOTHEST = (0.2157, 0.2532)
 
 

@@ -41,7 +41,7 @@ COMPLIANCE, CREEP = 1e-9, 1e-8  # m/N, m/(N s)
 TIME_STEP = 1.0 / 60.0  # s
 DURATION = 0.5  # s
 # Least thickness over the mean radius by limit analysis, of straight voussoirs, and the interval of the thrust over the
-# weight at 1.02 times that: a linear programme in tests/test_scalar_tests_contact_limits.py finds both again.
+# weight at 1.02 times that: a linear programme in tests/scalar_tests/test_contact_limits.py finds both again.
 LEAST = {5: 0.0949796, 9: 0.1015254, 21: 0.1066948}
 THRUST = {5: (0.19794, 0.20065), 9: (0.19650, 0.19920), 21: (0.19653, 0.19943)}
 

@@ -65,7 +65,7 @@ OBSERVE: dict[str, Observable] = {
 }
 
 
-ORACLE = "the method's own discrete solution, tests/oracle_rigid.py: "
+ORACLE = "the method's own discrete solution, tests/oracles/rigid.py: "
 
 
 def _around(value: float) -> tuple[float, float]:

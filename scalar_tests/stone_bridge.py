@@ -48,7 +48,7 @@ CROSSING = 2.0  # s
 SHORT = 0.1  # s, of the ladder's runs
 LESS, MORE = 0.99, 1.01  # of the limit load
 # Limit load over the weight on one stone, and the interval of the thrust over the weight at 0.99 times that; the least
-# limit load of a weight that crosses. Linear programmes in tests/test_scalar_tests_contact_limits.py find them again.
+# limit load of a weight that crosses. Linear programmes in tests/scalar_tests/test_contact_limits.py find them again.
 LIMIT = {1: 0.9777815, 2: 0.7517449, 3: 0.8485011, 4: 1.3156534}
 THRUST = {1: (0.77126, 0.77679), 2: (0.86073, 0.86661), 3: (1.05489, 1.06219)}
 LEAST = LIMIT[2]

@@ -67,7 +67,7 @@ ACROSS = GRAVITY * math.sin(LEAN)  # m/s², gravity across the axis
 PERIOD = 4.0 * math.sqrt(INERTIA / (MASS * ACROSS * LEVER)) * float(ellipk(math.sin(0.5 * START) ** 2))  # s
 
 
-ORACLE = "the method's own discrete solution, tests/oracle_rigid.py: "
+ORACLE = "the method's own discrete solution, tests/oracles/rigid.py: "
 
 
 def _around(value: float) -> tuple[float, float]:

@@ -16,9 +16,10 @@ from sqlalchemy.orm import Session
 from spook_tracker.tracker.cli.console import PIPE_WIDTH
 from spook_tracker.tracker.measure.request import Request
 from spook_tracker.tracker.store.database import open_database
-from tests import postgresql
-from tests.browser import MISSING, browser, new_tab, programs
+from tests.places import TOYS
 from tests.skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401 (hooks)
+from tests.tracker.store import postgresql
+from tests.website.browser import MISSING, browser, new_tab, programs
 
 # A shell starts what runs behind it deaf to the keyboard; what tests start is to hear it.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
@@ -28,10 +29,12 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 os.environ["COLUMNS"] = str(PIPE_WIDTH)
 
 # Minutes of work in few tests: they start first, so that all workers end at about the same time.
-LONG = ("tracker_publish", "scalar_tests_limits", "scalar_tests_answers", "tracker_durability", "tracker_history_machine",
-        "site_browser", "site_access", "release", "packaging", "tracker_publish_history", "judge_detection",
-        "team_workflow", "tracker_executors")  # fmt: skip
-FIRST = [Path(__file__).with_name(f"test_{name}.py") for name in LONG]
+LONG = (
+    "website/test_publish", "scalar_tests/test_limits", "scalar_tests/test_answers", "tracker/store/test_durability",
+    "tracker/store/test_history_machine", "website/test_browser", "website/test_access", "test_release", "test_packaging",
+    "website/test_publish_history", "tracker/judge/test_detection", "team/test_workflow", "tracker/measure/test_executors",
+)  # fmt: skip
+FIRST = [Path(__file__).parent / f"{name}.py" for name in LONG]
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
@@ -135,15 +138,15 @@ def driver(chromium: Any) -> Any:
 @pytest.fixture
 def in_process(monkeypatch: pytest.MonkeyPatch) -> None:
     """Runs that are asked for nothing else are measured in this process: for tests of what comes of their documents. That
-    no engine reaches the process that judges is asked in tests/test_tracker_gates.py and beside it."""
+    no engine reaches the process that judges is asked in tests/tracker/measure/test_gates.py and beside it."""
     monkeypatch.setitem(Request.__init__.__kwdefaults__, "apart", False)
     monkeypatch.setitem(Request.__init__.__kwdefaults__, "workers", 0)
 
 
 @pytest.fixture
 def toys(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The toys beside this file can be imported, by the processes that a test starts as well."""
-    monkeypatch.syspath_prepend(str(Path(__file__).parent))
+    """The toys can be imported as a team's own modules, by the processes that a test starts as well."""
+    monkeypatch.syspath_prepend(str(TOYS))
 
 
 @pytest.fixture

@@ -16,7 +16,8 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[1]
+from tests.places import ROOT
+
 LIST = ROOT / ".ci" / "build-constraints.txt"
 LINE = re.compile(r"([A-Za-z0-9-]+)==([\w.]+)((?: --hash=sha256:[0-9a-f]{64})+)")
 BACKEND = """

@@ -15,9 +15,9 @@ import pytest
 from spook_tracker import engine
 from spook_tracker.engine.observe import Quantity
 from spook_tracker.scalar_tests.catalogue import CATALOGUE, QUESTIONS
+from tests.places import ROOT
 from tests.test_changelog import faults
 
-ROOT = Path(__file__).parent.parent
 PYTHON_FILES = sorted(
     path for package in ("engine", "scalar_tests", "tracker") for path in (ROOT / package).rglob("*.py")
 )
@@ -25,7 +25,7 @@ ROOMS = (
     ".ci/a", ".clang-tidy", ".github/workflows/a.yml", "Makefile", "README.md", "action.yml", "bench/a.py", "docs/how-to/a.md",
     "docs/a.toml", "engine/a.py", "engine/native/a.cmake", "engine/native/src/a.hpp", "engine/peers/a.mjs",
     "examples/a/a.cpp", "examples/a/a.json", "migrations/versions/a.py", "scalar_tests/a/a.py", "site/static/a.css", "site/static/a.js",
-    "site/templates/a.html", "spook_tracker/a.py", "tests/test_a.py", "tracker/judge/a.py",
+    "site/templates/a.html", "spook_tracker/a.py", "tests/a/test_a.py", "tracker/judge/a.py",
 )  # fmt: skip
 
 
@@ -265,7 +265,7 @@ def test_any_and_object_become_rarer_in_the_tracker() -> None:
 def test_what_marks_a_module_is_said_once() -> None:
     """A second `pytestmark` replaces the first: tests that should stand in a folder of their own wrote into this one."""
     twice = [
-        path.name for path in (ROOT / "tests").glob("*.py") if path.read_text().count("\npytestmark = ") > 1
+        path.name for path in (ROOT / "tests").rglob("*.py") if path.read_text().count("\npytestmark = ") > 1
     ]
 
     assert twice == []

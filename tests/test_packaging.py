@@ -24,10 +24,10 @@ import pytest
 
 from spook_tracker.engine import _core
 from tests.installed_wheel import ASKS, THEIRS, ask, lay_out, run
+from tests.places import ROOT
 
 backend = pytest.importorskip("scikit_build_core.build", reason="the build backend is not installed here")
 
-ROOT = Path(__file__).resolve().parents[1]
 REAL = os.environ.get("SPOOK_TEST_REAL_WHEEL") == "1"
 FOLDERS = ("engine", "scalar_tests", "tracker", "migrations", "site")
 SLIM, EVERYTHING = 150, 350  # MB (10⁶ bytes) on the disk: without an extra, and with all of ours

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from spook_tracker.engine.build_info import _version
+from tests.places import ROOT, TOYS
 
-ROOT = Path(__file__).resolve().parents[1]
 WHO = {
     "GIT_AUTHOR_NAME": "Ada Example", "GIT_AUTHOR_EMAIL": "ada@example.org",
     "GIT_COMMITTER_NAME": "Ada Example", "GIT_COMMITTER_EMAIL": "ada@example.org",
@@ -148,7 +148,7 @@ def test_drift_against_a_release_end_to_end(clone: Clone) -> None:
         parents = clone.git("rev-parse", "HEAD^")
         return clone.run(
             sys.executable, "-m", "spook_tracker", "nightly", "--workers", "0", "--db", "history.db", "--out", "public",
-            PYTHONPATH=str(ROOT / "tests"), TRACKER_ENGINE="toy_engine", TRACKER_CATALOGUE="toy_creep:CATALOGUE",
+            PYTHONPATH=str(TOYS), TRACKER_ENGINE="toy_engine", TRACKER_CATALOGUE="toy_creep:CATALOGUE",
             TOY_VERSION=clone.version(), TOY_HASH=clone.git("rev-parse", "HEAD"), TOY_PARENT=parents,
             TOY_TIME=clone.git("log", "-1", "--format=%cI"), TOY_ERROR=repr(error), COLUMNS="160",
         )  # fmt: skip

@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests import skips
+from tests.places import ROOT
 
 TESTS = """
 import pytest
@@ -33,8 +34,7 @@ ALONE = os.environ | {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}  # loading those co
 def test_what_ci_installs_is_never_skipped_there(tmp_path: Path, ci: str, said: str) -> None:
     (tmp_path / "test_some.py").write_text(TESTS)
     command = [sys.executable, "-m", "pytest", "-p", "tests.skips", "-p", "no:cacheprovider", tmp_path]
-    root = Path(__file__).parents[1]
-    done = subprocess.run(command, env=ALONE | {"CI": ci}, cwd=root, capture_output=True, text=True)
+    done = subprocess.run(command, env=ALONE | {"CI": ci}, cwd=ROOT, capture_output=True, text=True)
 
     assert said in done.stdout
     assert ("skipped where nothing may be missing: " in done.stdout) == bool(ci)
@@ -43,8 +43,7 @@ def test_what_ci_installs_is_never_skipped_there(tmp_path: Path, ci: str, said: 
 def test_a_file_that_cannot_even_be_read_for_want_of_something_fails_too(tmp_path: Path) -> None:
     (tmp_path / "test_some.py").write_text("import pytest\npytest.importorskip('no_such_module')\n")
     command = [sys.executable, "-m", "pytest", "-p", "tests.skips", "-p", "no:cacheprovider", tmp_path]
-    root = Path(__file__).parents[1]
-    done = subprocess.run(command, env=ALONE | {"CI": "true"}, cwd=root, capture_output=True, text=True)
+    done = subprocess.run(command, env=ALONE | {"CI": "true"}, cwd=ROOT, capture_output=True, text=True)
 
     assert "1 error" in done.stdout
 

@@ -29,7 +29,7 @@ MEASUREMENTS = (
                 limit_source="thesis, section 4.2; it would catch a weight off by 0.02 %, and nothing less",
                 limit_kind="physical",
                 set_point=(-5e-7, 5e-7),
-                set_point_source="4.32e-7 % in the first step, as tests/oracle_rigid.py has it, rounding from then on",
+                set_point_source="4.32e-7 % in the first step, as tests/oracles/rigid.py has it, rounding from then on",
                 reference=0.0,
                 tolerance=1e-11,
             ),

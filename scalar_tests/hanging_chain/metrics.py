@@ -18,7 +18,7 @@ from spook_tracker.scalar_tests.hanging_chain.scene import BELOW_BREAK, HEAVY, L
 
 LINEAR_MAP = "the powers of the map of small motion, with h² T/(4 l) and its damping on the masses: "
 
-ORACLE = "the method's own discrete solution, tests/oracle.py: "
+ORACLE = "the method's own discrete solution, tests/oracles/particles.py: "
 
 
 def _near(value: float) -> tuple[float, float]:

@@ -266,7 +266,7 @@ TEST = ScalarTest(
             unit="s",
             expected=(0.997 * LONGEST, LONGEST),
             expected_source="213 steps keep it and 212 do not: the same rows in the mechanism's plane, stepped by the prototype "
-            "tests/oracle_squeezer.py; to the resolution of the search",
+            "tests/oracles/squeezer.py; to the resolution of the search",
         ),
         unbroken(
             scales,

@@ -52,7 +52,7 @@ def _around(value: float, relative: float) -> tuple[float, float]:
     return (value * (1.0 - relative), value * (1.0 + relative))
 
 
-PROTOTYPE = "the method's own discrete solution: the prototype tests/oracle_chain.py, written from the equations alone"
+PROTOTYPE = "the method's own discrete solution: the prototype tests/oracles/chain.py, written from the equations alone"
 
 
 def _energy_at_10_s(limit: float, source: str) -> Metric:
@@ -71,7 +71,7 @@ def _energy_at_10_s(limit: float, source: str) -> Metric:
 
 ENERGY_AT_10_S = _energy_at_10_s(
     -21.1,
-    "plain SPOOK's own discrete solution loses 21.08 % (tests/oracle_chain.py), and no remedy may cost more: projecting "
+    "plain SPOOK's own discrete solution loses 21.08 % (tests/oracles/chain.py), and no remedy may cost more: projecting "
     "positions meets every length limit and loses 79 %",
 )
 
@@ -209,7 +209,7 @@ MEASUREMENTS = (
                 unit="1",
                 role="companion",
                 limit=2.15e-9,
-                limit_source="the method's own discrete solution, tests/oracle_chain.py: 2.124e-9, in proportion to the "
+                limit_source="the method's own discrete solution, tests/oracles/chain.py: 2.124e-9, in proportion to the "
                 "compliance of 1e-13 m/N over which tension settles",
                 reference=0.0,
                 tolerance=1e-9,

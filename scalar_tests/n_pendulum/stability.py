@@ -23,7 +23,7 @@ OBSERVE: dict[str, Observable] = {
     "violation": Trace(quantity=Violation()),
     "energy": Trace(quantity=Energy(), from_start=True),
 }
-DISCRETE = "where the method's own discrete solution breaks: the prototype tests/oracle_chain.py"
+DISCRETE = "where the method's own discrete solution breaks: the prototype tests/oracles/chain.py"
 HOLDS = (
     "22 s without any link ever off by more than its own length, or the energy above its start by more than 15 % of the "
     "fall to hanging"
@@ -116,7 +116,7 @@ STUDIES = (
                 CURVED_TWICE,
                 None,
                 "none: with curved rows so little energy is lost that the whip is chaotic, and rounding decides which "
-                "chain fails first (tests/oracle_chain.py, rounding otherwise, loses one of five spheres)",
+                "chain fails first (tests/oracles/chain.py, rounding otherwise, loses one of five spheres)",
             ),
             ("four substeps", FOUR_SUBSTEPS, (196.0, 198.0), DISCRETE + ", to one sphere"),
             ("eight substeps", EIGHT_SUBSTEPS, (400.0, 400.0), DISCRETE + " beyond the end of the search"),
@@ -140,7 +140,7 @@ STUDIES = (
                 CURVED_TWICE,
                 None,
                 "none: with curved rows the whip is chaotic, so holding and failing alternate near the break (0.029 s "
-                "fails, 0.0292 s holds, 0.0295 s fails in tests/oracle_chain.py) and the answer hangs on the search's grid",
+                "fails, 0.0292 s holds, 0.0295 s fails in tests/oracles/chain.py) and the answer hangs on the search's grid",
             ),
         )
     ),

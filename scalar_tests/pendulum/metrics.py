@@ -20,9 +20,7 @@ from spook_tracker.scalar_tests.pendulum.measure import (
 )
 from spook_tracker.scalar_tests.pendulum.scene import CURVED, CURVED_TWICE, TIME_STEP
 
-PROTOTYPE = (
-    "the method's own discrete solution: the prototype tests/oracle.py, written from the equations alone"
-)
+PROTOTYPE = "the method's own discrete solution: the prototype tests/oracles/particles.py, written from the equations alone"
 
 
 def _around(value: float, relative: float = 1e-6) -> tuple[float, float]:
@@ -68,7 +66,7 @@ ENERGY_AT_THE_END = Metric(
     role="companion",
     better="larger",
     limit=-0.205,
-    limit_source="plain SPOOK's own discrete solution loses 0.2048 % (tests/oracle.py), and no remedy may buy its length "
+    limit_source="plain SPOOK's own discrete solution loses 0.2048 % (tests/oracles/particles.py), and no remedy may buy its length "
     "with more energy; projecting positions loses far more",
     reference=0.0,
     relative_tolerance=1e-7,
@@ -98,7 +96,7 @@ PERIOD = Metric(
 
 HALF_STEP_OLD = (
     "½ h v·a of a velocity half a step old is at most 2.29 % of m g l; the step adds 3 % of that at second order "
-    "(tests/oracle.py: 2.362 %)"
+    "(tests/oracles/particles.py: 2.362 %)"
 )
 
 COMPANIONS = (ENERGY_AT_THE_END, TENSION, PERIOD)

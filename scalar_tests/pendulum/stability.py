@@ -31,7 +31,9 @@ OBSERVE: dict[str, Observable] = {
     "violation": Trace(quantity=Violation("rod")),
     "energy": Trace(quantity=Energy(), from_start=True),
 }
-DISCRETE = "where the method's own discrete solution breaks: the dense prototype tests/oracle.py, to 1 %"
+DISCRETE = (
+    "where the method's own discrete solution breaks: the dense prototype tests/oracles/particles.py, to 1 %"
+)
 HOLDS = (
     "22 s without the length off by more than 10 % beyond what its compliance yields, or the energy above its start by "
     "more than 10 % of m g l beyond what a velocity half a step old reads, and neither doubling in the last third"

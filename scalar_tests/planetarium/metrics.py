@@ -138,7 +138,7 @@ MEASUREMENTS = (
                 "thesis, section 3.2.7: under 8 % at 5 s",
                 0.9,
                 1.1,
-                "tests/oracle.py has 1.04 %",
+                "tests/oracles/particles.py has 1.04 %",
             ),
         ),
         measure=coarse,

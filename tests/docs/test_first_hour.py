@@ -1,0 +1,40 @@
+"""What CONTRIBUTING says of the first hour in the core is so."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.places import ROOT
+
+NATIVE = ROOT / "engine/native"
+SECTION = (ROOT / "CONTRIBUTING.md").read_text().split("## The first hour in the core")[1].split("\n## ")[0]
+
+
+def test_every_file_it_names_is_there() -> None:
+    named = re.findall(r"`(engine/[\w./]+)`", SECTION)
+
+    assert len(named) > 8
+    assert [name for name in named if not (ROOT / name).exists()] == []
+
+
+def test_a_new_solver_touches_the_files_that_are_said() -> None:
+    """Each of them says what of the one by iterations."""
+    named = re.findall(
+        r"`(engine/[\w./]+)`", SECTION.split("One that a scene can ask for")[1].split("\n- ")[0]
+    )
+
+    assert len(named) == 4
+    assert [name for name in named if "iterative" not in (ROOT / name).read_text()] == []
+
+
+def test_clangd_finds_how_every_source_is_compiled() -> None:
+    listed = ROOT / "build/compile_commands.json"
+    if not listed.exists():
+        pytest.skip("not built by make develop")
+    compiled = {Path(entry["file"]).resolve() for entry in json.loads(listed.read_text())}
+
+    assert compiled >= {path.resolve() for path in (NATIVE / "src").rglob("*.cpp")}

@@ -1,0 +1,127 @@
+"""Bodies that start inside each other part without being launched."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from spook_tracker.engine import (
+    Box,
+    Capsule,
+    Final,
+    KineticEnergy,
+    Maximum,
+    Method,
+    Penetration,
+    Plane,
+    Position,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+    Velocity,
+    simulate,
+)
+from tests.scenes.contact import DOWN, TIME_STEP, ball, cube, ground
+
+
+@pytest.mark.parametrize("depth", [1e-3, 0.1, 0.4])
+def test_overlapping_bodies_part_without_being_launched(depth: float) -> None:
+    """Two balls, free in space, start `depth` inside each other: they part and stay at rest."""
+    result = simulate(
+        Scene(bodies=(ball("low", 0.0), ball("high", 1.0 - depth))),
+        time_step=TIME_STEP,
+        duration=5.0,
+        observe={
+            "x": Final(quantity=Position()),
+            "v": Trace(quantity=Velocity()),
+            "e": Maximum(quantity=KineticEnergy()),
+        },
+    )
+
+    assert result["x"][1, 2] - result["x"][0, 2] == pytest.approx(1.0, abs=1e-7)
+    assert result["e"] < 1e-15
+    assert abs(result["x"][:, 2].sum() - (1.0 - depth)) < 1e-12  # the centre of mass stays
+
+
+def test_a_box_sunk_into_the_ground_rises_and_rests() -> None:
+    result = simulate(
+        Scene(bodies=(ground(), cube("box", (0, 0, 0.2)), cube("lid", (0.1, 0, 1.0))), gravity=DOWN),
+        time_step=TIME_STEP,
+        duration=5.0,
+        observe={
+            "x": Final(quantity=Position()),
+            "v": Trace(quantity=Velocity()),
+            "e": Maximum(quantity=KineticEnergy()),
+        },
+    )
+
+    assert result["x"][1, 2] == pytest.approx(0.5, abs=1e-6)
+    assert result["x"][2, 2] == pytest.approx(1.5, abs=1e-6)
+    assert result["e"] < 1e-9
+
+
+@pytest.mark.parametrize("floor", [Plane(), Box((4.0, 4.0, 1.0))])
+@pytest.mark.parametrize("shape", [Capsule(0.05, 1.0), Box((0.1, 0.3, 1.0))])
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
+def test_an_end_that_is_hit_down_within_a_step_does_not_sink(
+    solver: str, shape: Capsule | Box, floor: Plane | Box
+) -> None:
+    """A bar lies still with one end on the floor, the other 4 mm above it, out of reach, until a ball hits that end."""
+    tilt, reach = 0.004, 0.5
+    bar = RigidBody(
+        name="bar",
+        mass=1.0,
+        shape=shape,
+        position=(0.0, 0.0, 0.05 + reach * math.sin(tilt)),
+        orientation=(math.cos(math.pi / 4 + tilt / 2), 0.0, math.sin(math.pi / 4 + tilt / 2), 0.0),
+    )
+    below = RigidBody(
+        name="floor",
+        motion="static",
+        shape=floor,
+        position=(0.0, 0.0, 0.0 if isinstance(floor, Plane) else -0.5),
+    )
+    hammer = RigidBody(
+        name="hammer", mass=5.0, shape=Sphere(0.1), position=(-0.45, 0.0, 0.3), velocity=(0.0, 0.0, -8.0)
+    )
+    result = simulate(
+        Scene(bodies=(below, bar, hammer), gravity=DOWN),
+        time_step=TIME_STEP,
+        duration=0.1,
+        method=Method(solver=solver),
+        observe={"overlap": Maximum(quantity=Penetration())},
+    )
+
+    assert result["overlap"] < 2e-3 * 0.6  # of how far the bar reaches: less than curved paths may overlap
+
+
+@pytest.mark.parametrize("shape", [Sphere(0.2), Box((0.4, 0.4, 0.4))], ids=["ball", "box"])
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
+def test_what_is_sunk_into_one_body_sinks_into_no_other(solver: str, shape: Sphere | Box) -> None:
+    """15 mm deep in a floor it comes to a wall, and no further: as much as twice its depth in the floor was let in."""
+    depth, speed, face = 0.015, 3.0, 0.013
+    floor, wall = (
+        RigidBody(name=name, motion="static", shape=Box(size), position=place)
+        for name, size, place in (
+            ("floor", (4.0, 2.0, 0.5), (0.0, 0.0, -0.25)),
+            ("wall", (0.4, 1.0, 1.0), (face + 0.2, 0.0, 0.5)),
+        )
+    )
+    slider = RigidBody(
+        name="slider",
+        mass=1.0,
+        shape=shape,
+        position=(-0.225, 0.0, 0.2 - depth),
+        velocity=(speed, 0.0, 0.0),
+    )
+    result = simulate(
+        Scene(bodies=(floor, wall, slider)),
+        time_step=TIME_STEP,
+        steps=12,
+        method=Method(solver=solver),
+        observe={"x": Trace(quantity=Position("slider"))},
+    )
+
+    assert abs(result["x"][:, 0].max() - (face - 0.2)) < 1e-8

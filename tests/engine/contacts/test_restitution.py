@@ -1,0 +1,198 @@
+"""One blow: restitution, what the bodies exchange, and where the energy goes, against closed forms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import (
+    WORLD,
+    Box,
+    Capsule,
+    Final,
+    KineticEnergy,
+    Lock,
+    Material,
+    Maximum,
+    Method,
+    Momentum,
+    Particle,
+    Penetration,
+    Position,
+    RigidBody,
+    Scene,
+    Sphere,
+    Trace,
+    Velocity,
+    simulate,
+)
+from spook_tracker.scalar_tests import bouncing_ball
+from tests.oracles.ball import dropped
+from tests.scenes.contact import DOWN, GRAVITY, TIME_STEP, ball, ground
+
+
+@pytest.mark.parametrize("psi", [0.0, 0.25, 0.5, 1.0])
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
+def test_one_contact_returns_psi_times_the_approach(psi: float, solver: str) -> None:
+    """Without gravity, touching at the start: v₊ = −psi v₋ along the normal, unchanged across it."""
+    scene = Scene(
+        bodies=(ground(Material(restitution=psi)), ball(velocity=(0.3, -0.2, -4.0))),
+    )
+    result = simulate(
+        scene,
+        time_step=TIME_STEP,
+        steps=1,
+        method=Method(solver=solver),
+        observe={"v": Final(quantity=Velocity("ball"))},
+    )
+
+    np.testing.assert_allclose(result["v"], (0.3, -0.2, 4.0 * psi), rtol=0, atol=1e-14)
+
+
+def test_two_free_balls_exchange_momentum_and_keep_their_energy() -> None:
+    """A central elastic collision: velocities by the two conservation laws, total momentum to rounding."""
+    light = ball(
+        "light", position=(0, 0, 0), velocity=(2.0, 0, 0), mass=1.0, material=Material(restitution=1.0)
+    )
+    heavy = ball("heavy", position=(1.5, 0, 0), mass=3.0)
+    result = simulate(
+        Scene(bodies=(light, heavy)),
+        time_step=TIME_STEP,
+        duration=1.0,
+        observe={
+            "v": Final(quantity=Velocity()),
+            "p": Trace(quantity=Momentum()),
+            "e": Final(quantity=KineticEnergy()),
+        },
+    )
+
+    assert result["v"][0, 0] == pytest.approx(2.0 * (1 - 3) / (1 + 3), abs=1e-13)
+    assert result["v"][1, 0] == pytest.approx(2.0 * 2 / (1 + 3), abs=1e-13)
+    assert np.abs(result["p"] - result["p"][0]).max() < 1e-13
+    assert result["e"] == pytest.approx(2.0, abs=1e-12)
+
+
+def test_a_jointed_body_takes_part_in_the_impact() -> None:
+    """A rod pinned at one end, struck at the other: nothing but its moment of inertia about the pin resists."""
+    rod = RigidBody(name="rod", position=(0.5, 0, 0), mass=2.0, shape=Box((1.0, 0.1, 0.1)))
+    hammer = RigidBody(
+        name="hammer",
+        position=(0.9, 0, 0.1),
+        mass=0.5,
+        shape=Sphere(0.05),
+        velocity=(0, 0, -3.0),
+        material=Material(restitution=1.0),
+    )
+    pin = Lock(name="pin", between=(WORLD, "rod"), at=(0, 0, 0), compliance=(0, 0, 0, 1e9, 1e9, 1e9))
+    result = simulate(
+        Scene(bodies=(rod, hammer), constraints=(pin,)),
+        time_step=TIME_STEP,
+        steps=1,
+        observe={"v": Final(quantity=Velocity("hammer"))},
+    )
+
+    about_pin = 2.0 * (1.0**2 + 0.1**2) / 12.0 + 2.0 * 0.5**2
+    effective = 1.0 / (1.0 / 0.5 + 0.9**2 / about_pin)  # reduced mass at the point struck
+    assert result["v"][2] == pytest.approx(-3.0 + 2.0 * effective * 3.0 / 0.5, abs=1e-6)
+
+
+def test_bounces_reach_e_to_the_2n_of_the_height_at_first_order() -> None:
+    """Heights h0 e^{2n} and stop time t0 (1 + e)/(1 − e), both with an error proportional to the time step."""
+    e, height = 0.5, 1.0
+    material = Material(restitution=e)
+    scene = Scene(bodies=(ground(material), ball(height=0.5 + height, material=material)), gravity=DOWN)
+    errors = []
+    for time_step in (1e-3, 2.5e-4):
+        result = simulate(
+            scene,
+            time_step=time_step,
+            duration=2.0,
+            observe={"z": Trace(quantity=Position("ball")), "v": Trace(quantity=Velocity("ball"))},
+        )
+        z, v = result["z"][:, 2] - 0.5, result["v"][:, 2]
+        tops = np.flatnonzero((v[1:] <= 0.0) & (v[:-1] > 0.0))
+        expected = height * e ** (2.0 * np.arange(1, 4))
+        errors.append(np.abs(z[tops[:3]] - expected).max())
+        moving = np.flatnonzero(np.abs(v) > 1e-9)
+        stop = math.sqrt(2.0 * height / GRAVITY) * (1.0 + e) / (1.0 - e)
+        assert moving[-1] * time_step == pytest.approx(stop, abs=40.0 * time_step)
+        assert z.min() > -1e-12
+
+    assert errors[0] < 4e-3
+    assert errors[1] < 0.35 * errors[0]
+
+
+def test_a_fast_body_neither_enters_nor_rebounds() -> None:
+    """Three metres per step onto a wall of 2 cm: it stops at the surface, exactly, with no speed left."""
+    wall = RigidBody(name="wall", position=(0, 0, 0), shape=Box((4, 4, 0.02)), motion="static")
+    result = simulate(
+        Scene(bodies=(wall, ball(height=3.0, velocity=(0, 0, -180.0)))),
+        time_step=TIME_STEP,
+        steps=30,
+        observe={
+            "z": Trace(quantity=Position("ball")),
+            "depth": Maximum(quantity=Penetration()),
+            "v": Trace(quantity=Velocity("ball")),
+        },
+    )
+
+    assert result["z"][:, 2].min() == pytest.approx(0.51, abs=1e-13)
+    assert result["depth"] < 1e-13
+    assert np.abs(result["v"][3:, 2]).max() < 1e-12
+
+
+# Rest -------------------------------------------------------------------------------------------------------
+
+
+def test_a_ball_bounces_where_the_map_of_its_steps_says() -> None:
+    """Five bounces of a metre: a blow within a step meets what gravity has done until then since the middle of the step before."""
+    _, found = bouncing_ball.gaps(simulate, bouncing_ball.TIME_STEP, 3.0)
+    _, expected = bouncing_ball.gaps(dropped, bouncing_ball.TIME_STEP, 3.0)
+
+    assert np.count_nonzero(np.diff(np.sign(np.diff(expected))) > 0) >= 5
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
+@pytest.mark.parametrize("psi", [0.3, 0.6, 0.9])
+def test_an_impact_ahead_in_the_step_gives_back_what_it_meets_with(psi: float, solver: str) -> None:
+    """A step's v is that of the middle of the step before. Met with (v − g h/2)² + 2 g d below the start of the step, given back ψ times
+    as fast, slower by 2 g d up there again, and by g h/2 in the middle of the step."""
+    rubber = Material(restitution=psi)
+    capsule = RigidBody(
+        name="capsule", mass=1.0, shape=Capsule(0.1, 0.5), position=(0.0, 0.0, 1.0), material=rubber
+    )
+    result = simulate(
+        Scene(bodies=(ground(rubber), capsule), gravity=DOWN),
+        time_step=TIME_STEP,
+        steps=40,
+        method=Method(solver=solver),
+        observe={"v": Trace(quantity=Velocity("capsule")), "x": Trace(quantity=Position("capsule"))},
+    )
+    v, gap = result["v"][:, 2], result["x"][:, 2] - 0.35
+    (blow, *_) = np.nonzero((v[:-1] < 0.0) & (v[1:] > 0.0))[0]
+    half_kick = 0.5 * GRAVITY * TIME_STEP
+    met = (v[blow] - half_kick) ** 2 + 2.0 * GRAVITY * gap[blow]
+    back = math.sqrt(psi**2 * met - 2.0 * GRAVITY * gap[blow])
+
+    assert gap[blow] > 1e-3
+    assert v[blow + 1] == pytest.approx(back - half_kick, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    "method", [Method(), Method(impacts="successive"), Method(half_step_velocities=True)]
+)
+def test_a_particle_beside_a_blow_falls_as_it_does_alone(method: Method) -> None:
+    """Forces act on what is free in halves in such a step, and a particle has no inertia to turn by."""
+    stone = Particle(name="stone", mass=2.0, position=(3.0, 0.0, 5.0), velocity=(0.5, 0.0, 1.0))
+    bouncing = (ground(Material(restitution=0.5)), ball(position=(0.0, 0.0, 1.1)))
+    observe = {"x": Trace(quantity=Position("stone")), "v": Trace(quantity=Velocity("stone"))}
+    beside, alone = (
+        simulate(Scene(bodies=bodies, gravity=DOWN), time_step=0.01, steps=60, method=method, observe=observe)
+        for bodies in ((*bouncing, stone), (stone,))
+    )
+    assert beside.completed and beside.counters["impacts"] > 0
+    for name in observe:
+        np.testing.assert_allclose(beside[name], alone[name], rtol=0.0, atol=1e-13)

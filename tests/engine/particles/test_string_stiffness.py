@@ -1,0 +1,208 @@
+"""A taut chain is unstable where T h²/(m l) > 1; with string stiffness it is not, at nearly no cost elsewhere."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import (
+    AngularMomentum,
+    ConstraintForce,
+    Distance,
+    Energy,
+    MaximumAbsolute,
+    Method,
+    Momentum,
+    Particle,
+    Position,
+    Result,
+    Scene,
+    Trace,
+    Velocity,
+    Violation,
+    simulate,
+)
+from tests.oracles.particles import Oracle
+from tests.scenes.particle import KINDS
+
+GRAVITY = 9.81  # m/s²
+H = 1 / 60  # s
+STRINGS = Method(string_stiffness=True)
+
+
+def hanging(ratio: float, offset: float = 1e-6, links: int = 10) -> Scene:
+    """Unit links of 1 kg hanging straight but for a tiny zigzag; the last weighs `ratio` kg."""
+    bodies = tuple(
+        Particle(
+            name=f"b{i}",
+            mass=ratio if i == links - 1 else 1.0,
+            position=(offset * (-1.0) ** i, 0.0, -1.0 - i),
+        )
+        for i in range(links)
+    )
+    rows = tuple(
+        Distance(
+            name=f"r{i}", between=((0.0, 0.0, 0.0) if i == 0 else f"b{i - 1}", f"b{i}"), compliance=1e-13
+        )
+        for i in range(links)
+    )
+    return Scene(bodies=bodies, constraints=rows, gravity=(0.0, 0.0, -GRAVITY))
+
+
+def hang(ratio: float, method: Method, duration: float = 20.0) -> Result:
+    observe = {
+        "x": MaximumAbsolute(quantity=Position()),
+        "g": MaximumAbsolute(quantity=Violation()),
+        "e": Trace(quantity=Energy()),
+    }
+    return simulate(hanging(ratio), time_step=H, duration=duration, method=method, observe=observe)
+
+
+def sideways(result: Result) -> float:
+    """Largest sideways excursion [m]; infinite if the run failed."""
+    return float(result["x"][:, 0].max()) if result.completed else math.inf
+
+
+def test_a_plain_chain_breaks_where_theory_says() -> None:
+    """(M + a little) g h²/(m l) = 1 lies at 367: 350 hangs still, 380 does not."""
+    assert sideways(hang(350.0, Method())) < 1e-4
+    assert sideways(hang(380.0, Method())) > 1e-2
+
+
+@pytest.mark.parametrize("ratio", [380.0, 1000.0, 1e4, 1e6, 1e9])
+def test_with_string_stiffness_it_holds(ratio: float) -> None:
+    """A load that starts without stretch stretches the links at most twice as far as it does at rest."""
+    result = hang(ratio, STRINGS)
+
+    assert sideways(result) < 1e-5
+    assert result["g"].max() < 1e-13 * GRAVITY * (ratio + 10.0) * 2.0 + 1e-9
+
+
+@pytest.mark.parametrize("half", [False, True])
+@pytest.mark.parametrize("offset", [1e-7, 1e-5, 1e-4])
+@pytest.mark.parametrize("ratio", [1e3, 1e6, 1e9])
+def test_the_first_step_knows_the_tension(ratio: float, offset: float, half: bool) -> None:
+    """A zigzag start swings from side to side; it is not thrown out by a first step without stiffness."""
+    method = Method(string_stiffness=True, half_step_velocities=half)
+    observe = {"x": MaximumAbsolute(quantity=Position()), "f": Trace(quantity=ConstraintForce())}
+    result = simulate(hanging(ratio, offset), time_step=H, duration=5.0, method=method, observe=observe)
+
+    assert result["x"][:, 0].max() < 4.0 * offset
+    assert not result["f"][0].any()  # no step was done, so no impulse was given
+
+
+@pytest.mark.parametrize("kind", ["chain", "tree", "loop"])
+def test_string_stiffness_is_the_averaged_law_across_the_rows(kind: str) -> None:
+    """The dense solve with (h²/4) (T/l) (I − u uᵀ) beside M, from the state after a first step on."""
+    h, scene = 0.002, KINDS[kind](np.random.default_rng(1))
+    observe = {
+        "x": Trace(quantity=Position()),
+        "v": Trace(quantity=Velocity()),
+        "f": Trace(quantity=ConstraintForce()),
+    }
+    run = simulate(scene, time_step=h, steps=30, method=STRINGS, observe=observe)
+    dense = Oracle(scene, h, STRINGS)
+    dense.x, dense.v, dense.impulse = run["x"][1], run["v"][1], -h * run["f"][1]
+    for k in range(2, 31):
+        dense.step()
+        assert np.abs(run["x"][k] - dense.x).max() < 1e-12
+    assert run["f"].max() * h**2 < 0.3 * min(dense.mass) * 0.5  # no damping here
+
+
+def test_string_stiffness_costs_next_to_nothing_where_it_is_not_needed() -> None:
+    """A light pendulum at 1/1000: the same motion within the error the method has anyway."""
+    bob = Particle(name="bob", mass=1.0, position=(1.0, 0.0, 0.0))
+    rod = Distance(name="rod", between=((0.0, 0.0, 0.0), "bob"), compliance=1e-13)
+    scene = Scene(bodies=(bob,), constraints=(rod,), gravity=(0.0, 0.0, -GRAVITY))
+    observe = {"x": Trace(quantity=Position("bob")), "e": Trace(quantity=Energy())}
+    plain, strings = (
+        simulate(scene, time_step=1e-3, duration=5.0, method=method, observe=observe)
+        for method in (Method(), STRINGS)
+    )
+
+    assert np.abs(plain["x"] - strings["x"]).max() < 2e-3
+    assert abs(strings["e"][-1] - plain["e"][-1]) < 1e-3 * GRAVITY
+
+
+def afloat(kind: str) -> Scene:
+    """Particles on taut rows that nothing holds: in a row, in a ring, and three rows from one."""
+    rng = np.random.default_rng(5)
+    count = 2 if kind == "pair" else 6
+    angle = 2.0 * math.pi * np.arange(count) / count
+    places = {
+        "pair": np.outer(np.arange(count), (1.0, 0.0, 0.0)),
+        "chain": np.outer(np.arange(count), (1.0, 0.0, 0.0)),
+        "ring": np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1),
+        "star": np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0)], float),
+    }[kind]
+    mass = 1.0 + np.arange(count) % 3
+    speeds = np.cross((0.1, 0.2, 0.6), places) + rng.normal(scale=0.3, size=(count, 3))
+    speeds -= mass @ speeds / mass.sum()  # it stays where it is, so that no long way costs digits
+    links = [(0, k) if kind == "star" else (k - 1, k) for k in range(1, count)]
+    links += [(count - 1, 0)] if kind == "ring" else []
+    return Scene(
+        bodies=tuple(
+            Particle(name=f"{k}", mass=mass[k], position=tuple(places[k]), velocity=tuple(speeds[k]))
+            for k in range(count)
+        ),
+        constraints=tuple(Distance(name=f"{a} to {b}", between=(f"{a}", f"{b}")) for a, b in links),
+    )
+
+
+@pytest.mark.parametrize("h", [H, 0.5])
+@pytest.mark.parametrize("kind", ["pair", "chain", "ring", "star"])
+@pytest.mark.parametrize("corrections", [0, 1])
+def test_it_takes_no_momentum_from_what_floats(kind: str, h: float, corrections: int) -> None:
+    """Forces across a row make a couple: were it not given back, 1e-5 of the momentum would go and more."""
+    observe = {
+        "l": MaximumAbsolute(quantity=AngularMomentum(), from_start=True),
+        "p": MaximumAbsolute(quantity=Momentum(), from_start=True),
+        "f": MaximumAbsolute(quantity=ConstraintForce()),
+    }
+    method = Method(string_stiffness=True, corrections=corrections)
+    run = simulate(afloat(kind), time_step=h, steps=400, method=method, observe=observe)
+
+    assert run.status == "completed" and run["f"].max() > 0.1
+    assert run["l"].max() < 1e-11 and run["p"].max() < 1e-11
+
+
+EDGES = {
+    "one that is held": ({"a": (1.0, (0.0, 0.0, 0.0), (0.0, 1.0, 0.0))}, ((0.0, 0.0, 1.0), "a")),
+    "a light one that turns about two heavy ones": (
+        {
+            "a": (1e15, (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+            "b": (1e15, (1.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
+            "c": (1.0, (0.0, 0.5, 0.0), (0.0, 0.0, 1.0)),
+        },
+        ("a", "b"),
+        ("a", "c"),
+        ("c", "b"),
+    ),
+    "a heavy one and a speck": (
+        {"a": (1.0, (0.0, 0.0, 0.0), (0.0, 1.0, 0.0)), "b": (1e-15, (1.0, 0.0, 0.0), (0.0, -1.0, 0.3))},
+        ("a", "b"),
+    ),
+    "a tiny pair": (
+        {"a": (1.0, (0.0, 0.0, 0.0), (0.0, -0.5, 0.0)), "b": (1.0, (1e-9, 0.0, 0.0), (0.0, 0.5, 0.0))},
+        ("a", "b"),
+    ),
+}
+
+
+@pytest.mark.parametrize("h", [H, 0.5])
+@pytest.mark.parametrize("name", EDGES)
+def test_nor_at_the_edges_of_what_floats(name: str, h: float) -> None:
+    """Bodies of all masses, in one line and about it; what is held owes its momentum to what holds it."""
+    bodies, *ends = EDGES[name]
+    scene = Scene(
+        bodies=tuple(Particle(name=k, mass=m, position=x, velocity=v) for k, (m, x, v) in bodies.items()),
+        constraints=tuple(Distance(name=f"{a} {b}", between=(a, b)) for a, b in ends),  # type: ignore[arg-type]
+    )
+    observe = {"l": Trace(quantity=AngularMomentum()), "e": MaximumAbsolute(quantity=Energy())}
+    run = simulate(scene, time_step=h, steps=400, method=STRINGS, observe=observe)
+
+    assert run.status == "completed" and run["e"] < 1.0
+    if name != "one that is held":
+        assert np.abs(run["l"] - run["l"][0]).max() < 1e-11

@@ -1,0 +1,387 @@
+"""What every engine behind the protocol is asked, with a row of what each owes: closed forms to its step and its rounding.
+
+What an engine alone does, or lacks, is in a file of its own. An engine that is missing is skipped with the reason.
+"""
+
+from __future__ import annotations
+
+import functools
+import math
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import (
+    Ball,
+    Capsule,
+    CentralGravity,
+    ConstraintForce,
+    ContactCount,
+    ContactForce,
+    Cylinder,
+    Final,
+    Hinge,
+    Load,
+    Lock,
+    Particle,
+    Penetration,
+    Position,
+    Prismatic,
+    RigidBody,
+    Scene,
+    Sphere,
+    Spring,
+    Trace,
+    Universal,
+    Velocity,
+)
+from spook_tracker.engine.find import EngineMissing, find
+from spook_tracker.engine.protocol import NotSupported
+from tests.scenes import peer as peer_scenes
+
+STEP = 1.0 / 60.0  # s
+G = peer_scenes.G
+Asked = tuple[str, str]  # engine, configuration
+DART, BULLET = ("dart", "joints"), ("pybullet", "joints")
+DART_LOOSE, BULLET_LOOSE = ("dart", "constraints"), ("pybullet", "constraints")  # joints as rows
+SAP, RK3, DRAKE_LOOSE = ("drake", "sap"), ("drake", "rk3"), ("drake", "constraints")
+JOLT, JOLT_AS_IT_COMES = ("jolt", "many-iterations"), ("jolt", "defaults")
+RAPIER, RAPIER_MANY = ("rapier3d", "defaults"), ("rapier3d", "many-iterations")
+TGS, PGS = ("sapien", "tgs"), ("sapien", "pgs")
+MOTRIX, MOTRIX_MANY, MOTRIX_LOOSE = (
+    ("motrixsim", name) for name in ("defaults", "many-iterations", "equalities")
+)
+MERSON, HELD_STEP = ("simbody", "merson"), ("simbody", "held-step")
+P2, P2_AS_IT_COMES = ("p2", "accurate"), ("p2", "defaults")
+CANNON = ("cannon", "accurate")
+JOINTS = (Ball, Hinge, Lock, Prismatic)
+EVERY_JOINT = (*JOINTS, Universal)
+
+
+def engine(asked: Asked) -> Callable[..., Any]:
+    """Its `simulate`, in that configuration."""
+    try:
+        found = find(asked[0])
+    except EngineMissing as missing:
+        if "is not installed" not in str(missing):
+            raise
+        pytest.skip(str(missing))
+    return functools.partial(found.simulate, configuration=asked[1]) if asked[1] else found.simulate
+
+
+def rows(owed: Mapping[Any, Any]) -> Any:
+    """A test for each row: an engine's configuration, or one and what else is asked of it, and what it owes."""
+    table = [(*(key if isinstance(key[0], tuple) else (key,)), value) for key, value in owed.items()]
+    names = [" ".join(getattr(part, "kind", part) for part in (*row[0], *row[1:-1]) if part) for row in table]
+    return pytest.mark.parametrize(
+        ("asked", "kind", "owed") if len(table[0]) == 3 else ("asked", "owed"), table, ids=names
+    )
+
+
+def by_joint(owed: Mapping[Asked, tuple[float, tuple[Any, ...]]]) -> Any:
+    """The same for every kind of joint that a configuration has."""
+    return rows({(asked, kind): bound for asked, (bound, kinds) in owed.items() for kind in kinds})
+
+
+EULER = pytest.approx(G * STEP, rel=1e-12)  # g T h / 2 of a semi-implicit step, m
+
+
+@rows(
+    {
+        **dict.fromkeys((DART, DART_LOOSE, BULLET, BULLET_LOOSE, SAP), EULER),
+        **dict.fromkeys((RK3, MERSON, HELD_STEP), pytest.approx(0.0, abs=1e-11)),
+        **dict.fromkeys((TGS, PGS, JOLT), pytest.approx(G * STEP, abs=1e-4)),
+        **dict.fromkeys((MOTRIX, MOTRIX_MANY, MOTRIX_LOOSE), pytest.approx(G * STEP, rel=1e-4)),
+        RAPIER: pytest.approx(G * STEP / 4, abs=2e-3),  # its iterations are substeps
+        RAPIER_MANY: pytest.approx(G * STEP / 100, abs=2e-3),
+    }
+)
+def test_a_fall_has_the_error_of_its_step(asked: Asked, owed: Any) -> None:
+    assert peer_scenes.fall_error(engine(asked), STEP) == owed
+
+
+@by_joint(
+    {
+        DART: (1e-8, JOINTS),
+        DART_LOOSE: (1e-8, JOINTS[:3]),
+        BULLET: (1e-9, JOINTS),
+        BULLET_LOOSE: (1e-9, JOINTS[:3]),
+        SAP: (1e-12, JOINTS),
+        DRAKE_LOOSE: (1e-5, JOINTS[:3]),
+        JOLT: (1e-5, JOINTS),
+        RAPIER_MANY: (1e-6, JOINTS),
+        TGS: (1e-6, JOINTS),
+        PGS: (1e-6, JOINTS),
+        MERSON: (1e-12, JOINTS),
+    }
+)
+def test_a_joint_holds_its_body(asked: Asked, kind: Any, owed: float) -> None:
+    assert peer_scenes.left_its_place(engine(asked), kind) < owed
+
+
+@by_joint(
+    {
+        DART: (0.02, EVERY_JOINT),
+        DART_LOOSE: (0.02, JOINTS[:3]),
+        BULLET: (0.02, JOINTS),
+        BULLET_LOOSE: (0.02, JOINTS[:3]),
+        RK3: (0.02, EVERY_JOINT),
+        DRAKE_LOOSE: (0.02, JOINTS[:3]),
+        JOLT: (0.02, JOINTS),
+        RAPIER: (3e-3, JOINTS),
+        TGS: (1e-3, JOINTS),
+        PGS: (1e-3, JOINTS),
+        MOTRIX: (2e-3, EVERY_JOINT),
+        MOTRIX_LOOSE: (1e-3, JOINTS[:3]),
+        MERSON: (3e-3, EVERY_JOINT),
+    }
+)
+def test_joints_between_moving_bodies_move_as_in_our_engine(asked: Asked, kind: Any, owed: float) -> None:
+    """Two bodies turned at random, from rest: both engines converge to one motion; impulses less well."""
+    assert peer_scenes.parted_from_ours(engine(asked), kind.kind) < owed
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+@by_joint(
+    {
+        DART: (1e-6, JOINTS[:3]),
+        BULLET: (1e-6, JOINTS[:2]),
+        BULLET_LOOSE: (1e-6, JOINTS[:2]),
+        SAP: (1e-9, JOINTS[:3]),
+        RK3: (1e-9, JOINTS[:3]),
+        JOLT: (1e-4, JOINTS[:2]),
+        MERSON: (1e-9, JOINTS[:3]),
+    }
+)
+def test_the_force_of_a_joint_is_the_weight_it_holds(
+    asked: Asked, kind: Any, owed: float, backwards: bool
+) -> None:
+    force = {"force": Final(quantity=ConstraintForce("joint"))}
+    found = engine(asked)(peer_scenes.hung(kind, backwards), time_step=STEP, duration=1.0, observe=force)
+
+    assert found["force"] == pytest.approx(peer_scenes.load_on_joint(kind, backwards), abs=owed)
+
+
+@rows(dict.fromkeys((DART, BULLET, SAP, RK3, MERSON), 1e-9) | {JOLT: 1e-6})
+def test_the_tension_of_a_rod_at_rest_is_all_that_hangs_on_it(asked: Asked, owed: float) -> None:
+    weights = tuple(Particle(name=f"{k}", mass=1.0 + k, position=(0.0, 0.0, -1.0 - k)) for k in range(2))
+    rods = peer_scenes.chain(2).constraints
+    observe = {f"{k}": Final(quantity=ConstraintForce(f"rod {k}")) for k in range(2)}
+    scene = Scene(bodies=weights, constraints=rods, gravity=peer_scenes.GRAVITY)
+    found = engine(asked)(scene, time_step=STEP, duration=1.0, observe=observe)
+
+    assert [float(found["0"]), float(found["1"])] == pytest.approx([29.43, 19.62], rel=owed)
+
+
+@rows(
+    dict.fromkeys((DART, DART_LOOSE, BULLET, BULLET_LOOSE, SAP, RK3, DRAKE_LOOSE, MERSON, HELD_STEP), 1e-12)
+    | dict.fromkeys((MOTRIX, MOTRIX_MANY, MOTRIX_LOOSE), 1e-6)
+)
+def test_spins_at_the_start_are_those_of_the_scene(asked: Asked, owed: float) -> None:
+    """Two bodies turned against the world on ball joints; each engine wants the spin of a joint in axes of its own."""
+    assert peer_scenes.started(engine(asked)) == pytest.approx((0.0, 0.0), abs=owed)
+
+
+@rows(dict.fromkeys((DART, DART_LOOSE, BULLET, BULLET_LOOSE), 5e-3))
+def test_speeds_at_the_start_are_those_of_the_scene(asked: Asked, owed: float) -> None:
+    """A hinged body and one on a slide, set going, are read back before any step, and hardly changed after it."""
+    found = peer_scenes.set_going(engine(asked), slides=asked[1] == "joints")
+
+    assert found[0] == pytest.approx(np.array([[0.0, 2.0, 0.0], [3.0, 0.0, 0.0]]), abs=1e-12)
+    assert found[1] == pytest.approx(found[0], abs=owed)
+
+
+@rows(
+    {
+        **dict.fromkeys((DART, DART_LOOSE, BULLET, BULLET_LOOSE, P2), (1 / 1000, 1e-4)),
+        **dict.fromkeys((RK3, MERSON, HELD_STEP), (1 / 240, 3e-5)),
+        JOLT: (1 / 1000, 4e-3),  # of first order, and in single precision
+        RAPIER: (1 / 1000, 2e-4),
+        TGS: (1 / 1000, 5e-4),
+        PGS: (1 / 1000, 5e-4),
+    }
+)
+def test_a_hinged_body_swings_with_its_period(asked: Asked, owed: tuple[float, float]) -> None:
+    assert peer_scenes.swings(engine(asked), owed[0]) == pytest.approx(1.0, abs=owed[1])
+
+
+@rows({DART: 0.3, BULLET: 0.3})
+def test_a_spinning_body_keeps_its_momentum_to_the_order_of_its_step(asked: Asked, owed: float) -> None:
+    coarse, fine = (peer_scenes.momentum_lost(engine(asked), h) for h in (1 / 240, 1 / 960))
+
+    assert coarse < 1e-3
+    assert fine < owed * coarse
+
+
+@rows({DART: 1e-12, BULLET: 1e-12})
+def test_a_rod_is_a_hinge_in_joint_coordinates(asked: Asked, owed: float) -> None:
+    """The length is exact; the energy is that of semi-implicit Euler, the same digits in every engine that has it."""
+    length, energy = peer_scenes.swung(engine(asked), STEP)
+
+    assert length < owed
+    assert energy == pytest.approx(0.0233, abs=2e-4)
+    assert peer_scenes.swung(engine(asked), 1 / 240)[1] == pytest.approx(0.0057, abs=1e-4)
+
+
+UNSEEN = 0.5 * 0.2 * G * 2.0 * (2.0 + STEP)  # m, of a cube pulled by .7 of its weight, in symplectic steps
+
+
+@rows(
+    {
+        DART: (1e-5, pytest.approx(UNSEEN, rel=1e-4)),  # friction on a box, solved exactly
+        BULLET: (4e-3, pytest.approx(0.4 * G, rel=0.1)),  # few points: it creeps, and tilts where it slides
+        SAP: (1e-3, pytest.approx(0.4 * G, rel=0.01)),
+        JOLT: (1e-6, pytest.approx(0.4 * G, rel=0.02)),
+        RAPIER_MANY: (1e-3, pytest.approx(0.4 * G, rel=2e-3)),
+        MERSON: (2e-4, pytest.approx(0.4 * G, rel=0.01)),  # springs that stick: it yields
+        **dict.fromkeys((TGS, PGS), (1e-3, pytest.approx(0.4 * G, rel=0.01))),
+        **dict.fromkeys((MOTRIX, MOTRIX_MANY, MOTRIX_LOOSE), (1e-3, pytest.approx(0.4 * G, rel=0.02))),
+    }
+)
+def test_friction_holds_below_its_coefficient_and_not_above(asked: Asked, owed: tuple[float, Any]) -> None:
+    assert abs(peer_scenes.slid(engine(asked), 0.3)) < owed[0]
+    assert peer_scenes.slid(engine(asked), 0.7) == owed[1]
+
+
+SOLIDS = {"box": None, "sphere": Sphere(0.5), "capsule": Capsule(0.25, 0.5)}
+TALL = {"box": None, "slim capsule": Capsule(0.2, 0.6), "cylinder": Cylinder(0.2, 1.0)}
+
+
+@rows(
+    {
+        (asked, name): (low, high, shape)
+        for asked, low, high, shapes in (
+            *((one, -1e-4, 1e-4, SOLIDS) for one in (DART, BULLET)),
+            *((one, -1e-3, 1e-3, SOLIDS) for one in (SAP, JOLT)),
+            (TGS, -1e-5, 1e-5, TALL),
+            (MERSON, -1e-4, 1e-12, {"box": None, "sphere": SOLIDS["sphere"]}),
+            (RAPIER, -1e-3, 1e-3, {"cylinder": TALL["cylinder"]}),
+            *((one, -1e-3, 0.0, SOLIDS | TALL) for one in (MOTRIX, MOTRIX_MANY, MOTRIX_LOOSE)),
+        )
+        for name, shape in shapes.items()
+    }
+)
+def test_a_body_rests_where_it_touches(asked: Asked, kind: str, owed: tuple[float, float, Any]) -> None:
+    """Along our axes: capsule and cylinder stand on their ends."""
+    low, high, shape = owed
+    assert low < peer_scenes.sunk(engine(asked), shape) < high
+
+
+@rows({DART: (1e-5, (4, 4)), BULLET: (1e-3, (3, 4)), SAP: (1e-2, None), MERSON: (2e-3, None)})
+def test_the_ground_carries_the_weight_and_the_pull(
+    asked: Asked, owed: tuple[float, tuple[int, int] | None]
+) -> None:
+    bound, points = owed
+    observe: dict[str, Any] = {
+        "force": Final(quantity=ContactForce("box")),
+        "ground": Final(quantity=ContactForce("ground", "box")),
+    }
+    if points:
+        observe |= {"depth": Final(quantity=Penetration()), "count": Final(quantity=ContactCount())}
+    found = engine(asked)(peer_scenes.box_on_ground(0.3), time_step=STEP, duration=2.0, observe=observe)
+
+    assert found["force"] == pytest.approx([-0.3 * G, 0.0, G], abs=bound)
+    assert list(found["ground"]) == list(-found["force"])
+    if points:
+        assert 0.0 < float(found["depth"]) < 1e-4
+        assert points[0] <= float(found["count"]) <= points[1]
+
+
+@rows({DART: (0.8, 0.01), JOLT: (0.8, 0.01), RAPIER: (0.5, 2e-3), TGS: (0.5, 2e-3)})
+def test_a_ball_comes_back_by_the_square_of_its_restitution(asked: Asked, owed: tuple[float, float]) -> None:
+    restitution, bound = owed
+    assert peer_scenes.bounced(engine(asked), restitution, 1e-3) == pytest.approx(restitution**2, abs=bound)
+
+
+@rows(
+    {
+        DART: (1e-3, 1e-6, 1e-3),
+        BULLET: (1e-3, 1e-6, 1e-3),
+        SAP: (1e-3, 1e-6, 1e-3),
+        RK3: (1e-9, 1e-6, 1e-3),
+        MERSON: (1e-8, 1e-9, 1e-8),
+        JOLT: (1e-3, 1e-5, 2e-3),
+        CANNON: (1e-3, 1e-9, None),
+    }
+)
+def test_forces_act_at_every_step(asked: Asked, owed: tuple[float, float, float | None]) -> None:
+    """A circular orbit stays one, a load of twice the weight lifts, and a spring swings by its cosine."""
+    simulate, (round_, lift, swing) = engine(asked), owed
+    moon = Particle(name="moon", mass=3.0, position=(2.0, 0.0, 0.0), velocity=(0.0, math.sqrt(0.5), 0.0))
+    orbit = Scene(bodies=(moon,), forces=(CentralGravity(name="pull", strength=1.0),))
+    path = {"path": Trace(quantity=Position("moon"))}
+    found = simulate(orbit, time_step=0.001, duration=5.0, observe=path)
+    assert np.abs(np.linalg.norm(found["path"], axis=1) - 2.0).max() < round_
+
+    box = RigidBody(name="box", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
+    lifted = Scene(
+        bodies=(box,),
+        forces=(Load(name="lift", body="box", force=(0.0, 0.0, 4.0 * G)),),
+        gravity=peer_scenes.GRAVITY,
+    )
+    speed = {"speed": Final(quantity=Velocity("box"))}
+    found = simulate(lifted, time_step=0.01, steps=100, observe=speed)
+    assert found["speed"][2] == pytest.approx(G, rel=lift)
+
+    if swing is not None:
+        weight = Particle(name="weight", mass=3.0, position=(2.0, 0.0, 0.0))
+        spring = Spring(name="spring", between=((0.0, 0.0, 0.0), "weight"), stiffness=30.0, rest_length=1.0)
+        end = {"end": Final(quantity=Position("weight"))}
+        found = simulate(
+            Scene(bodies=(weight,), forces=(spring,)), time_step=0.001, duration=1.0, observe=end
+        )
+        assert found["end"][0] == pytest.approx(1.0 + math.cos(math.sqrt(10.0)), abs=swing)
+
+
+@by_joint(
+    {(name, ""): (5e-3, (Hinge, Prismatic)) for name in ("dart", "pybullet", "jolt", "mujoco")}
+    | {MOTRIX: (2e-3, (Hinge, Prismatic))}
+)
+def test_dry_friction_in_a_joint_brakes_it_until_it_stands_and_holds_it_then(
+    asked: Asked, kind: Any, owed: float
+) -> None:
+    assert peer_scenes.braked(engine(asked), kind) == pytest.approx(peer_scenes.BRAKED, abs=owed)
+
+
+@rows(
+    {
+        **dict.fromkeys((DART, BULLET, SAP, MERSON), (-1e-12, 1e-12)),  # merged into one body
+        **dict.fromkeys((BULLET_LOOSE, JOLT_AS_IT_COMES), (1.1, 1.3)),  # ½ g t² is 1.23 m
+        **dict.fromkeys((DRAKE_LOOSE, P2_AS_IT_COMES), (1.0, 1.3)),
+    }
+)
+def test_locks_that_are_merged_hold_a_long_beam_and_those_that_are_iterated_let_it_fall(
+    asked: Asked, owed: tuple[float, float]
+) -> None:
+    assert owed[0] < peer_scenes.sag(engine(asked)) < owed[1]
+
+
+ROUGH = tuple(
+    ("friction in a joint", functools.partial(peer_scenes.rough, kind)) for kind in (Hinge, Prismatic)
+)
+
+
+@rows(
+    {
+        DART_LOOSE: (
+            ("no constraint of distance", peer_scenes.pendulum),
+            ("no constraint for the prismatic", lambda: peer_scenes.hung(Prismatic)),
+            *ROUGH,
+        ),
+        BULLET_LOOSE: (
+            ("no constraint of distance", peer_scenes.pendulum),
+            ("a slide as a constraint", lambda: peer_scenes.hung(Prismatic)),
+            *ROUGH,
+        ),
+        **dict.fromkeys((DART, SAP, MERSON), (("different friction", peer_scenes.unlike),)),
+        ("mujoco", "equalities"): ROUGH,
+        **dict.fromkeys((RK3, HELD_STEP), (("the shape box", lambda: peer_scenes.box_on_ground(0.0)),)),
+    }
+)
+def test_what_it_lacks_is_not_supported_by_name(asked: Asked, owed: Any) -> None:
+    simulate = engine(asked)
+    for words, scene in owed:
+        with pytest.raises(NotSupported, match=words):
+            simulate(scene(), time_step=STEP, steps=1)

@@ -1,0 +1,70 @@
+"""Rapier's Python package behind the protocol: closed forms to single precision. Skipped, with the reason, without it."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import pytest
+
+from spook_tracker.engine import (
+    Cone,
+    ContactForce,
+    Final,
+    Plane,
+    Position,
+    RigidBody,
+    Scene,
+    Velocity,
+)
+from spook_tracker.engine.find import find
+from spook_tracker.engine.protocol import NotSupported
+from tests.scenes import peer as peer_scenes
+
+rapier = pytest.importorskip(
+    "rapier3d", reason="the extra rapier3d is not installed: pip install 'spook-tracker[rapier3d]'"
+)
+DEFAULTS, MANY = "defaults", "many-iterations"
+
+
+def run(configuration: str) -> Any:
+    return partial(find("rapier3d").simulate, configuration=configuration)
+
+
+def test_what_it_cannot_be_asked_is_said_to_be_our_adapter_s_lack_where_it_is() -> None:
+    cone = RigidBody(name="cone", mass=1.0, shape=Cone(0.5, 1.0), position=(0.0, 0.0, 0.5))
+    ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
+    with pytest.raises(NotSupported, match=r"^our adapter cannot ask rapier3d for the shape cone$"):
+        run(DEFAULTS)(Scene(bodies=(cone, ground)), time_step=0.01, steps=1)
+    with pytest.raises(NotSupported, match="does not support the joint distance"):
+        run(DEFAULTS)(peer_scenes.pendulum(), time_step=0.01, steps=1)
+    force = {"f": Final(quantity=ContactForce("box"))}
+    with pytest.raises(NotSupported, match="cannot ask rapier3d for a contact force with friction"):
+        run(DEFAULTS)(peer_scenes.box_on_ground(0.0), time_step=0.01, steps=1, observe=force)
+
+
+def test_a_contact_without_friction_shows_the_weight_it_carries() -> None:
+    force = {"f": Final(quantity=ContactForce("box"))}
+    found = run(MANY)(peer_scenes.box_on_ground(0.0, 0.0), time_step=1 / 60, duration=1.0, observe=force)
+    assert found["f"] == pytest.approx([0.0, 0.0, 9.81], abs=1e-3)
+
+
+def test_a_stranger_s_ten_lines_give_the_same_numbers() -> None:
+    """Place and speed of a pushed box from the package's own interface, without our adapter: equal to the last digit."""
+    world = rapier.PhysicsWorld(gravity=(0.0, 0.0, -9.81))
+    world.integration_parameters.dt = 1 / 60
+    made = rapier.RigidBodyBuilder(rapier.RigidBodyType.DYNAMIC).can_sleep(False).translation((0.0, 0.0, 0.5))
+    inertia = (1 / 6, 1 / 6, 1 / 6)
+    made = made.additional_mass_properties(rapier.MassProperties((0.0, 0.0, 0.0), 1.0, inertia))
+    ground = rapier.RigidBodyBuilder(rapier.RigidBodyType.FIXED)
+    world.add_body(ground, [rapier.Collider.halfspace((0.0, 0.0, 1.0)).friction(0.5)])
+    box = world.add_body(made, [rapier.Collider.cuboid(0.5, 0.5, 0.5).density(0.0).friction(0.5)])
+    world.gravity = (0.7 * 9.81, 0.0, -9.81)
+    for _ in range(120):
+        world.step()
+    theirs = world.rigid_bodies[box]
+
+    observe = {"place": Final(quantity=Position("box")), "speed": Final(quantity=Velocity("box"))}
+    ours = run(DEFAULTS)(peer_scenes.box_on_ground(0.7), time_step=1 / 60, steps=120, observe=observe)
+    assert tuple(ours["place"]) == tuple(theirs.translation)
+    assert tuple(ours["speed"]) == tuple(theirs.linvel)

@@ -1,0 +1,231 @@
+"""What the particle scenes measure, against numbers known from elsewhere; and that a broken engine is seen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import (
+    Distance,
+    Final,
+    Particle,
+    Position,
+    Scene,
+    SimulationFailed,
+    Spring,
+    simulate,
+)
+from spook_tracker.scalar_tests import chain
+from spook_tracker.scalar_tests.case import Metric, Simulate
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.scalar_tests.oscillator import scene as oscillator
+from spook_tracker.scalar_tests.pendulum import scene as pendulum_scene
+from spook_tracker.scalar_tests.planetarium import scene as planetarium_scene
+from tests.toys.broken_engines import deaf, with_scene
+
+# test, configuration, metric, value known from an independent prototype or a closed form, |difference| allowed
+KNOWN = (
+    ("falling_object", "plain", "position_error", 1.635, 1e-9),
+    ("falling_object", "plain", "position_error_read_late", 4.903637, 1e-6),
+    ("falling_object", "half-step", "position_error", 0.0, 1e-11),
+    ("pendulum", "plain", "length_deviation", 0.407038, 0.407038e-5),
+    ("pendulum", "plain", "energy_deviation", 3.433, 5e-4),
+    ("pendulum", "curved", "length_deviation", 9.3e-4, 5e-6),
+    ("pendulum", "curved twice", "length_deviation", 2.5e-6, 5e-8),
+    ("n_pendulum", "plain", "length_deviation", 34.483, 34.483e-4),
+    ("n_pendulum", "plain", "length_deviation_early", 12.164, 12.164e-4),
+    ("n_pendulum", "plain", "weakest_link", 25.0, 0.0),
+    ("n_pendulum", "plain", "energy_at_the_end", -35.85, 5e-3),
+    ("n_pendulum", "plain", "energy_gain", 0.24, 5e-3),
+    ("n_pendulum", "two substeps", "length_deviation", 13.0, 0.05),
+    ("n_pendulum", "curved twice", "length_deviation", 10.0, 0.05),
+    ("n_pendulum", "small motion", "frequency_error", 0.0, 1e-8),
+    ("planetarium", "plain", "energy_oscillation", 9.843e-4, 5e-8),
+    ("planetarium", "plain", "energy_oscillation_as_printed", 2.2857, 5e-5),
+    ("planetarium", "plain", "angular_momentum_drift", 0.0, 1e-12),
+    ("planetarium", "plain", "position_error", 2.5e-4, 5e-6),
+    ("planetarium", "half-step", "position_error", 5.2e-7, 1e-8),
+    ("planetarium", "long run", "energy_drift", 0.0, 1e-7),
+    ("oscillator_spring", "plain", "difference", 0.0, 0.0),
+    ("oscillator_filter", "plain", "left_at_100", 0.961, 5e-4),
+    ("oscillator_filter", "plain", "left_at_50", 0.857, 5e-4),
+    ("oscillator_filter", "plain", "left_at_20", 0.414, 5e-4),
+    ("oscillator_filter", "plain", "left_at_10", 0.0667, 5e-5),
+    ("oscillator_filter", "plain", "left_at_7", 0.0142, 5e-5),
+    ("oscillator_filter", "plain", "left_at_5", 2.7e-3, 5e-5),
+    ("oscillator_filter", "plain", "left_at_2", 7.45e-5, 5e-7),
+)
+PARTICLE_TESTS = [
+    name
+    for name, test in CATALOGUE.items()
+    if all(isinstance(body, Particle) for body in test.example().scene.bodies)
+]
+
+
+def measured(test: str, configuration: str, metric: str, engine: Simulate = simulate) -> float:
+    for measurement in CATALOGUE[test].measurements:
+        if measurement.configuration == configuration and metric in {m.name for m in measurement.metrics}:
+            return measurement.measure(engine)[metric]
+    raise LookupError((test, configuration, metric))
+
+
+def gates(test: str, engine: Simulate) -> list[tuple[Metric, float]]:
+    found = []
+    for measurement in CATALOGUE[test].measurements:
+        metrics = [metric for metric in measurement.metrics if metric.role == "gate"]
+        if metrics:
+            values = measurement.measure(engine)
+            found += [(metric, values[metric.name]) for metric in metrics]
+    return found
+
+
+@pytest.mark.parametrize(("test", "configuration", "metric", "value", "allowed"), KNOWN)
+def test_values_agree_with_what_is_known(
+    test: str, configuration: str, metric: str, value: float, allowed: float
+) -> None:
+    assert abs(measured(test, configuration, metric) - value) <= allowed
+
+
+# --- a broken engine ------------------------------------------------------------------------------------
+
+
+def heavy(scene: Scene) -> Scene:
+    x, y, z = scene.gravity
+    return replace(scene, gravity=(x, y, 1.01 * z))
+
+
+def softened(factor: float) -> Callable[[Scene], Scene]:
+    def change(scene: Scene) -> Scene:
+        rows = tuple(replace(c, compliance=c.compliance * factor) for c in scene.constraints)
+        return replace(scene, constraints=rows)
+
+    return change
+
+
+def damped(factor: float) -> Callable[[Scene], Scene]:
+    def change(scene: Scene) -> Scene:
+        rows = [replace(c, damping=c.damping * factor) for c in scene.constraints if isinstance(c, Distance)]
+        return replace(scene, constraints=tuple(rows))
+
+    return change
+
+
+def stiffened(scene: Scene) -> Scene:
+    springs = [
+        replace(f, stiffness=f.stiffness * (1.0 + 1e-12)) for f in scene.forces if isinstance(f, Spring)
+    ]
+    return replace(scene, forces=tuple(springs))
+
+
+def coarse(scene: Scene, *, time_step: float, duration: float, **options: Any) -> Any:
+    """Takes steps of 20 s, whatever it is told."""
+    return simulate(scene, time_step=20.0, duration=duration, **options)
+
+
+BROKEN: dict[str, Any] = {
+    "falling_object": with_scene(heavy),
+    "pendulum": deaf,
+    "n_pendulum": deaf,
+    "oscillator_spring": with_scene(stiffened),
+    "oscillator_row": with_scene(softened(1.0 + 1e-9)),
+    "oscillator_damped": with_scene(damped(1.0 + 1e-9)),
+    "oscillator_filter": with_scene(damped(1.0 + 1e-6)),
+}
+
+
+@pytest.mark.parametrize("test", BROKEN)
+def test_a_broken_engine_turns_every_gate_red(test: str) -> None:
+    for metric, value in gates(test, BROKEN[test]):
+        assert not metric.passes(value), (metric.name, value)
+
+
+def test_an_engine_that_steps_too_coarsely_loses_the_orbit() -> None:
+    planet = CATALOGUE["planetarium"].measurements[0]
+    found = planet.measure(coarse)
+
+    assert not any(metric.passes(found[metric.name]) for metric in planet.metrics if metric.role == "gate")
+
+
+@pytest.mark.parametrize("test", PARTICLE_TESTS)
+def test_the_slightest_change_of_physics_leaves_a_set_point_or_a_limit(test: str) -> None:
+    """A part in a thousand of gravity, stiffness or attraction is seen, though the printed limit may hold."""
+
+    def change(scene: Scene) -> Scene:
+        x, y, z = scene.gravity
+        forces = [
+            replace(f, stiffness=f.stiffness * 1.001)
+            if isinstance(f, Spring)
+            else replace(f, strength=f.strength * 1.001)  # type: ignore[call-arg]
+            for f in scene.forces
+        ]
+        softer = softened(0.999)(scene)
+        return replace(softer, gravity=(x, y, 1.001 * z), forces=tuple(forces))
+
+    broken = with_scene(change)
+    seen = [
+        not (metric.passes(value) and metric.holds_set_point(value))
+        for measurement in CATALOGUE[test].measurements
+        if "long" not in measurement.configuration
+        for values in [measurement.measure(broken)]
+        for metric in measurement.metrics
+        for value in [values[metric.name]]
+    ]
+
+    assert any(seen)
+
+
+def test_an_engine_that_fails_is_a_failure_and_not_a_value() -> None:
+    def exploding(scene: Scene, **options: Any) -> Any:
+        result = simulate(scene, **options)
+        return replace(result, status="diverged", failure="body 'bob' ran away at step 3")
+
+    with pytest.raises(SimulationFailed, match="ran away"):
+        CATALOGUE["pendulum"].measurements[0].measure(exploding)
+
+
+# --- the references themselves --------------------------------------------------------------------------
+
+
+def test_the_period_of_the_pendulum_is_the_known_one() -> None:
+    assert abs(pendulum_scene.period() - 2.36784194757624) < 1e-14
+    assert abs(float(pendulum_scene.angle(0.0)) - np.pi / 2) < 1e-15
+    assert abs(float(pendulum_scene.angle(pendulum_scene.period() / 2)) + np.pi / 2) < 1e-12
+
+
+def test_kepler_starts_where_the_planet_starts_and_comes_back() -> None:
+    assert np.allclose(planetarium_scene.exact_position(0.0), (1.0, 0.0), atol=1e-14)
+    assert np.allclose(planetarium_scene.exact_position(planetarium_scene.PERIOD), (1.0, 0.0), atol=1e-12)
+    assert abs(planetarium_scene.PERIOD - 365.1583) < 5e-5
+    step = 1e-4
+    forward, back = (np.array(planetarium_scene.exact_position(s)) for s in (step, -step))
+    assert np.allclose((forward - back) / (2 * step), planetarium_scene.SPEED[:2], atol=1e-9)
+
+
+def test_small_motion_of_the_chain_has_the_known_roots() -> None:
+    squares, _ = chain.small_motion(26)
+
+    assert abs(squares[0] / chain.GRAVITY - 0.05456448) < 5e-9
+    assert abs(squares[-1] / chain.GRAVITY - 89.02840275) < 5e-9
+
+
+def test_the_chain_reference_is_the_pendulum_for_one_link() -> None:
+    x, z = chain.exact_tip(1, 2.0)
+    theta = float(pendulum_scene.angle(2.0))
+
+    assert np.allclose((x, z), (np.sin(theta), -np.cos(theta)), atol=1e-10)
+
+
+def test_the_one_step_map_is_what_the_engine_does() -> None:
+    exact = oscillator.one_step(50.4, 0.05) @ np.array([2.0, 3.0])
+    result = simulate(
+        oscillator.row_scene(50.4, 0.05, start=2.0, speed=3.0),
+        time_step=oscillator.TIME_STEP,
+        steps=1,
+        observe={"x": Final(quantity=Position("mass"))},
+    )
+
+    assert abs(result["x"][2] - exact[0]) < 1e-13

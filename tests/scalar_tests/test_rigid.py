@@ -1,0 +1,231 @@
+"""What the rigid scenes measure, against numbers known from elsewhere; and that a broken engine is seen."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import PLAIN, Load, RigidBody, Scene, simulate
+from spook_tracker.engine.joints import Joint
+from spook_tracker.scalar_tests import resting_box, resting_stack
+from spook_tracker.scalar_tests.beam import scene as beam_scene
+from spook_tracker.scalar_tests.cantilever import scene as cantilever
+from spook_tracker.scalar_tests.cantilever import statics
+from spook_tracker.scalar_tests.case import Measurement, Simulate
+from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from tests.toys.broken_engines import with_scene
+
+SLOW = {("beam", 2000.0)}  # a beam of 250 m takes seconds; every night runs it
+# test, configuration, metric, value known from a closed form or an independent prototype, |difference| allowed
+KNOWN = (
+    ("beam", "plain", "height_deviation", 0.0, 1e-12),
+    ("beam", "compliant", "sag", 2.134e-7, 2.134e-10),
+    ("door", "damped", "weight_error", -4.3e-7, 5e-9),
+    ("door", "damped", "weight_error_settled", 0.0, 1e-9),
+    ("door", "printed", "weight_error_at_20_s", 0.0090, 5e-5),
+    ("door", "damped", "split_error", 0.0, 1e-9),
+    ("friction", "cone", "force_ratio", 0.5, 1e-9),
+    ("friction", "cone", "sliding_error", 0.0, 1e-9),
+    ("friction", "cone", "direction_error", 0.0, 1e-6),
+    ("friction", "box", "anisotropy", 0.1, 1e-3),
+    ("cantilever", "dynamic", "tip_against_statics", 0.0, 1e-7),
+    ("cantilever", "self-weight", "self_weight_ratio", 0.9925, 1e-4),
+    ("resting_box", "direct", "depth_on_plane", 0.0, 1e-12),
+    ("resting_box", "direct", "depth_on_box", 0.0, 1e-12),
+    ("resting_ball", "direct", "weight_error", 0.0, 1e-12),
+    ("resting_stack", "direct", "load_error", 0.0, 1e-9),
+    ("resting_stack", "direct", "overlap", 0.0, 1e-9),
+)
+
+
+def measurements(test: str) -> list[Measurement]:
+    return [m for m in CATALOGUE[test].measurements if (test, m.parameters.get("N")) not in SLOW]
+
+
+@pytest.mark.parametrize(("test", "configuration", "metric", "value", "allowed"), KNOWN)
+def test_values_agree_with_what_is_known(
+    test: str, configuration: str, metric: str, value: float, allowed: float
+) -> None:
+    for measurement in measurements(test):
+        if measurement.configuration == configuration and metric in {m.name for m in measurement.metrics}:
+            assert abs(measurement.measure(simulate)[metric] - value) <= allowed
+            return
+    raise LookupError((test, configuration, metric))
+
+
+def test_the_ringing_of_the_printed_door_is_the_known_one() -> None:
+    printed = next(m for m in CATALOGUE["door"].measurements if m.configuration == "printed")
+
+    assert abs(abs(printed.measure(simulate)["weight_error_to_65_s"]) - 0.0193) < 5e-5
+
+
+def test_a_box_on_soft_ground_lies_as_deep_as_its_weight_pushes_it() -> None:
+    """Each of four contact points carries a quarter of the weight, by the compliance of both surfaces: c m g / 2."""
+    on_plane = resting_box.depth(with_scene(yielding), "plane")
+
+    assert on_plane == pytest.approx(1e-7 * resting_box.MASS * resting_box.GRAVITY / 2.0, rel=1e-6)
+    assert resting_box.depth(with_scene(yielding), "box") == pytest.approx(on_plane, rel=1e-6)
+
+
+def test_the_overlap_of_a_stack_is_that_of_its_boxes_and_none_where_they_have_fallen() -> None:
+    """Floor, three boxes: the first sinks 3 mm into the floor, the second 1 mm into it, the third 2 mm into that."""
+    moved = np.zeros((4, 3))
+    moved[1:, 2] = -0.003, -0.004, -0.006
+    assert resting_stack.deepest(moved) == pytest.approx(0.002, abs=1e-15)
+
+    moved[3] = 0.9, 0.0, -2.0
+    assert np.isnan(resting_stack.deepest(moved)), "beside the stack and on the floor"
+
+
+# --- a broken engine ------------------------------------------------------------------------------------
+
+
+def with_joints(**fields: Any) -> Simulate:
+    """An engine whose joints have other numbers than it was given."""
+    return with_scene(
+        lambda scene: replace(
+            scene,
+            constraints=tuple(replace(c, **fields) if isinstance(c, Joint) else c for c in scene.constraints),
+        )
+    )
+
+
+def slippery(scene: Scene) -> Scene:
+    bodies = [
+        replace(b, material=replace(b.material, friction=b.material.friction * 0.99))
+        if isinstance(b, RigidBody)
+        else b
+        for b in scene.bodies
+    ]
+    return replace(scene, bodies=tuple(bodies))
+
+
+def dull(scene: Scene) -> Scene:
+    bodies = [
+        replace(b, material=replace(b.material, restitution=b.material.restitution * 0.97))
+        for b in scene.bodies
+        if isinstance(b, RigidBody)
+    ]
+    return replace(scene, bodies=tuple(bodies))
+
+
+def overloaded(scene: Scene) -> Scene:
+    forces = [
+        replace(f, force=tuple(1.0001 * part for part in f.force)) if isinstance(f, Load) else f  # type: ignore[arg-type]
+        for f in scene.forces
+    ]
+    return replace(scene, forces=tuple(forces))
+
+
+def yielding(scene: Scene) -> Scene:
+    bodies = [
+        replace(b, material=replace(b.material, compliance=1e-7)) if isinstance(b, RigidBody) else b
+        for b in scene.bodies
+    ]
+    return replace(scene, bodies=tuple(bodies))
+
+
+def lighter(scene: Scene) -> Scene:
+    x, y, z = scene.gravity
+    return replace(scene, gravity=(0.999 * x, 0.999 * y, 0.999 * z))
+
+
+def much_lighter(scene: Scene) -> Scene:
+    x, y, z = scene.gravity
+    return replace(scene, gravity=(0.97 * x, 0.97 * y, 0.97 * z))
+
+
+def overdriven(scene: Scene) -> Scene:
+    rows = []
+    for row in scene.constraints:
+        motor = getattr(row, "motor", None)
+        rows.append(replace(row, motor=replace(motor, speed=motor.speed * (1 + 1e-6))) if motor else row)
+    return replace(scene, constraints=tuple(rows))
+
+
+def lopsided(scene: Scene) -> Scene:
+    """Every inertia 1 % off along x."""
+    bodies = [
+        replace(b, inertia=(1.01 * b.inertia[0], *b.inertia[1:]))
+        if isinstance(b, RigidBody) and b.inertia
+        else b
+        for b in scene.bodies
+    ]
+    return replace(scene, bodies=tuple(bodies))
+
+
+BROKEN: dict[str, Simulate] = {
+    "beam": with_joints(compliance=1e-13),  # hidden softness in the locks
+    "door": with_scene(lighter),
+    "friction": with_scene(slippery),
+    "cantilever": with_scene(overloaded),
+    "force_ratio": with_scene(slippery),
+    "slip_angle": with_scene(slippery),
+    "bouncing_ball": with_scene(dull),
+    "rotating_box": with_scene(lopsided),
+    "swinging_door": with_scene(much_lighter),
+    "spinning_top": with_scene(much_lighter),
+    "loaded_rods": with_scene(much_lighter),
+    "motor": with_scene(overdriven),
+    "lock_ring": with_joints(compliance=1e-6),
+    "resting_box": with_scene(yielding),
+    "resting_ball": with_scene(lighter),
+    "resting_stack": with_scene(lighter),
+    "rolling_sphere": with_scene(lighter),
+    "slope_grid": with_scene(slippery),
+    "resting_grid": with_scene(much_lighter),
+    "bounce_grid": with_scene(dull),
+}
+
+
+@pytest.mark.parametrize("test", BROKEN)
+def test_a_broken_engine_turns_a_gate_red(test: str) -> None:
+    found = []
+    for measurement in measurements(test):
+        gates = [metric for metric in measurement.metrics if metric.role == "gate"]
+        if gates:
+            values = measurement.measure(BROKEN[test])
+            found += [metric.passes(values[metric.name]) for metric in gates]
+
+    assert found and not all(found)
+
+
+def test_an_engine_without_refinement_is_caught_by_name() -> None:
+    """One refinement against the true equations is worth five digits where rows are redundant."""
+
+    def rough(scene: Scene, **options: Any) -> Any:
+        method = replace(options.pop("method", PLAIN), refinements=0)
+        return simulate(scene, method=method, **options)
+
+    split = next(m for m in CATALOGUE["door"].measurements if m.metrics[0].name == "split_error")
+    ring = next(m for m in CATALOGUE["lock_ring"].measurements if m.parameters.get("N") == 200)
+
+    for measurement in (split, ring):
+        good, bad = measurement.measure(simulate), measurement.measure(rough)
+        metric = measurement.metrics[0]
+        assert metric.passes(good[metric.name])
+        assert not metric.passes(bad[metric.name]), metric.name
+
+
+# --- the references themselves --------------------------------------------------------------------------
+
+
+def test_the_statics_of_the_beam_bends_as_known() -> None:
+    assert abs(beam_scene.sag_of_compliant_beam() - 2.134e-7) < 2.134e-10
+
+
+def test_the_elastica_is_right_to_leading_order_and_the_pieces_approach_it() -> None:
+    exact = statics.elastica_tip() / cantilever.TIP - 1.0
+
+    assert abs(exact - cantilever.LARGE_DEFLECTION) < 5e-8
+    assert abs(statics.chain_tip(320) / statics.elastica_tip() - 1.0) < 5e-7
+
+
+def test_statics_of_a_small_load_is_the_linear_beam() -> None:
+    tip = statics.chain_tip(20, load=1e-3 * cantilever.LOAD)
+    ends_free = 1.0 / (4.0 * 20.0**2)  # a rigid last half piece: the tip lies below the curve's tangent
+
+    assert abs(tip / (1e-3 * cantilever.TIP) - 1.0) < ends_free
