@@ -80,6 +80,13 @@ public:
         return (block.axial && drives_.of(block.joint)->has_limit) ||
                (joint.general >= 0 && generals_[joint.general].one_sided);
     }
+    /// Whether that row holds nothing where it is not overstepped; other than a coordinate between two ends that are one, or where
+    /// it is after many impacts.
+    bool lets_go(const JointBlock& block) const noexcept {
+        if (!block.axial) return may_stop(block);
+        const Axial& axial = *drives_.of(block.joint);
+        return axial.has_limit && axial.lower < axial.upper && !states[block.joint].folds;
+    }
     bool has_spring(const JointBlock& block) const noexcept {
         return block.axial && drives_.of(block.joint)->has_spring;
     }

@@ -27,6 +27,7 @@ private:
     bool project_island(int island, double share);
     bool take_back(int island);
     bool keep_energy(int island);
+    double hold_row(int k, int row, double now, RowBlock& block) const;
     bool hold_joints(const std::vector<int>& members, const std::vector<int>& own_blocks);
     void keep_spin_energy(int body);
     bool keep_momenta(const std::vector<int>& members, double limit);

@@ -275,6 +275,26 @@ bool OverlapProjection::keep_energy(int island) {
     return true;
 }
 
+/// A joint's row that is to lead back to where it was before the displacement; how far that is, of the joint's size. A stop, or a
+/// wire, that is overstepped by less than before, or was left, may stay so: led back it would close what has parted.
+double OverlapProjection::hold_row(int k, int row, double now, RowBlock& block) const {
+    const JointBlock& joint = joints_.blocks()[k];
+    double wanted = scratch_.overstep[scratch_.overstep_at[k] + row];
+    if (now == 0.0 && wanted == 0.0 && !joints_.always_holds(joint))
+        block.lower[row] = block.upper[row] = 0.0;
+    else if (joints_.lets_go(joint)) {
+        const bool high = (now == 0.0 ? wanted : now) > 0.0;
+        wanted = high ? std::max(0.0, wanted) : std::min(0.0, wanted);
+        (high ? block.upper : block.lower)[row] = 0.0;
+        if (high ? now <= wanted : now >= wanted) {
+            block.right[row] = (wanted - now) / model_.h;
+            return 0.0;
+        }
+    }
+    block.right[row] = (wanted - now) / model_.h;
+    return std::abs(now - wanted) / joints_.gain(k, row).extent;
+}
+
 /// Brings the joints back to where they were before the displacement; false if they cannot be.
 bool OverlapProjection::hold_joints(const std::vector<int>& members, const std::vector<int>& own_blocks) {
     if (own_blocks.empty()) return true;
@@ -313,13 +333,8 @@ bool OverlapProjection::hold_joints(const std::vector<int>& members, const std::
                 for (FurtherBody& other : scratch_.holding_further[k]) other.body = place[other.body];
             }
             for (int row = 0; row < block.size; ++row) {
-                const double wanted = scratch_.overstep[scratch_.overstep_at[k] + row],
-                             change = now[row] - wanted;
-                block.right[row] = -change / model_.h;
-                if (now[row] == 0.0 && wanted == 0.0 && !joints_.always_holds(blocks[k]))
-                    block.lower[row] = block.upper[row] = 0.0;
-                const double relative = std::abs(change) / joints_.gain(k, row).extent;
-                if (!(relative <= worst)) worst = relative;
+                const double off = hold_row(k, row, now[row], block);
+                if (!(off <= worst)) worst = off;
             }
         }
         joints_.states = states;  // assembling them takes notes for the step
