@@ -406,9 +406,11 @@ bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, Fr
     return false;
 }
 
-/// Joints and contacts, or contacts with friction of turning: Newton's method on the whole, at the cost of its pattern, which
-/// knows no friction of turning; where its path ends, the joints are eliminated, and iterations and Newton's method go on
-/// over contacts alone; in turns, each from the best so far, which is the answer.
+/// Joints and contacts, or contacts with friction of turning: the joints are eliminated, and iterations and Newton's method go
+/// over contacts alone, in turns with more iterations each from the best so far, which is the answer. Newton's method on the
+/// whole, at the cost of its pattern, comes before where points are redundant, whose loads its path shares evenly, or many rows
+/// between bounds: it knows no friction of turning. Where few points are beside many bodies it comes after the first turn, from
+/// the start.
 /// `kept`: work() has a copy of the system already.
 void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points, DirectSolver& direct,
                          bool kept, FrictionReport& report) {
@@ -423,12 +425,11 @@ void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points
         report.residual = residual;
         if (!(residual <= fair)) best = system;
     };
-    const bool newton = is_for_newton(system, points, FrictionModel::cone);
-    direct.newton.near_enough = fair;
-    direct.newton.max_losses = 1;
-    direct.newton.max_frozen = max_frozen;
-    const auto by_newton = [&] {
+    const auto by_newton = [&](int frozen) {
+        direct.newton.near_enough = fair;
+        direct.newton.max_losses = 1, direct.newton.max_frozen = frozen;
         const ConeReport found = direct.newton.solve(system, points);
+        direct.newton.max_losses = ConeNewton{}.max_losses, direct.newton.max_frozen = 0;
         report.rounds += found.iterations;
         take(found.residual);
     };
@@ -438,18 +439,17 @@ void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points
         report.rounds += found.newton_steps, report.pgs_iterations += found.iterations;
         take(found.residual);
     };
-    // Where points are few beside many bodies, the joints are eliminated first.
     const std::size_t bodies = system.mass.size();
+    const bool many = ReducedContacts::bounded_rows(system) > ReducedContacts::few_bounded_rows;
+    const bool newton = is_for_newton(system, points, FrictionModel::cone) && (many || is_redundant(system));
     const bool few = bodies >= worth_eliminating && points.size() * bodies_a_point <= bodies;
     if (newton && few && !kept) start = system;
+    if (newton && !few) by_newton(many ? 0 : max_frozen);
     const int turns = std::any_of(points.begin(), points.end(), spook::turns) ? turning_turns : joint_turns;
     for (int turn = 0; turn < turns && !(report.residual <= (turn == 0 ? fair : near)); ++turn) {
-        if (newton && turn == 0 && !few) by_newton();
-        if (turn > 0 || !(report.residual <= fair)) reduced(turn);
-        if (newton && turn == 0 && few && !(report.residual <= fair)) system = start, by_newton();
+        reduced(turn);
+        if (newton && turn == 0 && few && !(report.residual <= fair)) system = start, by_newton(max_frozen);
     }
-    direct.newton.max_losses = ConeNewton{}.max_losses;
-    direct.newton.max_frozen = 0;
     report.converged = report.residual <= fair;
     report.finite = std::isfinite(report.residual);
     for (FrictionPoint& point : points) point.normal = system.rows[point.block].multiplier[0];

@@ -50,6 +50,13 @@ bool ReducedContacts::takes(const MixedSystem& system, const std::vector<Frictio
     return reduces && bounded > 0 && bounded <= most_bounded_rows && (turning || touching <= most_rows);
 }
 
+int ReducedContacts::bounded_rows(const MixedSystem& system) {
+    int bounded = 0;
+    for (const RowBlock& block : system.rows)
+        for (int i = 0; i < block.size; ++i) bounded += BilateralRows::is_bilateral(block, i) ? 0 : 1;
+    return bounded;
+}
+
 void ReducedContacts::analyse(const MixedSystem& system) {
     std::vector<Pattern> pattern;
     std::vector<std::pair<int, int>> further;
@@ -237,17 +244,6 @@ void ReducedContacts::couple_refined(const MixedSystem& system) {
     }
 }
 
-/// u = W z + q.
-void ReducedContacts::measure() {
-    const std::size_t n = static_cast<std::size_t>(rows_);
-    u_ = q_;
-    for (std::size_t j = 0; j < n; ++j) {
-        if (z_[j] == 0.0) continue;
-        const double* column = w_.data() + n * j;
-        for (std::size_t i = 0; i < n; ++i) u_[i] += column[i] * z_[j];
-    }
-}
-
 void ReducedContacts::change(int at, double by) {
     if (by == 0.0) return;
     z_[at] += by;
@@ -300,38 +296,6 @@ void ReducedContacts::iterate() {
         else find_disc(unit);
 }
 
-/// How far a unit is from where a step of projection puts it, as a velocity.
-double ReducedContacts::residual_of(const Unit& unit, const double* z, const double* u) const {
-    if (!(unit.own > 0.0)) return 0.0;
-    const int at = unit.at;
-    if (unit.size == 1) {
-        const double bound = unit.normal < 0 ? 0.0 : unit.coefficient * std::max(0.0, z[unit.normal]);
-        const double lower = unit.normal < 0 ? unit.lower : -bound,
-                     upper = unit.normal < 0 ? unit.upper : bound;
-        return unit.own * std::abs(z[at] - std::clamp(z[at] - u[at] / unit.own, lower, upper));
-    }
-    const double bound = unit.coefficient * std::max(0.0, z[unit.normal]);
-    double t1 = z[at] - u[at] / unit.own, t2 = z[at + 1] - u[at + 1] / unit.own;
-    const double size = length(t1, t2);
-    if (size > bound) t1 *= bound / size, t2 *= bound / size;
-    return unit.own * length(z[at] - t1, z[at + 1] - t2);
-}
-
-double ReducedContacts::residual() const {
-    double worst = 0.0;
-    for (const Unit& unit : units_) {
-        const double own = residual_of(unit, z_.data(), u_.data());
-        if (!(own <= worst)) worst = own;
-    }
-    return worst;
-}
-
-double ReducedContacts::keep_best() {
-    const double now = residual();
-    if (now < best_residual_) best_residual_ = now, best_ = z_;
-    return now;
-}
-
 /// Iterations find which rows push and which slide, Newton's method the answer; where it does not, both again from its end.
 void ReducedContacts::settle(Report& report, double goal, int iterations) {
     best_residual_ = unbounded;
@@ -340,7 +304,7 @@ void ReducedContacts::settle(Report& report, double goal, int iterations) {
         for (int round = 0; round < rounds; ++round) {
             Watch::look();
             for (int k = 0; k < iterations; ++k, ++report.iterations) iterate();
-            polish(report, goal);
+            report.newton_steps += polish(goal, round % 2 == 1);
             if (best_residual_ <= std::max(goal, good * speed_)) break;
         }
     z_ = best_;

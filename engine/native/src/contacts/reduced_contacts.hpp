@@ -21,15 +21,17 @@
 #include "contacts/bilateral_rows.hpp"
 #include "contacts/friction_point.hpp"
 #include "contacts/mass_factors.hpp"
+#include "contacts/reduced_newton.hpp"
 #include "linear/block_ldlt.hpp"
 
 namespace spook {
 
-class ReducedContacts {
+class ReducedContacts : private ReducedNewton {
 public:
     static constexpr int most_rows = 120;  // of contacts: three of one with friction
     // With stops and drives, few of which are at their bounds; and of friction of turning, which no other Newton knows.
     static constexpr int most_bounded_rows = 400;
+    static constexpr int few_bounded_rows = 48;  // cost less than a factor of the whole each iteration
 
     struct Report {
         int iterations = 0, newton_steps = 0;
@@ -38,6 +40,7 @@ public:
 
     /// Whether the system has joints to eliminate, or friction of turning, and few enough rows between bounds.
     static bool takes(const MixedSystem& system, const std::vector<FrictionPoint>& points);
+    static int bounded_rows(const MixedSystem& system);
 
     /// Starts from the multipliers of bounded rows in `system`; fills velocities and all multipliers. Points obey the cone.
     /// `iterations`: between tries of Newton's method.
@@ -46,14 +49,6 @@ public:
     BlockLdlt::Counters counters() const noexcept { return matrix_.counters(); }
 
 private:
-    /// Rows that are found together: one between bounds, or those of a disc (an interval, where one) of a normal's.
-    struct Unit {
-        int block = 0, row = 0, size = 1, at = 0;
-        int normal = -1;           // in z: what bounds it; −1: lower and upper
-        double coefficient = 0.0;  // times that
-        double lower = 0.0, upper = 0.0;
-        double own = 1.0;  // of W's block: its entry, or trace
-    };
     struct Pattern {
         int first = -1, second = -1, size = 0;
         bool operator==(const Pattern&) const = default;
@@ -65,46 +60,29 @@ private:
     void reduce(const MixedSystem& system);
     void couple();
     void couple_refined(const MixedSystem& system);
-    void measure();
     void change(int at, double by);
     void iterate();
     void find_row(const Unit& unit);
     void find_disc(const Unit& unit);
-    double residual_of(const Unit& unit, const double* z, const double* u) const;
-    double residual() const;
-    bool rests_at_bound(const Unit& unit) const;
-    bool find_step(double& worst);
-    bool eliminate(std::size_t m);
-    double share_to_edge(const Unit& unit) const;
-    void take_step();
-    double leaves(const Unit& unit) const;
-    void polish(Report& report, double goal);
-    double keep_best();
     void settle(Report& report, double goal, int iterations);
     void deliver(MixedSystem& system);
 
     BlockLdlt matrix_;
     std::vector<Pattern> pattern_;
     std::vector<std::pair<int, int>> further_;  // of joints over more bodies: node and body
-    int bodies_ = -1, rows_ = 0;
+    int bodies_ = -1;
     struct Joint {
         int block = 0, count = 0;
         int row[6] = {};
         int first_edge = -1, second_edge = -1, further_edge = -1;
     };
     std::vector<Joint> joints_;
-    std::vector<Unit> units_;
     MassFactors mass_;
     bool floored_ = false;                // pivots, by the last factorisation
     std::vector<double> response_;        // columns U⁻ᵀ Gᵀ; A⁻¹ Gᵀ where pivots are floored; of all unknowns
     std::vector<double> line_;            // of the first, what one unknown adds to a row of W
     std::vector<int> touched_, reached_;  // bodies of a row, and columns it reaches
-    std::vector<double> w_, q_, z_, u_, best_;  // W row by row; best_: z
     std::vector<double> right_, free_, whole_;
-    std::vector<double> dense_, step_, image_;  // of Newton's method
-    std::vector<int> active_, place_;
-    std::vector<signed char> pinned_;
-    double speed_ = 0.0, best_residual_ = 0.0;
 };
 
 }  // namespace spook

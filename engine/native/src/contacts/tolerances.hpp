@@ -115,7 +115,7 @@ inline constexpr double near = 1e-6,
 // Bodies on joints from which on these are eliminated first, which takes one factor of all of them; where there are more
 // points than one in so many bodies, Newton's method, which takes one an iteration, ends sooner all the same.
 inline constexpr std::size_t worth_eliminating = 64, bodies_a_point = 4;
-// Beside joints: iterations, four times as many each turn, and paths of the convex part.
+// Beside joints: iterations, four times as many each turn, and paths of the convex part where rows are few.
 inline constexpr int joint_turns = 3, first_iterations = 8, max_frozen = 8;
 inline constexpr int turning_turns = 4;                         // the same with friction of turning
 inline constexpr int pgs_turns = 1, iterations_per_turn = 100;  // where Newton's path ends without an answer
@@ -207,8 +207,11 @@ inline constexpr int refinements_of_floored = 2;  // what the factor lacks there
 // reduced_newton.cpp
 namespace tolerances::reduced_newton {
 inline constexpr int polish_steps = 24;  // of Newton, at most
-inline constexpr int patience = 8;       // steps without half the best residual: those that end do so sooner
-inline constexpr double relief = 1e-9;   // of a row's own entry of W, in Newton's matrix only
+inline constexpr int many_rows = 100;    // from which on a step is dear:
+inline constexpr int patience = 8;       //   so many without half the best residual end it
+// Of a row's own entry of W, in Newton's matrix only: a part of what is left, of the speeds, so that steps stay short where points
+// are redundant (Levenberg, Marquardt); in turn the least, since systems that hardly move ask for large impulses.
+inline constexpr double relief = 1e-9, most_relief = 1e-3, relief_share = 0.1;
 }  // namespace tolerances::reduced_newton
 
 // solve_by_pgs.cpp
