@@ -379,8 +379,8 @@ READING = (
     "*run time* the processor's for the engine's own steps in one thread, models built before. *First* is which comes within an",
     "error soonest, whatever step that takes. What an engine cannot be asked (a joint, a shape, a force it does not show) is not",
     "supported, by name, and no mark against it. What pushes besides gravity does so from Python in dart, motrixsim, newton,",
-    "pybullet and sapien, before every step, and in mujoco, in every stage, where it is the pull of the sun in planetarium: there",
-    "the run times of these six are Python's more than theirs. All others push in their own loop.",
+    "pybullet and sapien, before every step, and where it is the pull of the sun in planetarium in rapier3d, too, and in mujoco,",
+    "in every stage: there the run times of these seven are Python's more than theirs. All others push in their own loop.",
 )
 
 

@@ -42,6 +42,9 @@ from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Compound, Shape
 
 RIGID = 1e-8  # m/N or rad/(N m): a softer row is a spring, which an engine must be able to hold as such
+NOWHERE = frozenset(
+    {"the joint tyre", "the force of the joint tyre", "restitution of the slip"}
+)  # no engine here has it
 _FROM_ENGINE: tuple[type[Quantity], ...] = (
     ConstraintForce,
     ContactForce,
@@ -70,14 +73,17 @@ class Capabilities:
     )  # of ConstraintForce, ContactForce, ContactCount, Penetration
     shows_force_of: frozenset[type[Constraint]] | None = None  # None: of every joint, if of any
     compliance: bool = False  # rows of a stated stiffness
+    soft: frozenset[type[Constraint]] = frozenset()  # joints alone that have one
     friction: bool = False
     rolling_friction: bool = False  # of rolling, and of turning on the spot
     joint_friction: bool = False  # constant; none has any that grows with a joint's load
     restitution: bool = False
+    surface_velocity: bool = False  # of what moves along itself, as a belt does
     tangential_restitution: bool = False  # of the slip
     motors: bool = False
     limits: bool = False
     springs: bool = False  # in a joint
+    springs_aside: bool = False  # the force, on points beside centres
     armature: bool = False
     loops: bool = True  # closed chains of joints
     kinematic: bool = False
@@ -175,7 +181,7 @@ def _of_scene(can: Capabilities, scene: Scene) -> Iterator[str]:
     for force in scene.forces:
         if type(force) not in can.forces:
             yield f"the force {_words(type(force))}"
-        if isinstance(force, Spring) and force.aside:
+        if isinstance(force, Spring) and force.aside and not can.springs_aside:
             yield "a spring beside a body's centre"
 
 
@@ -205,17 +211,51 @@ def _of_surface(can: Capabilities, body: RigidBody) -> Iterator[str]:
         yield "friction of rolling or turning"
     if body.material.oriented:
         yield "friction that differs with the direction"
-    if any(body.surface_velocity):
+    if any(body.surface_velocity) and not can.surface_velocity:
         yield "a surface that moves along itself"
     if body.inertia_axes != (1.0, 0.0, 0.0, 0.0):
         yield "principal axes of inertia beside those of the body"
 
 
+def is_spring(can: Capabilities, constraint: Constraint) -> bool:
+    """Whether a distance that gives is asked as the spring it is: of stiffness 1/compliance and viscosity
+    damping/compliance, for engines that have springs and no compliant rows."""
+    if not isinstance(constraint, Distance) or constraint.compliance <= RIGID:
+        return False
+    if can.compliance or Distance in can.soft:
+        return False
+    aside = any(any(anchor) for anchor in constraint.anchors)
+    return Spring in can.forces and (can.springs_aside or not aside)
+
+
+def sprung(can: Capabilities, scene: Scene) -> Scene:
+    """The scene with such distances as springs."""
+    rows = [row for row in scene.constraints if isinstance(row, Distance) and is_spring(can, row)]
+    if not rows:
+        return scene
+    springs = tuple(
+        Spring(
+            name=f"{row.name} (row)",
+            between=row.between,
+            stiffness=1.0 / row.compliance,
+            rest_length=scene.length(row) if row.rest_length is None else row.rest_length,
+            viscosity=(row.damping or 0.0) / row.compliance,
+            anchors=row.anchors,
+        )
+        for row in rows
+    )
+    kept = tuple(one for one in scene.constraints if one not in rows)
+    return replace(scene, constraints=kept, forces=(*scene.forces, *springs))
+
+
 def _of_constraint(can: Capabilities, constraint: Constraint) -> Iterator[str]:
+    if is_spring(can, constraint):
+        return
     if type(constraint) not in can.joints:
         yield f"the joint {_words(type(constraint))}"
     soft = constraint.compliance
-    if max(soft if isinstance(soft, tuple) else (soft,)) > RIGID and not can.compliance:
+    gives = max(soft if isinstance(soft, tuple) else (soft,)) > RIGID
+    if gives and not can.compliance and type(constraint) not in can.soft:
         yield "compliance of a joint"
     if isinstance(constraint, Joint) and (constraint.strength or constraint.torque_strength) is not None:
         yield "a joint that breaks"
@@ -260,6 +300,10 @@ def _of_observables(can: Capabilities, scene: Scene, observe: Mapping[str, Obser
         asked = what.quantity
         if isinstance(asked, _FROM_ENGINE) and type(asked) not in can.shows:
             yield f"the observable {_words(type(asked))}"
+        elif isinstance(asked, ConstraintForce) and any(
+            is_spring(can, c) for c in scene.constraints if asked.constraint in (None, c.name)
+        ):
+            yield "the force of a distance that gives"
         elif isinstance(asked, ConstraintForce) and can.shows_force_of is not None:
             kinds = [type(c) for c in scene.constraints if asked.constraint in (None, c.name)]
             for kind in kinds:
@@ -267,7 +311,9 @@ def _of_observables(can: Capabilities, scene: Scene, observe: Mapping[str, Obser
                     yield f"the force of the joint {_words(kind)}"
         # A name the scene has not is a mistake of the test, not a lack of the engine.
         if isinstance(asked, Violation | ConstraintForce) and asked.constraint is not None:
-            scene.constraint(asked.constraint)
+            named = scene.constraint(asked.constraint)
+            if isinstance(asked, Violation) and not isinstance(named, Distance | Joint):
+                yield f"the observable violation of a {_words(type(named))}"
         if isinstance(asked, JointCoordinate):
             scene.constraint(asked.joint)
 
@@ -306,7 +352,7 @@ def run(
     refuse_unsupported(adapter, chosen, scene, observe)
     asked = [type(what.quantity) for what in observe.values()]
     task = Task(
-        scene=scene,
+        scene=sprung(adapter.capabilities, scene),
         time_step=float(time_step),
         steps=count,
         every_step=needs_every_step(observe, count),
@@ -316,7 +362,7 @@ def run(
         contacts=not {ContactForce, ContactCount, ContactPoints, Penetration}.isdisjoint(asked),
         time_limit=time_limit,
     )
-    return _result(task, adapter.record(task), observe)
+    return _result(replace(task, scene=scene), adapter.record(task), observe)
 
 
 def _of_model(
@@ -352,7 +398,7 @@ def refuse_unsupported(
         return
     always = unsupported(adapter.capabilities, scene, observe)
     own = [
-        one for one in lacking if one in can.absent or one not in always
+        one for one in lacking if one in can.absent | NOWHERE or one not in always
     ]  # the engine's, or this configuration's
     ours = [one for one in lacking if one not in own]
     said = [f"{adapter.name} ({configuration.name}) does not support {', '.join(own)}"] if own else []

@@ -69,9 +69,11 @@ class Recording:
 
 
 def wanted_samples(observe: Mapping[str, Observable], steps: int) -> npt.NDArray[np.int64]:
-    """The steps at which something is read, with the start and the end, ascending."""
+    """The steps at which something is read, with the start and the end, ascending; all where turns must be counted."""
     wanted = np.zeros(steps + 1, dtype=bool)
     wanted[[0, steps]] = True
+    if any(isinstance(what.quantity, JointCoordinate) for what in observe.values()):
+        wanted[:] = True
     for what in observe.values():
         last = steps if what.last is None else min(what.last, steps)
         if isinstance(what, Final):
@@ -82,8 +84,13 @@ def wanted_samples(observe: Mapping[str, Observable], steps: int) -> npt.NDArray
 
 
 def needs_every_step(observe: Mapping[str, Observable], steps: int) -> bool:
-    """Whether something is read between the start and the end."""
-    return any(not isinstance(what, Final) or what.last not in (None, steps) for what in observe.values())
+    """Whether something is read between the start and the end, or turns are counted on the way."""
+    return any(
+        isinstance(what.quantity, JointCoordinate)
+        or not isinstance(what, Final)
+        or what.last not in (None, steps)
+        for what in observe.values()
+    )
 
 
 def observed(

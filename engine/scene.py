@@ -271,8 +271,8 @@ class Scene:
                 return constraint
         raise SceneError(f"there is no constraint named {name!r}")
 
-    def anchor(self, constraint: Distance, end: int) -> Vector:
-        """World position [m] at the start of one end (0 or 1) of a distance constraint."""
+    def anchor(self, constraint: Distance | Spring, end: int) -> Vector:
+        """World position [m] at the start of one end (0 or 1) of a distance constraint or a spring."""
         where = constraint.between[end]
         return self._anchor(constraint, end, {where: self.body(where)} if isinstance(where, str) else {})
 

@@ -38,6 +38,15 @@ class Cannon:
         shows=frozenset({ConstraintForce}),
         shows_force_of=frozenset({Distance}),
         friction=True,
+        absent=frozenset(
+            {
+                "the joint relation",
+                "the shape cylinder",
+                "the force fluid",
+                "friction of rolling or turning",
+                "friction that differs with the direction",
+            }
+        ),
     )
     configurations = (
         Configuration(

@@ -18,9 +18,19 @@ import numpy as np
 from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
 from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, Universal, frictions
+from spook_tracker.engine.joints import (
+    Ball,
+    Distance,
+    Hinge,
+    Joint,
+    Lock,
+    Prismatic,
+    Universal,
+    frictions,
+)
 from spook_tracker.engine.observe import ConstraintForce, ContactCount, ContactForce, Penetration
 from spook_tracker.engine.peers.dart_file import READS, run_model
+from spook_tracker.engine.peers.frames import drive
 from spook_tracker.engine.peers.joint_tree import (
     Node,
     alone,
@@ -64,7 +74,10 @@ class Dart:
         shows_force_of=frozenset({Distance, Ball, Hinge, Lock}),
         friction=True,
         joint_friction=True,
+        motors=True,
+        springs_aside=True,
         restitution=True,
+        absent=frozenset({"the force fluid", "friction of rolling or turning"}),
     )
     configurations = (
         Configuration(
@@ -79,7 +92,7 @@ class Dart:
             reason="free bodies held by constraints, solved by the same direct method. It has none of distance",
             expected_order=1.0,
             options={"joints": False},
-            lacks=("joint_friction",),
+            lacks=("joint_friction", "motors"),
         ),
     )
 
@@ -106,6 +119,7 @@ class _Run:
         self.restitution = one_restitution(scene, "dart")
         self.pushes = Pushes(scene)
         self.bodies: dict[str, Any] = {}
+        self.driven: list[tuple[Any, float]] = []  # joints with motors, and their speeds
         self.world = dart.simulation.World()
         self.world.setTimeStep(task.time_step)
         self.world.setGravity(np.array(scene.gravity))
@@ -125,8 +139,10 @@ class _Run:
         for constraint in left:
             for one in self._held(constraint):
                 solver.addConstraint(one)
-        if task.constraint_forces and (left or (scene.contacts and solid(scene))):
-            raise NotSupported("dart does not show forces of joints where contacts or loops act, too")
+        if task.constraint_forces and (left or self.driven or (scene.contacts and solid(scene))):
+            raise NotSupported(
+                "dart does not show forces of joints where contacts or loops act, too, or motors"
+            )
 
     def _skeleton(self, top: str) -> None:
         """One free or fixed body, with all that hangs from it."""
@@ -189,7 +205,18 @@ class _Run:
         )
         joint.setAxis(axes[0])
         joint.setCoulombFriction(0, max(frictions(tie)[0]))
+        if getattr(tie, "motor", None) and (driven := drive(tie, "dart")) is not None:
+            self._drive(joint, driven, 1.0 if tie.between[1] == node.body.name else -1.0)
         return joint, body
+
+    def _drive(self, joint: Any, driven: tuple[float, float | None], sign: float) -> None:
+        """A servo: a row of bounded force that holds a speed, which DART forgets after each step."""
+        speed, most = driven
+        joint.setActuatorType(dart.dynamics.ActuatorType.SERVO)
+        if most is not None:
+            joint.setForceLowerLimit(0, -most)
+            joint.setForceUpperLimit(0, most)
+        self.driven.append((joint, sign * speed))
 
     def _fill(self, given: Particle | RigidBody, body: Any) -> None:
         """Mass, inertia and surface."""
@@ -242,8 +269,10 @@ class _Run:
         """DART's constraints where no joint can be."""
         if isinstance(constraint, Distance):
             raise NotSupported("dart has no constraint of distance, only rods that joints can stand for")
-        if any(frictions(constraint)[0]):
-            raise NotSupported(f"dart has no friction in a constraint, as {constraint.name!r} would be")
+        if any(frictions(constraint)[0]) or getattr(constraint, "motor", None):
+            raise NotSupported(
+                f"dart does not support friction or a motor in a constraint, as {constraint.name!r} would be"
+            )
         one, two = constraint.between
         if one == WORLD or fixed(self.nodes[one].body):
             one, two = two, one
@@ -265,6 +294,8 @@ class _Run:
         for _ in range(count):
             if self.pushes:
                 self._push()
+            for joint, speed in self.driven:
+                joint.setCommand(0, speed)
             self.world.step()
 
     def health(self) -> str:
@@ -278,7 +309,14 @@ class _Run:
         moving = [self.bodies[body.name] for body in self.scene.bodies]
         where = np.array([body.getWorldTransform().translation().ravel() for body in moving])
         speeds = np.array([body.getCOMLinearVelocity() for body in moving])
-        forces, torques = self.pushes.at(where, speeds)
+        more: tuple[Any, ...] = ()
+        if self.pushes.aside:
+            turns = [body.getWorldTransform().quaternion() for body in moving]
+            more = (
+                np.array([[q.w(), q.x(), q.y(), q.z()] for q in turns]),
+                np.array([body.getAngularVelocity() for body in moving]),
+            )
+        forces, torques = self.pushes.at(where, speeds, *more)
         for body, force, torque in zip(moving, forces, torques, strict=True):
             body.addExtForce(force)
             if torque.any():

@@ -11,9 +11,10 @@ import numpy as np
 from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
 from spook_tracker.engine.forces import CentralGravity, Load, Spring
 from spook_tracker.engine.joints import Joint
+from spook_tracker.engine.meshes import HeightField, TriangleMesh
 from spook_tracker.engine.peers import node
 from spook_tracker.engine.protocol import Task
-from spook_tracker.engine.shapes import Box, Capsule, Plane, Shape, Sphere
+from spook_tracker.engine.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Plane, Shape, Sphere
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
@@ -53,6 +54,7 @@ def described(task: Task, folder: Path, constraints: list[dict[str, Any]]) -> di
                 "stiffness": f.stiffness,
                 "rest": f.rest_length,
                 "viscosity": f.viscosity,
+                "anchors": f.anchors,
             }
             for f in scene.forces
             if isinstance(f, Spring)
@@ -84,6 +86,7 @@ def _body(body: Particle | RigidBody) -> dict[str, Any]:
             "spin": (0.0, 0.0, 0.0),
             "friction": 0.0,
             "restitution": 0.0,
+            "belt": None,
             "shape": None,
         }
     moves = body.motion == "dynamic"
@@ -97,6 +100,7 @@ def _body(body: Particle | RigidBody) -> dict[str, Any]:
         "spin": body.angular_velocity,
         "friction": body.material.friction,
         "restitution": body.material.restitution,
+        "belt": body.surface_velocity if any(body.surface_velocity) else None,
         "shape": None if body.shape is None else _shape(body.shape),
     }
 
@@ -109,6 +113,15 @@ def _shape(shape: Shape) -> dict[str, Any]:
         return {"kind": "box", "half": [0.5 * edge for edge in shape.size], "turn": UPRIGHT}
     if isinstance(shape, Capsule):
         return {"kind": "capsule", "radius": shape.radius, "half": 0.5 * shape.length, "turn": UPRIGHT}
+    if isinstance(shape, Cylinder):
+        return {"kind": "cylinder", "radius": shape.radius, "half": 0.5 * shape.length, "turn": UPRIGHT}
+    if isinstance(shape, ConvexHull):
+        return {"kind": "hull", "corners": shape.corners, "turn": UPRIGHT}
+    if isinstance(shape, TriangleMesh | HeightField):
+        return {"kind": "mesh", "corners": shape.corners, "faces": shape.faces, "turn": UPRIGHT}
+    if isinstance(shape, Compound):
+        parts = [{"shape": _shape(p.shape), "at": p.position, "turn": p.orientation} for p in shape.parts]
+        return {"kind": "compound", "parts": parts, "turn": UPRIGHT}
     assert isinstance(shape, Plane)
     return {"kind": "plane", "normal": list(shape.normal), "turn": list(upwards(shape.normal))}
 

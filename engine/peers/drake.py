@@ -45,6 +45,15 @@ class Drake:
         shows=frozenset({ConstraintForce, ContactForce}),
         shows_force_of=frozenset({Distance, Ball, Hinge, Lock}),
         friction=True,
+        springs_aside=True,
+        absent=frozenset(
+            {
+                "restitution",
+                "the force fluid",
+                "friction of rolling or turning",
+                "friction that differs with the direction",
+            }
+        ),
     )
     configurations = (
         Configuration(

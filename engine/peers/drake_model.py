@@ -225,8 +225,8 @@ class Model:
         if spring.rest_length <= 0.0:
             raise NotSupported("drake does not support a spring without a rest length")
         ends = [
-            (self.bodies[e], np.zeros(3)) if isinstance(e, str) else (self.plant.world_body(), np.array(e))
-            for e in spring.between
+            (self.bodies[e], np.array(a)) if isinstance(e, str) else (self.plant.world_body(), np.array(e))
+            for e, a in zip(spring.between, spring.anchors, strict=True)
         ]
         self.plant.AddForceElement(
             LinearSpringDamper(*ends[0], *ends[1], spring.rest_length, spring.stiffness, spring.viscosity)

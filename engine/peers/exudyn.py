@@ -18,10 +18,10 @@ from exudyn.rigidBodyUtilities import RigidBodyInertia
 
 from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
 from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import Load
+from spook_tracker.engine.forces import Load, Spring
 from spook_tracker.engine.joints import Ball, Distance, Hinge, Lock, Prismatic
 from spook_tracker.engine.observe import ConstraintForce
-from spook_tracker.engine.protocol import Capabilities, Configuration, Task
+from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
 from spook_tracker.engine.recorded_joints import joint_point, turned
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
@@ -39,7 +39,8 @@ class Exudyn:
     name = "exudyn"
     capabilities = Capabilities(
         joints=frozenset({Distance, Lock, Ball, Hinge, Prismatic}),
-        forces=frozenset({Load}),
+        forces=frozenset({Load, Spring}),
+        springs_aside=True,
         shows=frozenset({ConstraintForce}),
         shows_force_of=frozenset({Distance}),
     )
@@ -79,6 +80,9 @@ class _Run:
         for constraint in task.scene.constraints:
             self._constraint(constraint)
         for force in task.scene.forces:
+            if isinstance(force, Spring):
+                self._spring(force)
+                continue
             assert isinstance(force, Load)
             item = self.items[force.body]
             self.system.CreateForce(bodyNumber=item, loadVector=list(force.force))
@@ -114,15 +118,37 @@ class _Run:
             gravity=gravity,
         )
 
+    def _ends(self, held: Distance | Spring) -> tuple[list[Any], list[list[float]]]:
+        """Both items, and the points on them."""
+        items: list[Any] = []
+        points: list[list[float]] = []
+        for end, anchor in zip(held.between, held.anchors, strict=True):
+            fixed = not isinstance(end, str) or self.items[end] == self.ground
+            items.append(self.ground if fixed else self.items[str(end)])
+            points.append(list(self.task.scene.anchor(held, len(points))) if fixed else list(anchor))
+        return items, points
+
+    def _spring(self, spring: Spring) -> None:
+        items, points = self._ends(spring)
+        place = {"itemNumbers": items, "localPosition0": points[0], "localPosition1": points[1]}
+        if spring.rest_length > 0.0:
+            self.system.CreateSpringDamper(
+                referenceLength=spring.rest_length,
+                stiffness=spring.stiffness,
+                damping=spring.viscosity,
+                **place,
+            )
+            return
+        if spring.viscosity:
+            raise NotSupported(
+                f"exudyn does not support viscosity along {spring.name!r}, which has no rest length"
+            )
+        self.system.CreateCartesianSpringDamper(stiffness=[spring.stiffness] * 3, damping=[0.0] * 3, **place)
+
     def _constraint(self, constraint: Any) -> None:
         scene = self.task.scene
         if isinstance(constraint, Distance):
-            items: list[Any] = []
-            points: list[list[float]] = []
-            for end, anchor in zip(constraint.between, constraint.anchors, strict=True):
-                fixed = not isinstance(end, str) or self.items[end] == self.ground
-                items.append(self.ground if fixed else self.items[str(end)])
-                points.append(list(scene.anchor(constraint, len(points))) if fixed else list(anchor))
+            items, points = self._ends(constraint)
             length = scene.length(constraint) if constraint.rest_length is None else constraint.rest_length
             made = self.system.CreateDistanceConstraint(
                 itemNumbers=items, localPosition0=points[0], localPosition1=points[1], distance=length

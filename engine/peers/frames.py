@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from spook_tracker.engine.bodies import WORLD, Particle
+from spook_tracker.engine.joints import frictions
+from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.recorded_joints import conjugate, joint_point, product, turned_back
 from spook_tracker.engine.result import Array
 from spook_tracker.engine.scene import Scene
@@ -35,6 +37,17 @@ def ends_of(scene: Scene, joint: Any) -> tuple[End, End]:
         x, y, z = turned_back(turn, at - place)
         found.append(End((float(x), float(y), float(z)), product(conjugate(turn), axes)))
     return found[0], found[1]
+
+
+def drive(joint: Any, engine: str) -> tuple[float, float | None] | None:
+    """Speed and largest force [N or N m; None is unbounded] of what drives or brakes a joint: friction is a motor that is to
+    stand still. Raises NotSupported for both at once."""
+    motor, dry = getattr(joint, "motor", None), max(frictions(joint)[0])
+    if motor is None:
+        return (0.0, dry) if dry else None
+    if dry:
+        raise NotSupported(f"{engine} does not support friction in {joint.name!r}, which a motor drives")
+    return float(motor.speed), None if motor.max_force is None else float(motor.max_force)
 
 
 def along(axis: tuple[float, float, float]) -> Array:

@@ -47,6 +47,8 @@ def grown(scene: Scene) -> dict[str, Node]:
     nodes = alone(scene)
     beside: dict[str, list[Constraint]] = {}
     for constraint in scene.constraints:
+        if not isinstance(constraint, Distance | Joint):  # wires and relations hang nothing
+            continue
         if isinstance(constraint, Distance) and not _is_rod(scene, constraint):
             continue
         for end in constraint.between:

@@ -35,11 +35,42 @@ serve(async (task) => {
     if (shape.kind === "sphere") return new J.SphereShape(shape.radius);
     if (shape.kind === "box") return new J.BoxShape(vec(shape.half), Math.min(0.05, 0.2 * Math.min(...shape.half)));
     if (shape.kind === "plane") return new J.PlaneShape(new J.Plane(vec(shape.normal), 0), null, PLANE);
-    const upright = new J.CapsuleShapeSettings(shape.half, shape.radius); // along y; ours lies along z
+    if (shape.kind === "compound") return compoundOf(shape.parts);
+    if (shape.kind === "hull") return hullOf(shape.corners);
+    if (shape.kind === "mesh") return meshOf(shape);
+    const rounded = Math.min(0.05, 0.2 * Math.min(shape.half, shape.radius)); // of a cylinder's edges
+    const upright = // along y; ours lies along z
+      shape.kind === "cylinder"
+        ? new J.CylinderShapeSettings(shape.half, shape.radius, rounded)
+        : new J.CapsuleShapeSettings(shape.half, shape.radius);
     const turn = J.Quat.prototype.sRotation(vec([1, 0, 0]), Math.PI / 2);
     return new J.RotatedTranslatedShapeSettings(vec([0, 0, 0]), turn, upright).Create().Get();
   }
 
+  function meshOf({ corners, faces }) {
+    const triangles = new J.TriangleList();
+    for (const face of faces) triangles.push_back(new J.Triangle(...face.map((k) => vec(corners[k]))));
+    return new J.MeshShapeSettings(triangles, new J.PhysicsMaterialList()).Create().Get();
+  }
+
+  function hullOf(corners) {
+    const settings = new J.ConvexHullShapeSettings();
+    for (const corner of corners) settings.mPoints.push_back(vec(corner));
+    return centred(settings.Create().Get());
+  }
+
+  function compoundOf(parts) {
+    const settings = new J.StaticCompoundShapeSettings();
+    for (const part of parts) settings.AddShapeShape(vec(part.at), quat(part.turn), shapeOf(part.shape), 0);
+    return centred(settings.Create().Get());
+  }
+
+  // The centre of mass, which Jolt puts where the shape has it, put back to where the body's is.
+  function centred(shape) {
+    return new J.OffsetCenterOfMassShape(shape, vec(three(shape.GetCenterOfMass()).map((x) => -x)));
+  }
+
+  const three = (v) => [v.GetX(), v.GetY(), v.GetZ()];
   const filter = new J.GroupFilterTable(task.bodies.length);
   task.apart.forEach(([a, b]) => filter.DisableCollision(a, b));
   const interface_ = system.GetBodyInterface();
@@ -56,6 +87,7 @@ serve(async (task) => {
     made.mApplyGyroscopicForce = task.options.gyroscopic;
     made.mFriction = one.friction; // two surfaces: the geometric mean, and the larger restitution, as the scene wants
     made.mRestitution = one.restitution;
+    if (task.options.edges && one.mass > 0) made.mEnhancedInternalEdgeRemoval = true;
     made.mCollisionGroup = new J.CollisionGroup(filter, 0, index);
     if (one.mass > 0) {
       made.mOverrideMassProperties = J.EOverrideMassProperties_MassAndInertiaProvided;
@@ -81,11 +113,50 @@ serve(async (task) => {
       new J.BodyCreationSettings(new J.EmptyShape(), place([0, 0, 0]), quat([1, 0, 0, 0]), J.EMotionType_Static, 0),
     );
 
+  function spring(settings, stiffness, viscosity) {
+    settings.mMode = J.ESpringMode_StiffnessAndDamping;
+    settings.mStiffness = stiffness;
+    settings.mDamping = viscosity;
+  }
+
+  // A drive of hinge or slide: Jolt's velocity motor, which a row of its own holds.
+  function drive(constraint, { speed, most }, kind) {
+    const motor = constraint.GetMotorSettings();
+    if (kind === "hinge") {
+      [motor.mMinTorqueLimit, motor.mMaxTorqueLimit] = [-most, most];
+      constraint.SetTargetAngularVelocity(speed);
+    } else {
+      [motor.mMinForceLimit, motor.mMaxForceLimit] = [-most, most];
+      constraint.SetTargetVelocity(speed);
+    }
+    constraint.SetMotorState(J.EMotorState_Velocity);
+  }
+
+  // Two joints of bodies that turn or slide against what stands: `a` x + `b` y = 0 of their coordinates.
+  function relate({ kind, names, axes, factors }) {
+    const [one, two] = names.map((name) => made.get(name));
+    const settings = kind === "gear" ? new J.GearConstraintSettings() : new J.RackAndPinionConstraintSettings();
+    settings.mSpace = J.EConstraintSpace_WorldSpace;
+    settings.mRatio = factors[1] / factors[0]; // gear: x = -ratio y; rack, x of the pinion: x = ratio y
+    if (kind === "gear") [settings.mHingeAxis1, settings.mHingeAxis2] = axes.map(vec);
+    else {
+      [settings.mHingeAxis, settings.mSliderAxis] = axes.map(vec);
+      settings.mRatio *= -1;
+    }
+    const held = settings.Create(one.moving, two.moving);
+    const type = kind === "gear" ? J.GearConstraint : J.RackAndPinionConstraint;
+    // Drift is mended by the joints' own coordinates, which count the other way where what stands is their second end.
+    if (one.moving === one.second && two.moving === two.second)
+      J.castObject(held, type).SetConstraints(one.constraint, two.constraint);
+    system.AddConstraint(held);
+  }
+
   function settingsOf(one) {
     if (one.kind === "distance") {
       const rod = new J.DistanceConstraintSettings();
       [rod.mPoint1, rod.mPoint2] = one.points.map(place);
       rod.mMinDistance = rod.mMaxDistance = one.length;
+      if (one.stiffness > 0) spring(rod.mLimitsSpringSettings, one.stiffness, one.viscosity);
       return [rod, J.DistanceConstraint];
     }
     const [kind, type] = {
@@ -115,11 +186,14 @@ serve(async (task) => {
     const [a, b] = one.ends.map((end) => (end === null ? world : bodies[end]));
     const constraint = settings.Create(a, b);
     system.AddConstraint(constraint);
-    made.set(one.name, { kind: one.kind, second: b, first: a, constraint: J.castObject(constraint, type) });
+    const cast = J.castObject(constraint, type);
+    if (one.motor) drive(cast, one.motor, one.kind);
+    const moving = one.ends[1] === null ? a : b;
+    made.set(one.name, { kind: one.kind, second: b, first: a, moving, constraint: cast });
   }
+  task.relations.forEach(relate);
 
   // What Jolt shows of a constraint are the impulses of the last step, on its second body; of a lock this package does not.
-  const three = (v) => [v.GetX(), v.GetY(), v.GetZ()];
   const cross = ([a, b, c], [x, y, z]) => [b * z - c * y, c * x - a * z, a * y - b * x];
   function turned(body, local) {
     return three(body.GetRotation().MulVec3(local));
@@ -129,19 +203,36 @@ serve(async (task) => {
     const push = three(constraint.GetTotalLambdaPosition());
     if (kind === "ball") return [...push, 0, 0, 0];
     const rows = constraint.GetTotalLambdaRotation();
+    const driven = constraint.GetTotalLambdaMotor();
     const lambdas = [rows.GetComponent(0), rows.GetComponent(1)];
     const axis = turned(first, constraint.GetLocalSpaceHingeAxis1());
     const b = three(vec(turned(second, constraint.GetLocalSpaceHingeAxis2())).GetNormalizedPerpendicular());
     const c = cross(turned(second, constraint.GetLocalSpaceHingeAxis2()), b);
     const [one, two] = [cross(b, axis), cross(c, axis)];
-    return [...push, ...one.map((_, i) => one[i] * lambdas[0] + two[i] * lambdas[1])];
+    return [...push, ...one.map((_, i) => one[i] * lambdas[0] + two[i] * lambdas[1] + axis[i] * driven)];
   }
 
   let deepest = 0;
-  if (task.depth) {
+  const belts = new Map(); // body → velocity of what moves along itself, in its axes
+  task.bodies.forEach((one, index) => {
+    if (one.belt) belts.set(bodies[index].GetID().GetIndex(), vec(one.belt));
+  });
+  const flow = vec([0, 0, 0]);
+  function belt(body, settings, sign) {
+    const along = belts.get(body.GetID().GetIndex());
+    if (!along) return;
+    const before = three(settings.mRelativeLinearSurfaceVelocity);
+    flow.Set(...turned(body, along).map((x, i) => before[i] + sign * x));
+    settings.mRelativeLinearSurfaceVelocity = flow;
+  }
+  if (task.depth || belts.size > 0) {
     const listener = new J.ContactListenerJS();
-    const look = (_a, _b, manifold) => {
+    const look = (a, b, manifold, settings) => {
       deepest = Math.max(deepest, J.wrapPointer(manifold, J.ContactManifold).mPenetrationDepth);
+      if (belts.size === 0) return;
+      const asked = J.wrapPointer(settings, J.ContactSettings); // of the second against the first
+      belt(J.wrapPointer(a, J.Body), asked, -1);
+      belt(J.wrapPointer(b, J.Body), asked, 1);
     };
     listener.OnContactValidate = () => J.ValidateResult_AcceptAllContactsForThisBodyPair;
     listener.OnContactAdded = listener.OnContactPersisted = look;
@@ -153,6 +244,24 @@ serve(async (task) => {
   function act(body, x, y, z) {
     force.Set(x, y, z);
     body.AddForce(force);
+  }
+
+  // A point of a body, given in its axes: where it is, and how fast.
+  const anchored = (anchor) => (anchor.some((x) => x !== 0) ? vec(anchor) : null);
+  const springs = task.springs.map((spring) => ({ ...spring, anchors: spring.anchors.map(anchored) }));
+  function reached(end, anchor) {
+    const at = three(bodies[end].GetPosition());
+    return anchor ? turned(bodies[end], anchor).map((x, i) => x + at[i]) : at;
+  }
+  function speedOf(end, anchor) {
+    const speed = three(bodies[end].GetLinearVelocity());
+    if (!anchor) return speed;
+    const round = cross(three(bodies[end].GetAngularVelocity()), turned(bodies[end], anchor));
+    return speed.map((x, i) => x + round[i]);
+  }
+  function twist(end, anchor, pull) {
+    force.Set(...cross(turned(bodies[end], anchor), pull));
+    bodies[end].AddTorque(force);
   }
 
   const loads = task.loads.map((load) => [bodies[load.body], vec(load.force), vec(load.torque)]);
@@ -169,15 +278,18 @@ serve(async (task) => {
         const size = (-mass * strength) / (x * x + y * y + z * z) ** 1.5;
         act(body, size * x, size * y, size * z);
       }
-    for (const spring of task.springs) {
-      const [one, two] = spring.ends.map((end) => (Array.isArray(end) ? end : three(bodies[end].GetPosition())));
+    for (const spring of springs) {
+      const [one, two] = spring.ends.map((end, k) => (Array.isArray(end) ? end : reached(end, spring.anchors[k])));
       const away = two.map((x, i) => x - one[i]);
       const length = Math.hypot(...away);
-      const speeds = spring.ends.map((end) => (Array.isArray(end) ? [0, 0, 0] : three(bodies[end].GetLinearVelocity())));
+      const speeds = spring.ends.map((end, k) => (Array.isArray(end) ? [0, 0, 0] : speedOf(end, spring.anchors[k])));
       const opening = away.reduce((sum, x, i) => sum + x * (speeds[1][i] - speeds[0][i]), 0) / length;
       const size = length > 0 ? (spring.stiffness * (length - spring.rest) + spring.viscosity * opening) / length : 0;
       spring.ends.forEach((end, k) => {
-        if (!Array.isArray(end)) act(bodies[end], ...away.map((x) => (k === 0 ? size : -size) * x));
+        if (Array.isArray(end)) return;
+        const pull = away.map((x) => (k === 0 ? size : -size) * x);
+        act(bodies[end], ...pull);
+        if (spring.anchors[k]) twist(end, spring.anchors[k], pull);
       });
     }
   }

@@ -1,6 +1,7 @@
 """Jolt in Node, by its WebAssembly package: single precision, joints and contacts by sequential impulses.
 
-Central gravity and springs are pushed from JavaScript at every step. Contact forces are not shown: Jolt keeps them.
+Central gravity and springs are pushed from JavaScript at every step; distances that give are its own soft constraints.
+Contact forces are not shown: Jolt keeps them. Its gears and racks hold two bodies that turn or slide against what stands.
 """
 
 from __future__ import annotations
@@ -8,23 +9,28 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from spook_tracker.engine.bodies import WORLD
+from spook_tracker.engine.bodies import WORLD, RigidBody
 from spook_tracker.engine.build_info import BuildInfo
+from spook_tracker.engine.couplings import Relation
 from spook_tracker.engine.forces import CentralGravity, Load, Spring
 from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, frictions
+from spook_tracker.engine.meshes import HeightField, TriangleMesh
 from spook_tracker.engine.observe import ConstraintForce, Penetration
 from spook_tracker.engine.peers import node
 from spook_tracker.engine.peers.described import described as common
 from spook_tracker.engine.peers.described import numbered
-from spook_tracker.engine.protocol import Capabilities, Configuration, Task
+from spook_tracker.engine.peers.frames import drive
+from spook_tracker.engine.protocol import RIGID, Capabilities, Configuration, NotSupported, Task
 from spook_tracker.engine.recorded_joints import joint_point
 from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.shapes import Box, Capsule, Plane, Sphere
+from spook_tracker.engine.scene import Scene
+from spook_tracker.engine.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Plane, Sphere
 
 PACKAGE = "jolt-physics"
 SCRIPT = Path(__file__).with_suffix(".mjs")
 KINDS: dict[type[Any], str] = {Ball: "ball", Lock: "lock", Hinge: "hinge", Prismatic: "prismatic"}
 FOUND = node.package(PACKAGE)
+UNBOUNDED = 1e30  # N or N m
 
 
 class Jolt:
@@ -32,24 +38,40 @@ class Jolt:
 
     name = "jolt"
     capabilities = Capabilities(
-        shapes=frozenset({Sphere, Box, Capsule, Plane}),
-        joints=frozenset({Distance, Lock, Ball, Hinge, Prismatic}),
+        shapes=frozenset(
+            {Sphere, Box, Capsule, Cylinder, ConvexHull, Plane, Compound, TriangleMesh, HeightField}
+        ),
+        joints=frozenset({Distance, Lock, Ball, Hinge, Prismatic, Relation}),
+        soft=frozenset({Distance}),
         forces=frozenset({CentralGravity, Load, Spring}),
         shows=frozenset({ConstraintForce, Penetration}),
         shows_force_of=frozenset({Distance, Ball, Hinge}),
         friction=True,
         joint_friction=True,
+        motors=True,
+        springs_aside=True,
         restitution=True,
+        surface_velocity=True,
         kinematic=True,
+        absent=frozenset(
+            {
+                "the observable contact force",
+                "compliance of a surface",
+                "friction of rolling or turning",
+                "friction that differs with the direction",
+            }
+        ),
     )
     configurations = (
         Configuration(
             name="many-iterations",
             reason="100 velocity and 20 position iterations in place of 10 and 2, gyroscopic torques, bodies that may "
-            "sink 1 mm into each other in place of 2 cm, and restitution from 1 cm/s on in place of 1 m/s",
+            "sink 1 mm into each other in place of 2 cm, restitution from 1 cm/s on in place of 1 m/s, and no bumps where "
+            "the triangles of a mesh meet (mEnhancedInternalEdgeRemoval)",
             expected_order=1.0,
             options={
                 "gyroscopic": True,
+                "edges": True,
                 "settings": {
                     "mNumVelocitySteps": 100,
                     "mNumPositionSteps": 20,
@@ -62,7 +84,7 @@ class Jolt:
             name="defaults",
             reason="10 velocity and 2 position iterations, no gyroscopic torques: what one gets without asking",
             expected_order=1.0,
-            options={"gyroscopic": False, "settings": {}},
+            options={"gyroscopic": False, "edges": False, "settings": {}},
         ),
     )
 
@@ -82,8 +104,40 @@ def described(task: Task) -> dict[str, Any]:
             if type(constraint) in (Jolt.capabilities.shows_force_of or ()):
                 shown[constraint.name] = 1 if isinstance(constraint, Distance) else 6
     places = numbered(task)
-    constraints = [_constraint(task, constraint, places) for constraint in task.scene.constraints]
-    return {**common(task, FOUND, constraints), "forces_of": shown, "depth": task.contacts}
+    joints = [one for one in task.scene.constraints if not isinstance(one, Relation)]
+    constraints = [_constraint(task, joint, places) for joint in joints]
+    relations = [_relation(task.scene, one) for one in task.scene.constraints if isinstance(one, Relation)]
+    told = common(task, FOUND, constraints)
+    shapes = [b.shape for b in task.scene.bodies if isinstance(b, RigidBody)]
+    told["options"]["edges"] &= any(isinstance(shape, TriangleMesh | HeightField) for shape in shapes)
+    return {**told, "relations": relations, "forces_of": shown, "depth": task.contacts}
+
+
+def _relation(scene: Scene, relation: Relation) -> dict[str, Any]:
+    """A gear of two hinges, or a rack on a slide with its pinion, the hinge first."""
+    terms = sorted(relation.terms, key=lambda term: not isinstance(scene.constraint(term[0]), Hinge))
+    joints = [scene.constraint(name) for name, _ in terms]
+    kinds = [type(joint) for joint in joints]
+    if kinds not in ([Hinge, Hinge], [Hinge, Prismatic]):
+        raise NotSupported(
+            f"jolt does not support {relation.name!r}: its gears and racks are of two joints, one a hinge"
+        )
+    ground = {WORLD, *(b.name for b in scene.bodies if getattr(b, "motion", "dynamic") == "static")}
+    signs = [-1.0 if joint.between[1] in ground else 1.0 for joint in joints]
+    if any(ground.isdisjoint(joint.between) for joint in joints):
+        raise NotSupported(f"jolt does not support {relation.name!r}: its gears turn against what stands")
+    return {
+        "kind": "gear" if kinds[1] is Hinge else "rack",
+        "names": [name for name, _ in terms],
+        "axes": [list(joint.axis) for joint in joints],  # type: ignore[union-attr]
+        "factors": [sign * factor for sign, (_, factor) in zip(signs, terms, strict=True)],
+    }
+
+
+def _motor(joint: Any) -> dict[str, float] | None:
+    """Speed and largest force of what drives a joint; friction is a part of its own."""
+    driven = drive(joint, "jolt") if getattr(joint, "motor", None) else None
+    return driven and {"speed": driven[0], "most": UNBOUNDED if driven[1] is None else driven[1]}
 
 
 def _constraint(task: Task, constraint: Any, places: dict[str, int]) -> dict[str, Any]:
@@ -92,7 +146,16 @@ def _constraint(task: Task, constraint: Any, places: dict[str, int]) -> dict[str
     if isinstance(constraint, Distance):
         length = scene.length(constraint) if constraint.rest_length is None else constraint.rest_length
         points = [list(scene.anchor(constraint, k)) for k in (0, 1)]
-        return {"kind": "distance", "name": constraint.name, "ends": ends, "length": length, "points": points}
+        soft = constraint.compliance > RIGID
+        return {
+            "kind": "distance",
+            "name": constraint.name,
+            "ends": ends,
+            "length": length,
+            "points": points,
+            "stiffness": 1.0 / constraint.compliance if soft else 0.0,
+            "viscosity": (constraint.damping or 0.0) / constraint.compliance if soft else 0.0,
+        }
     assert isinstance(constraint, Joint)
     return {
         "kind": KINDS[type(constraint)],
@@ -101,6 +164,7 @@ def _constraint(task: Task, constraint: Any, places: dict[str, int]) -> dict[str
         "at": list(joint_point(scene, constraint)),
         "axis": list(getattr(constraint, "axis", (0.0, 0.0, 1.0))),
         "friction": max(frictions(constraint)[0]),
+        "motor": _motor(constraint),
     }
 
 

@@ -7,15 +7,20 @@ from xml.dom.minidom import parseString
 
 import mujoco
 
+from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.forces import Spring
 from spook_tracker.engine.peers.mujoco import CAREFUL, ENGINE, STIFF, start_speeds
 from spook_tracker.engine.peers.mujoco_model import model, numbers
-from spook_tracker.engine.protocol import NotSupported, unsupported
+from spook_tracker.engine.protocol import NotSupported, is_spring, unsupported
 from spook_tracker.engine.scene import Scene
 
-CAN = replace(
-    ENGINE.capabilities, forces=frozenset({Spring}), armature=True
-)  # a file has no forces but of springs and actuators
+CAN = replace(  # a file has no forces but of springs and actuators, and no servo that knows its step
+    ENGINE.capabilities,
+    joints=ENGINE.capabilities.joints - {Relation, Wire},
+    forces=frozenset({Spring}),
+    armature=True,
+    motors=False,
+)
 START = "start"
 
 
@@ -24,7 +29,10 @@ def mjcf(scene: Scene, time_step: float) -> str:
 
     Runge-Kutta and the stiffest contacts and ties that MuJoCo takes at this step: what comes closest to rigid ones.
     """
-    if lacking := unsupported(CAN, scene, {}):
+    lacking = unsupported(CAN, scene, {})
+    if any(is_spring(CAN, row) for row in scene.constraints):
+        lacking = (*lacking, "compliance of a joint")
+    if lacking:
         raise NotSupported(f"MJCF, as we write it, has no place for {', '.join(lacking)}")
     option = f'timestep="{time_step!r}" integrator="RK4" {CAREFUL}'
     made = model(scene, joint_coordinates=True, option=option, row=STIFF.format(h2=2.0 * time_step))

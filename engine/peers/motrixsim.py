@@ -53,7 +53,14 @@ class MotrixSim:
         friction=True,
         joint_friction=True,
         rolling_friction=True,
-        absent=frozenset({"the observable constraint force", "the observable penetration"}),
+        absent=frozenset(
+            {
+                "the observable constraint force",
+                "the observable penetration",
+                "restitution",
+                "compliance of a surface",
+            }
+        ),
     )
     configurations = (
         Configuration(

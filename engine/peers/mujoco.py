@@ -17,6 +17,7 @@ import numpy as np
 
 from spook_tracker.engine.bodies import WORLD
 from spook_tracker.engine.build_info import BuildInfo
+from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.forces import CentralGravity, Load, Spring
 from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, Universal
 from spook_tracker.engine.observe import ConstraintForce, ContactCount, ContactForce, Penetration
@@ -28,8 +29,9 @@ from spook_tracker.engine.recorded_joints import cross, joint_point, turned
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
 from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Sphere
+from spook_tracker.engine.shapes import Box, Capsule, Compound, Cylinder, Plane, Sphere
 
+SURFACES_MOVE = hasattr(mujoco.MjModel, "geom_surfacevel")  # since 4.0
 BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 STIFF = 'solref="{h2!r} 1" solimp=".9999 .9999 .001 .5 2"'
 CAREFUL = 'cone="elliptic" impratio="100" noslip_iterations="10" tolerance="1e-12" iterations="200"'
@@ -42,14 +44,27 @@ class MuJoCo:
     reads = READS
     run_model = staticmethod(run_model)
     capabilities = Capabilities(
-        shapes=frozenset({Sphere, Box, Capsule, Cylinder, Plane}),
-        joints=frozenset({Distance, Lock, Ball, Hinge, Prismatic, Universal}),
+        shapes=frozenset({Sphere, Box, Capsule, Cylinder, Plane, Compound}),
+        joints=frozenset({Distance, Lock, Ball, Hinge, Prismatic, Universal, Relation, Wire}),
         forces=frozenset({CentralGravity, Load, Spring}),
         shows=frozenset({ConstraintForce, ContactForce, ContactCount, Penetration}),
-        shows_force_of=frozenset({Distance, Ball, Hinge}),
+        shows_force_of=frozenset({Distance, Ball, Hinge, Relation, Wire}),
         friction=True,
         rolling_friction=True,
         joint_friction=True,
+        motors=True,
+        springs_aside=True,
+        surface_velocity=SURFACES_MOVE,
+        absent=frozenset(
+            {
+                # Its contacts return what their damping leaves, and give by their pair's effective mass.
+                "restitution",
+                "compliance of a surface",
+                "the shape triangle mesh",  # of which it takes the hull
+                "the force fluid",  # its medium has no surface and lifts nothing
+                "friction that differs with the direction",  # its two are along no direction of a body
+            }
+        ),
     )
     configurations = (
         Configuration(
@@ -58,6 +73,13 @@ class MuJoCo:
             "sweeps and the stiffest safe reference (2 h): what the manual advises where accuracy is wanted",
             expected_order=4.0,
             options={"joints": True, "option": f'integrator="RK4" {CAREFUL}', "stiff": True},
+        ),
+        Configuration(
+            name="implicit",
+            reason="the same, but implicit in what damps and drives (implicitfast), which the manual recommends for most "
+            "models and where servos and damping are stiff",
+            expected_order=1.0,
+            options={"joints": True, "option": f'integrator="implicitfast" {CAREFUL}', "stiff": True},
         ),
         Configuration(
             name="defaults",
@@ -70,9 +92,8 @@ class MuJoCo:
             reason="free bodies held by equality constraints, as an engine of constraints has them; reference 2 h",
             expected_order=1.0,
             options={"joints": False, "option": f'integrator="Euler" {CAREFUL}', "stiff": True},
-            lacks=(
-                "joint_friction",
-            ),  # which it has of degrees of freedom, and here those of joints are none
+            # It has them of degrees of freedom, and here those of joints are none.
+            lacks=("joint_friction", "motors"),
         ),
     )
 
@@ -139,6 +160,8 @@ class _Run:
         except ValueError as error:
             raise NotSupported(f"mujoco refuses the model: {' '.join(str(error).split())[:200]}") from None
         self.data = mujoco.MjData(self.model)
+        if self.made.speeds:
+            self._drive()
         self.ids = np.array([self._body(body.name) for body in task.scene.bodies])
         self.roots = self.model.body_rootid[self.ids]
         self._push()
@@ -146,6 +169,15 @@ class _Run:
 
     def _body(self, name: str) -> int:
         return int(mujoco.mj_name2id(self.model, mujoco.mjtObj.mjOBJ_BODY, name))
+
+    def _drive(self) -> None:
+        """Velocity servos as stiff as a step takes: what a motor turns comes to its speed in one, and not beyond it."""
+        m = self.model
+        for k, speed in enumerate(self.made.speeds):
+            dof = m.jnt_dofadr[m.actuator_trnid[k, 0]]
+            stiffness = 1.0 / (m.dof_invweight0[dof] * self.task.time_step)
+            m.actuator_gainprm[k, 0], m.actuator_biasprm[k, 2] = stiffness, -stiffness
+            self.data.ctrl[k] = speed
 
     def _push(self) -> None:
         fields = []
@@ -195,12 +227,19 @@ class _Run:
             mujoco.mj_rnePostConstraint(m, d)
         equalities = d.efc_type[: d.nefc] == int(mujoco.mjtConstraint.mjCNSTR_EQUALITY)
         rows, forces = d.efc_id[: d.nefc][equalities], d.efc_force[: d.nefc][equalities]
+        taut = d.efc_type[: d.nefc] == int(mujoco.mjtConstraint.mjCNSTR_LIMIT_TENDON)
         for constraint in scene.constraints:
             if type(constraint) not in MuJoCo.capabilities.shows_force_of:  # type: ignore[operator]
                 continue
-            assert isinstance(constraint, Distance | Joint)
+            assert isinstance(constraint, Distance | Joint | Relation | Wire)
             if not sample:
-                value: Any = 0.0 if isinstance(constraint, Distance) else np.zeros(6)
+                value: Any = np.zeros(6) if isinstance(constraint, Joint) else 0.0
+            elif constraint.name in self.made.wires:
+                pull = taut & (d.efc_id[: d.nefc] == self.made.wires[constraint.name])
+                value = float(d.efc_force[: d.nefc][pull].sum())
+            elif isinstance(constraint, Relation | Wire):
+                force = forces[rows == self.made.equalities[constraint.name][0]]
+                value = float(force.sum()) * (1.0 if isinstance(constraint, Relation) else -1.0)
             elif constraint.name in self.made.tree:
                 value = self._of_tree(constraint)
             else:

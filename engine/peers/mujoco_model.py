@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from itertools import combinations
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations, pairwise
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from spook_tracker.engine.bodies import WORLD, Material, Particle, RigidBody
-from spook_tracker.engine.forces import Spring
+from spook_tracker.engine.couplings import Relation, Wire
+from spook_tracker.engine.forces import End, Spring
 from spook_tracker.engine.joints import (
+    AxialJoint,
     Ball,
     Constraint,
     Distance,
@@ -38,7 +40,7 @@ from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.recorded_joints import conjugate, joint_point, product, turned_back
 from spook_tracker.engine.result import Array
 from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Shape, Sphere
+from spook_tracker.engine.shapes import Box, Capsule, Compound, Cylinder, Plane, Shape, Sphere
 
 POINT_INERTIA = 1e-12  # kg m²: MuJoCo wants one of every moving body; a point mass has none
 HALF_HINGE = 0.5  # m from a hinge to each of the two points that hold it as equalities
@@ -52,6 +54,8 @@ class Model:
     tree: Mapping[str, str]  # constraint -> the body it ties to its parent
     equalities: Mapping[str, tuple[int, ...]]  # constraint -> its equalities
     point_bodies: tuple[str, ...]
+    speeds: tuple[float, ...] = ()  # of its motors, in order, rad/s or m/s
+    wires: Mapping[str, int] = field(default_factory=dict)  # those that may go slack -> their tendons
 
 
 def numbers(values: Iterable[float]) -> str:
@@ -73,6 +77,9 @@ class _Writer:
         self.equalities: dict[str, tuple[int, ...]] = {}
         self.equality_lines: list[str] = []
         self.tendon_lines: list[str] = []
+        self.motor_lines: list[str] = []
+        self.speeds: list[float] = []
+        self.wires: dict[str, int] = {}
         self.world_sites: list[str] = []
         self.sites: dict[str, list[str]] = {name: [] for name in nodes}
         materials = {
@@ -81,6 +88,10 @@ class _Writer:
         self.one_friction = len(materials) <= 1
         if not self.one_friction and len(scene.bodies) > 50:
             raise NotSupported("mujoco does not support surfaces of different friction in a large scene")
+        if not self.one_friction and any(_is_compound(body) for body in scene.bodies):
+            raise NotSupported(
+                "our adapter cannot ask mujoco for a compound among surfaces of different friction"
+            )
 
     def write(self, option: str) -> Model:
         for constraint in self.scene.constraints:
@@ -105,12 +116,13 @@ class _Writer:
                 "</worldbody>",
                 f"<tendon>{''.join(self.tendon_lines)}</tendon>" if self.tendon_lines else "",
                 f"<equality>{''.join(self.equality_lines)}</equality>" if self.equality_lines else "",
+                f"<actuator>{''.join(self.motor_lines)}</actuator>" if self.motor_lines else "",
                 f"<contact>{contact}</contact>" if contact else "",
                 "</mujoco>",
             ]
         )
         points = tuple(b.name for b in self.scene.bodies if isinstance(b, Particle))
-        return Model(xml, self.tree, self.equalities, points)
+        return Model(xml, self.tree, self.equalities, points, tuple(self.speeds), self.wires)
 
     def _branch(self, top: str, lines: list[str]) -> None:
         """A body with all that hangs from it, without recursion: chains may be long."""
@@ -170,10 +182,24 @@ class _Writer:
                 assert isinstance(tie, Hinge | Prismatic)
                 axes = [np.array(tie.axis)]
         where = numbers(turned_back(turn, at - place))
+        name = ""
+        if isinstance(tie, AxialJoint):
+            name = f" name={quoteattr(tie.name)}"
+            self._motor(tie, 1.0 if second else -1.0)
         return "".join(
-            f'<joint type="{kind}" pos={where} axis={numbers(turned_back(turn, axis))} {self._loss(tie)}{_armature(tie)}/>'
+            f'<joint{name} type="{kind}" pos={where} axis={numbers(turned_back(turn, axis))} {self._loss(tie)}{_armature(tie)}/>'
             for axis in axes
         )
+
+    def _motor(self, tie: AxialJoint, sign: float) -> None:
+        """A velocity servo; how stiff, which depends on what it turns, is told once the model is compiled."""
+        motor = tie.motor
+        if motor is None or motor.max_force == 0.0:
+            return
+        speed, most = float(motor.speed), motor.max_force  # type: ignore[arg-type]
+        bound = "" if most is None else f" forcerange={numbers((-float(most), float(most)))}"  # type: ignore[arg-type]
+        self.motor_lines.append(f"<velocity joint={quoteattr(tie.name)}{bound}/>")
+        self.speeds.append(sign * speed)
 
     def _loss(self, tie: Constraint) -> str:
         """Dry friction of a slide [N] or a hinge [N m], as stiff as everything else."""
@@ -183,11 +209,22 @@ class _Writer:
 
     def _geom(self, body: RigidBody) -> str:
         assert body.shape is not None
-        kind, size, q = _surface(body.shape)
-        return (
-            f'<geom name={quoteattr(body.name)} type="{kind}" size={numbers(size)} quat={numbers(q)} mass="0" '
-            f"{_friction(body.material.friction, body.material)} {self.row}/>"
-        )
+        parts: list[tuple[Shape, Any, Any]] = [(body.shape, (0.0, 0.0, 0.0), UPRIGHT)]
+        if isinstance(body.shape, Compound):
+            parts = [(part.shape, part.position, np.array(part.orientation)) for part in body.shape.parts]
+        belt = ""
+        if any(body.surface_velocity):
+            belt = f" surfacevel={numbers((*body.surface_velocity, 0.0, 0.0, 0.0))}"
+        text = ""
+        for k, (shape, at, turn) in enumerate(parts):
+            kind, size, q = _surface(shape)
+            name = quoteattr(body.name if k == 0 else f"{body.name}/{k}")
+            text += (
+                f'<geom name={name} type="{kind}" size={numbers(size)} pos={numbers(at)} '
+                f'quat={numbers(product(turn, q))} mass="0" '
+                f"{_friction(body.material.friction, body.material)} {self.row}{belt}/>"
+            )
+        return text
 
     def _site(self, end: str | None, point: Array, name: str) -> str:
         """A named point of a body, or of the world, given where it is at the start."""
@@ -196,37 +233,47 @@ class _Writer:
         (self.world_sites if end is None else self.sites[end]).append(site)
         return name
 
-    def _tendon(self, constraint: Distance | Spring, points: list[Array], attributes: str) -> str:
+    def _tendon(self, name: str, through: Sequence[tuple[End, Array]], attributes: str) -> None:
         sites = "".join(
-            f"<site site={quoteattr(self._site(end if isinstance(end, str) else None, point, f'{constraint.name}/{k}'))}/>"
-            for k, (end, point) in enumerate(zip(constraint.between, points, strict=True))
+            f"<site site={quoteattr(self._site(end if isinstance(end, str) and end != WORLD else None, point, f'{name}/{k}'))}/>"
+            for k, (end, point) in enumerate(through)
         )
-        self.tendon_lines.append(f"<spatial name={quoteattr(constraint.name)} {attributes}>{sites}</spatial>")
-        return constraint.name
+        self.tendon_lines.append(f"<spatial name={quoteattr(name)} {attributes}>{sites}</spatial>")
+
+    def _ended(self, row: Distance | Spring) -> list[tuple[End, Array]]:
+        """Both ends, and where they are at the start."""
+        return [(end, np.array(self.scene.anchor(row, k))) for k, end in enumerate(row.between)]
 
     def _spring(self, spring: Spring) -> None:
-        points = [np.array(self.scene.body(e).position if isinstance(e, str) else e) for e in spring.between]
         self._tendon(
-            spring,
-            points,
+            spring.name,
+            self._ended(spring),
             f'stiffness="{spring.stiffness!r}" damping="{spring.viscosity!r}" springlength="{spring.rest_length!r}"',
         )
 
     def _hold(self, constraint: Constraint) -> None:
         """A constraint as equality constraints."""
         if isinstance(constraint, Distance):
-            points = [np.array(self.scene.anchor(constraint, k)) for k in (0, 1)]
-            self._tendon(constraint, points, "")
+            ends = self._ended(constraint)
+            self._tendon(constraint.name, ends, "")
             longer = 0.0
             if constraint.rest_length is not None:
-                longer = constraint.rest_length - math.dist(*points)
-            line = f'<tendon tendon1={quoteattr(constraint.name)} polycoef="{longer!r} 0 0 0 0" {self.row}/>'
-            self._add(constraint, [line])
+                longer = constraint.rest_length - math.dist(ends[0][1], ends[1][1])
+            self._add(constraint, [self._of_length(constraint.name, longer)])
+            return
+        if isinstance(constraint, Relation):
+            self._relate(constraint)
+            return
+        if isinstance(constraint, Wire):
+            self._wire(constraint)
             return
         assert isinstance(constraint, Joint)
-        if any(frictions(constraint)[0]) or getattr(constraint, "armature", False):
+        if any(frictions(constraint)[0]) or any(
+            getattr(constraint, name, None) for name in ("armature", "motor")
+        ):
             raise NotSupported(
-                f"mujoco has no friction or armature in an equality constraint, as {constraint.name!r} would be"
+                "mujoco does not support friction, armature or a motor in an equality constraint, as "
+                f"{constraint.name!r} would be"
             )
         at = joint_point(self.scene, constraint)
         if isinstance(constraint, Lock):
@@ -240,6 +287,41 @@ class _Writer:
             raise NotSupported(
                 f"mujoco has no equality constraint for the {constraint.kind} {constraint.name!r}"
             )
+
+    def _of_length(self, tendon: str, longer: float) -> str:
+        """An equality that keeps a tendon's length that of the start, or so much longer."""
+        return f'<tendon tendon1={quoteattr(tendon)} polycoef="{longer!r} 0 0 0 0" {self.row}/>'
+
+    def _relate(self, relation: Relation) -> None:
+        """A fixed tendon, whose length is the sum of joint coordinates, kept as it is."""
+        terms = ""
+        for name, factor in relation.terms:
+            child, joint = self.tree.get(name), self.scene.constraint(name)
+            if child is None:
+                raise NotSupported(
+                    f"mujoco has no coordinate of {name!r}, which is an equality constraint here"
+                )
+            sign = 1.0 if joint.between[1] == child else -1.0
+            terms += f'<joint joint={quoteattr(name)} coef="{sign * factor!r}"/>'
+        self.tendon_lines.append(f"<fixed name={quoteattr(relation.name)}>{terms}</fixed>")
+        self._add(relation, [self._of_length(relation.name, 0.0)])
+
+    def _wire(self, wire: Wire) -> None:
+        """A tendon through sites, whose length is bounded or kept."""
+        if wire.rubs or wire.wound or wire.restitution or wire.strength is not None:
+            raise NotSupported(
+                f"mujoco does not support friction, drums, restitution or a strength of a tendon, as of {wire.name!r}"
+            )
+        through = [(end, np.array(point)) for end, point in wire.through]
+        start = sum(math.dist(one, two) for (_, one), (_, two) in pairwise(through))
+        length = start if wire.length is None else wire.length
+        if not wire.slack:
+            self._tendon(wire.name, through, "")
+            self._add(wire, [self._of_length(wire.name, length - start)])
+            return
+        self.wires[wire.name] = len(self.tendon_lines)
+        row = self.row.replace("solref", "solreflimit").replace("solimp", "solimplimit")
+        self._tendon(wire.name, through, f'limited="true" range="0 {length!r}" {row}')
 
     def _add(self, constraint: Constraint, lines: list[str]) -> None:
         first = len(self.equality_lines)
@@ -284,6 +366,10 @@ class _Writer:
                 f"{_friction(mu, one.material, two.material, pair=True)} {self.row}/>"
             )
         return text
+
+
+def _is_compound(body: Particle | RigidBody) -> bool:
+    return isinstance(body, RigidBody) and isinstance(body.shape, Compound)
 
 
 def _armature(tie: Constraint) -> str:

@@ -42,6 +42,9 @@ class MuJoCoWarp:
         friction=True,
         rolling_friction=True,
         joint_friction=True,
+        absent=frozenset(
+            {"restitution", "compliance of a surface", "the shape triangle mesh", "the force fluid"}
+        ),
     )
     configurations = (
         Configuration(

@@ -64,6 +64,7 @@ class Newton:
         friction=True,
         restitution=True,
         limits=True,
+        springs_aside=True,
     )
     configurations = (
         Configuration(
@@ -399,8 +400,8 @@ class _World:
                 self.launch()
 
     def _push(self) -> None:
-        where, _, speeds, _ = self._bodies()
-        forces, torques = self.pushes.at(where, speeds)
+        where, turns, speeds, spins = self._bodies()
+        forces, torques = self.pushes.at(where, speeds, turns, spins)
         pushed = self.pushed.numpy()  # on the CPU the memory itself
         for k, body in enumerate(self.scene.bodies):
             if (index := self.bodies[body.name]) != -1:

@@ -41,6 +41,7 @@ class P2:
         forces=frozenset({CentralGravity, Load}),
         shows=frozenset({ConstraintForce}),
         shows_force_of=frozenset({Distance}),
+        absent=frozenset({"the force fluid"}),
     )
     configurations = (
         Configuration(

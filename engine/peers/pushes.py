@@ -6,6 +6,7 @@ import numpy as np
 
 from spook_tracker.engine.bodies import Particle
 from spook_tracker.engine.forces import CentralGravity, Load, Spring
+from spook_tracker.engine.recorded_joints import cross, turned
 from spook_tracker.engine.result import Array
 from spook_tracker.engine.scene import Scene
 
@@ -21,11 +22,19 @@ class Pushes:
             [(b.mass or 0.0) if m else 0.0 for b, m in zip(scene.bodies, moving, strict=True)]
         )
 
+    @property
+    def aside(self) -> bool:
+        """Whether a spring holds some body beside its centre."""
+        return any(isinstance(force, Spring) and force.aside for force in self.scene.forces)
+
     def __bool__(self) -> bool:
         return bool(self.scene.forces)
 
-    def at(self, where: Array, speeds: Array) -> tuple[Array, Array]:
-        """Forces and torques for positions and velocities (n, 3)."""
+    def at(
+        self, where: Array, speeds: Array, turns: Array | None = None, spins: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Forces and torques for positions and velocities (n, 3), turns (n, 4), angular velocities (n, 3): the last two
+        are asked for by springs beside centres alone."""
         forces, torques = np.zeros_like(where), np.zeros_like(where)
         for force in self.scene.forces:
             if isinstance(force, Load):
@@ -36,19 +45,42 @@ class Pushes:
                 size = -force.strength * self.masses / np.linalg.norm(away, axis=1) ** 3
                 forces += size[:, None] * away
             elif isinstance(force, Spring):
-                self._pull(force, where, speeds, forces)
+                arms = [np.zeros(3), np.zeros(3)]
+                if force.aside:
+                    assert turns is not None and spins is not None
+                    arms = [
+                        turned(turns[self.places[str(end)]], np.array(anchor)) if any(anchor) else np.zeros(3)
+                        for end, anchor in zip(force.between, force.anchors, strict=True)
+                    ]
+                self._pull(force, arms, where, speeds, spins, forces, torques)
         return forces, torques
 
-    def _pull(self, spring: Spring, where: Array, speeds: Array, forces: Array) -> None:
+    def _pull(
+        self,
+        spring: Spring,
+        arms: list[Array],
+        where: Array,
+        speeds: Array,
+        spins: Array | None,
+        forces: Array,
+        torques: Array,
+    ) -> None:
         ends = [self.places[e] if isinstance(e, str) else None for e in spring.between]
-        points = [np.array(e) if k is None else where[k] for e, k in zip(spring.between, ends, strict=True)]
+        points = [
+            np.array(e) if k is None else where[k] + arm
+            for e, k, arm in zip(spring.between, ends, arms, strict=True)
+        ]
         away = points[1] - points[0]
         length = float(np.linalg.norm(away))
         if length == 0.0:
             return
-        moved = [np.zeros(3) if k is None else speeds[k] for k in ends]
+        moved = [
+            np.zeros(3) if k is None else speeds[k] + (cross(spins[k], arm) if spins is not None else 0.0)
+            for k, arm in zip(ends, arms, strict=True)
+        ]
         opening = away @ (moved[1] - moved[0]) / length
         pull = (spring.stiffness * (length - spring.rest_length) + spring.viscosity * opening) / length * away
-        for k, sign in zip(ends, (1.0, -1.0), strict=True):
+        for k, arm, sign in zip(ends, arms, (1.0, -1.0), strict=True):
             if k is not None:
                 forces[k] += sign * pull
+                torques[k] += sign * cross(arm, pull)

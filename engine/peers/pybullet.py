@@ -29,7 +29,7 @@ from spook_tracker.engine.protocol import Capabilities, Configuration, Task
 from spook_tracker.engine.recorded_joints import conjugate, cross, joint_point, product, turned
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
-from spook_tracker.engine.shapes import Box, Capsule, Plane, Sphere
+from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Sphere
 
 with quiet():  # it says when it was built
     import pybullet as bullet
@@ -42,7 +42,7 @@ class PyBullet:
     reads = READS
     run_model = staticmethod(run_model)
     capabilities = Capabilities(
-        shapes=frozenset({Sphere, Box, Capsule, Plane}),
+        shapes=frozenset({Sphere, Box, Capsule, Cylinder, Plane}),
         joints=frozenset({Distance, Lock, Ball, Hinge, Prismatic}),
         forces=frozenset({CentralGravity, Load, Spring}),
         shows=frozenset({ConstraintForce, ContactForce, ContactCount, Penetration}),
@@ -50,7 +50,10 @@ class PyBullet:
         friction=True,
         rolling_friction=True,
         joint_friction=True,
+        motors=True,
+        springs_aside=True,
         restitution=True,
+        absent=frozenset({"the force fluid"}),
     )
     configurations = (
         Configuration(
@@ -66,7 +69,7 @@ class PyBullet:
             "where bodies are joined and parted. It has no constraint of distance",
             expected_order=1.0,
             options={"joints": False},
-            lacks=("joint_friction",),
+            lacks=("joint_friction", "motors"),
         ),
     )
 
@@ -98,7 +101,9 @@ class _Run(Model):
     def _push(self) -> None:
         states = [self._state(body.name) for body in self.scene.bodies]
         where = np.array([state[0] for state in states])
-        forces, torques = self.pushes.at(where, np.array([state[2] for state in states]))
+        turns = np.array([(state[1][3], *state[1][:3]) for state in states])
+        speeds, spinning = (np.array([state[k] for state in states]) for k in (2, 3))
+        forces, torques = self.pushes.at(where, speeds, turns, spinning)
         for k, body in enumerate(self.scene.bodies):
             if fixed(body):
                 continue

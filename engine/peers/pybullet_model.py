@@ -9,6 +9,7 @@ import numpy as np
 
 from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
 from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, frictions
+from spook_tracker.engine.peers.frames import drive
 from spook_tracker.engine.peers.joint_tree import (
     Node,
     alone,
@@ -28,7 +29,7 @@ from spook_tracker.engine.peers.surfaces import one_restitution, pairs_apart, sh
 from spook_tracker.engine.protocol import NotSupported, Task
 from spook_tracker.engine.recorded_joints import conjugate, joint_point, turned_back
 from spook_tracker.engine.result import Array
-from spook_tracker.engine.shapes import Box, Capsule, Plane, Shape, Sphere
+from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Shape, Sphere
 
 with quiet():  # it says when it was built
     import pybullet as bullet
@@ -197,14 +198,13 @@ class Model:
                 if kind == bullet.JOINT_PRISMATIC:
                     speed = sliding(self.nodes, node, np.array(axis), turning[str(node.parent)])
                 bullet.resetJointState(made, link, 0.0, float(speed), physicsClientId=self.client)
-                # A motor that wants to stand still, of bounded force, is dry friction; without any it does nothing.
-                dry = max(frictions(node.tie)[0])
+                wanted, most = _motor(node)
                 bullet.setJointMotorControl2(
                     made,
                     link,
                     bullet.VELOCITY_CONTROL,
-                    targetVelocity=0.0,
-                    force=dry,
+                    targetVelocity=wanted,
+                    force=most,
                     physicsClientId=self.client,
                 )
             if self.task.constraint_forces:
@@ -214,8 +214,10 @@ class Model:
         """A constraint where no joint can be."""
         if isinstance(constraint, Distance):
             raise NotSupported("pybullet has no constraint of distance, only rods that joints can stand for")
-        if any(frictions(constraint)[0]):
-            raise NotSupported(f"pybullet has no friction in a constraint, as {constraint.name!r} would be")
+        if any(frictions(constraint)[0]) or getattr(constraint, "motor", None):
+            raise NotSupported(
+                f"pybullet does not support friction or a motor in a constraint, as {constraint.name!r} would be"
+            )
         at = joint_point(self.scene, constraint)
         points, kind = [at], bullet.JOINT_POINT2POINT
         if isinstance(constraint, Hinge):
@@ -282,6 +284,15 @@ def _xyzw(q: Array) -> list[float]:
     return [float(q[1]), float(q[2]), float(q[3]), float(q[0])]
 
 
+def _motor(node: Node) -> tuple[float, float]:
+    """Speed and largest force of a joint's motor; without force it does nothing."""
+    tie = node.tie
+    if tie is None or (driven := drive(tie, "pybullet")) is None:
+        return 0.0, 0.0
+    sign = 1.0 if tie.between[1] == node.body.name else -1.0
+    return sign * driven[0], NO_BOUND if driven[1] is None else driven[1]
+
+
 def _surface(shape: Shape) -> dict[str, Any]:
     if isinstance(shape, Sphere):
         return {"shapeType": bullet.GEOM_SPHERE, "radius": shape.radius}
@@ -289,5 +300,7 @@ def _surface(shape: Shape) -> dict[str, Any]:
         return {"shapeType": bullet.GEOM_BOX, "halfExtents": [0.5 * edge for edge in shape.size]}
     if isinstance(shape, Capsule):
         return {"shapeType": bullet.GEOM_CAPSULE, "radius": shape.radius, "height": shape.length}
+    if isinstance(shape, Cylinder):
+        return {"shapeType": bullet.GEOM_CYLINDER, "radius": shape.radius, "height": shape.length}
     assert isinstance(shape, Plane)
     return {"shapeType": bullet.GEOM_PLANE, "planeNormal": list(shape.normal)}

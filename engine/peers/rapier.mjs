@@ -10,6 +10,13 @@ serve(async (task) => {
   const upright = quat([1, 0, 0, 0]);
   const pointInertia = vec([1e-6, 1e-6, 1e-6]); // kg m²: every moving body wants one; a particle that turns is not seen to
 
+  const product = ([a, b, c, d], [w, x, y, z]) => [
+    a * w - b * x - c * y - d * z,
+    a * x + b * w + c * z - d * y,
+    a * y - b * z + c * w + d * x,
+    a * z + b * y - c * x + d * w,
+  ];
+
   const world = new R.World(vec(task.gravity));
   world.timestep = task.time_step;
   world.integrationParameters.numSolverIterations = task.options.sweeps;
@@ -18,6 +25,12 @@ serve(async (task) => {
     if (shape.kind === "sphere") return new R.Ball(shape.radius);
     if (shape.kind === "box") return new R.Cuboid(...shape.half);
     if (shape.kind === "capsule") return new R.Capsule(shape.half, shape.radius); // along y
+    if (shape.kind === "cylinder") return new R.Cylinder(shape.half, shape.radius); // along y
+    if (shape.kind === "hull") return new R.ConvexPolyhedron(new Float32Array(shape.corners.flat()), null);
+    if (shape.kind === "mesh") {
+      const sides = [new Float32Array(shape.corners.flat()), new Uint32Array(shape.faces.flat())];
+      return new R.TriMesh(...sides, R.TriMeshFlags?.FIX_INTERNAL_EDGES);
+    }
     return new R.HalfSpace(vec(shape.normal));
   }
 
@@ -36,11 +49,15 @@ serve(async (task) => {
     );
     const inertia = given.motion === "particle" ? pointInertia : vec(given.inertia);
     if (given.mass > 0) body.setAdditionalMassProperties(given.mass, vec([0, 0, 0]), inertia, upright, true);
-    if (given.shape && task.contacts) {
-      const collider = new R.ColliderDesc(shapeOf(given.shape)).setDensity(0).setRestitution(given.restitution);
+    const none = { at: [0, 0, 0], turn: [1, 0, 0, 0] };
+    const parts = given.shape?.kind === "compound" ? given.shape.parts : [{ ...none, shape: given.shape }];
+    for (const part of given.shape && task.contacts ? parts : []) {
+      const collider = new R.ColliderDesc(shapeOf(part.shape)).setDensity(0).setRestitution(given.restitution);
       collider.setRestitutionCombineRule(R.CoefficientCombineRule.Max);
       collider.setFriction(Math.sqrt(given.friction)).setFrictionCombineRule(R.CoefficientCombineRule.Multiply);
-      if (given.shape.kind === "capsule") collider.setRotation(quat([Math.SQRT1_2, Math.SQRT1_2, 0, 0])); // y to z
+      const upright = part.shape.kind === "capsule" || part.shape.kind === "cylinder";
+      const turn = upright ? product(part.turn, [Math.SQRT1_2, Math.SQRT1_2, 0, 0]) : part.turn; // y to z
+      collider.setTranslation(...part.at).setRotation(quat(turn));
       if (task.contacts_of.length > 0)
         collider.setActiveEvents(R.ActiveEvents.CONTACT_FORCE_EVENTS).setContactForceEventThreshold(0);
       bodyOfCollider.set(world.createCollider(collider, body).handle, place);
@@ -50,20 +67,55 @@ serve(async (task) => {
 
   const bodies = task.bodies.map(bodyOf);
 
+  const RIGID_DRIVE = 1e6; // N s/m or N m s: damping of a motor, which it solves implicitly
+  const fixed = () => world.createRigidBody(R.RigidBodyDesc.fixed());
   for (const given of task.constraints) {
-    const ends = given.ends.map((end) =>
-      typeof end === "number" ? bodies[end] : world.createRigidBody(R.RigidBodyDesc.fixed()),
-    );
+    const ends = given.ends.map((end) => (typeof end === "number" ? bodies[end] : fixed()));
     const [a, b] = given.points.map(vec);
-    let joint = R.JointData.spherical(a, b);
-    if (given.kind === "lock") joint = R.JointData.fixed(a, quat(given.turns[0]), b, quat(given.turns[1]));
-    if (given.kind === "prismatic") joint = R.JointData.prismatic(a, b, vec(given.axis));
-    if (given.kind === "hinge") joint = R.JointData.revolute(a, b, vec(given.axis));
-    world.createImpulseJoint(joint, ends[0], ends[1], true).setContactsEnabled(false);
+    const turns = given.turns.map(quat);
+    const x = vec(given.axis ?? [1, 0, 0]); // in the axes of both
+    let made = R.JointData.spherical(a, b);
+    if (given.kind === "lock") made = R.JointData.fixed(a, turns[0], b, turns[1]);
+    if (given.kind === "prismatic") made = R.JointData.prismatic(a, b, x);
+    if (given.kind === "hinge") made = R.JointData.revolute(a, b, x);
+    const joint = world.createImpulseJoint(made, ends[0], ends[1], true);
+    joint.setContactsEnabled(false);
+    if (given.axis === null) {
+      joint.setLocalFrame1(a, turns[0]);
+      joint.setLocalFrame2(b, turns[1]);
+    }
+    if (given.motor) {
+      joint.configureMotorModel(R.MotorModel.ForceBased);
+      joint.configureMotorVelocity(given.motor.speed, RIGID_DRIVE);
+      if (given.motor.most !== null) joint.setMotorMaxForce(given.motor.most);
+    }
   }
-  for (const load of task.loads) {
-    bodies[load.body].addForce(vec(load.force), true); // stays until it is taken away
-    bodies[load.body].addTorque(vec(load.torque), true);
+  for (const [one, two] of task.parted) {
+    // kept apart by a joint that holds nothing
+    const zero = vec([0, 0, 0]);
+    const free = R.JointData.generic(zero, zero, vec([1, 0, 0]), 0);
+    world.createImpulseJoint(free, bodies[one], bodies[two], true).setContactsEnabled(false);
+  }
+  for (const spring of task.springs) {
+    const ends = spring.ends.map((end) => (typeof end === "number" ? bodies[end] : fixed()));
+    const points = spring.ends.map((end, k) => vec(typeof end === "number" ? spring.anchors[k] : end));
+    const made = R.JointData.spring(spring.rest, spring.stiffness, spring.viscosity, ...points);
+    world.createImpulseJoint(made, ends[0], ends[1], true).setContactsEnabled(true);
+  }
+  for (const { body, force, torque } of task.loads) {
+    bodies[body].addForce(vec(force), true); // stays until it is taken away
+    bodies[body].addTorque(vec(torque), true);
+  }
+  // Fields push at once, and not through all iterations of a step, which would give energy.
+  function pull() {
+    for (const { centre, strength } of task.fields)
+      task.bodies.forEach(({ mass }, index) => {
+        if (!(mass > 0)) return;
+        const p = bodies[index].translation();
+        const [x, y, z] = [p.x - centre[0], p.y - centre[1], p.z - centre[2]];
+        const size = (-mass * strength * task.time_step) / (x * x + y * y + z * z) ** 1.5;
+        bodies[index].applyImpulse(vec([size * x, size * y, size * z]), true);
+      });
   }
 
   const column = new Map(task.contacts_of.map(([i, j], place) => [`${i} ${j}`, 3 * place]));
@@ -71,6 +123,7 @@ serve(async (task) => {
   const events = column.size > 0 ? new R.EventQueue(true) : undefined;
 
   function step() {
+    if (task.fields.length > 0) pull();
     world.step(events);
     forces.fill(0);
     events?.drainContactForceEvents((event) => {

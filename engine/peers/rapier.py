@@ -1,12 +1,13 @@
 """Rapier in Node, by its WebAssembly package: single precision, joints and contacts by sequential impulses.
 
 It has no rod of constant length (its rope only pulls), shows no forces of joints, and single precision bounds every
-answer from below. The force of a contact is the one its contact force events tell, which is along the normal: with
-friction it would be a part, so that it is asked of smooth surfaces only.
+answer from below. Of a contact's friction its package shows nothing, so that contact forces are asked of smooth surfaces
+only. Central gravity is pushed from JavaScript at every step; springs are its own joints.
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from itertools import combinations
 from pathlib import Path
@@ -14,19 +15,21 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
+from spook_tracker.engine.bodies import WORLD, RigidBody
 from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import Load
-from spook_tracker.engine.joints import Ball, Hinge, Joint, Lock, Prismatic
+from spook_tracker.engine.forces import CentralGravity, Load, Spring
+from spook_tracker.engine.joints import AxialJoint, Ball, Hinge, Joint, Lock, Prismatic
+from spook_tracker.engine.meshes import HeightField, TriangleMesh
 from spook_tracker.engine.observe import ContactForce
 from spook_tracker.engine.peers import node
 from spook_tracker.engine.peers.described import described as common
 from spook_tracker.engine.peers.described import numbered
+from spook_tracker.engine.peers.frames import drive, ends_of
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recorded_joints import conjugate, joint_point, turned_back
+from spook_tracker.engine.recorded_joints import turned
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.shapes import Box, Capsule, Plane, Sphere
+from spook_tracker.engine.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Plane, Sphere
 
 PACKAGE = "@dimforge/rapier3d-compat"
 SCRIPT = Path(__file__).with_suffix(".mjs")
@@ -39,14 +42,29 @@ class Rapier:
 
     name = "rapier"
     capabilities = Capabilities(
-        shapes=frozenset({Sphere, Box, Capsule, Plane}),
+        shapes=frozenset(
+            {Sphere, Box, Capsule, Cylinder, ConvexHull, Plane, Compound, TriangleMesh, HeightField}
+        ),
         joints=frozenset({Lock, Ball, Hinge, Prismatic}),
-        forces=frozenset({Load}),
+        forces=frozenset({CentralGravity, Load, Spring}),
         shows=frozenset({ContactForce}),
         friction=True,
+        joint_friction=True,
+        motors=True,
+        springs_aside=True,
         restitution=True,
         kinematic=True,
-        absent=frozenset({"the joint distance", "the observable constraint force"}),
+        absent=frozenset(
+            {
+                "the joint distance",
+                "the joint relation",
+                "the observable constraint force",
+                "compliance of a surface",
+                "friction of rolling or turning",
+                "friction that differs with the direction",
+                "the force fluid",
+            }
+        ),
     )
     configurations = (
         Configuration(
@@ -72,22 +90,28 @@ class Rapier:
 
 
 def described(task: Task) -> dict[str, Any]:
-    """The task as JSON takes it. Raises NotSupported for pairs kept apart that no joint ties."""
+    """The task as JSON takes it."""
     scene = task.scene
     joined = {frozenset(c.between) for c in scene.constraints if isinstance(c, Joint)}
-    if scene.contacts and any(frozenset(pair) not in joined for pair in scene.no_contact):
-        raise NotSupported("our adapter cannot ask rapier for single pairs that must not touch")
     places = numbered(task)
+    parted = [pair for pair in scene.no_contact if scene.contacts and frozenset(pair) not in joined]
     constraints = [_joint(task, constraint, places) for constraint in scene.constraints]
     pairs = _touching(scene, places) if task.contacts else []
-    return {**common(task, FOUND, constraints), "contacts_of": pairs, "names": list(places)}
+    return {
+        **common(task, FOUND, constraints),
+        "parted": [[places[name] for name in pair] for pair in parted],
+        "contacts_of": pairs,
+        "names": list(places),
+    }
 
 
 def _touching(scene: Scene, places: Mapping[str, int]) -> list[tuple[int, int]]:
     """Pairs of bodies that may touch, by their places. Raises NotSupported where their forces would be told in part."""
     solid = [b for b in scene.bodies if isinstance(b, RigidBody) and b.shape is not None]
     if any(body.material.friction for body in solid):
-        raise NotSupported("our adapter cannot ask rapier for a contact force with friction")
+        raise NotSupported(
+            "rapier does not support a contact force with friction: its package shows none of friction's"
+        )
     pairs = [
         (places[a.name], places[b.name])
         for a, b in combinations(solid, 2)
@@ -98,30 +122,32 @@ def _touching(scene: Scene, places: Mapping[str, int]) -> list[tuple[int, int]]:
     return pairs
 
 
+@functools.cache
+def _has(name: str) -> bool:
+    """Whether this release of the package has a function of joints of that name."""
+    return any(name in file.read_text(encoding="utf-8") for file in FOUND.rglob("impulse_joint.d.ts"))
+
+
 def _joint(task: Task, joint: Any, places: dict[str, int]) -> dict[str, Any]:
-    """Points, turns and axis in the axes of both ends."""
-    scene, at = task.scene, joint_point(task.scene, joint)
-    frames = [_frame(None if end == WORLD else scene.body(end)) for end in joint.between]
-    points = [list(turned_back(turn, at - place)) for place, turn in frames]
-    axes = [turned_back(turn, np.array(getattr(joint, "axis", (0.0, 0.0, 1.0)))) for _, turn in frames]
-    if isinstance(joint, Hinge | Prismatic) and np.abs(axes[0] - axes[1]).max() > 1e-12:
+    """Points on both ends, the turns there that carry x onto its axis, and what drives it."""
+    first, second = ends_of(task.scene, joint)
+    axes = [turned(end.turn, np.array([1.0, 0.0, 0.0])) for end in (first, second)]
+    askew = isinstance(joint, AxialJoint) and np.abs(axes[0] - axes[1]).max() > 1e-12
+    if askew and not _has("setLocalFrame1"):
         raise NotSupported(
-            "our adapter cannot ask rapier for a hinge or slide between bodies that are turned against each other"
+            "this release of rapier does not support a hinge or slide between bodies that are turned against each other"
         )
+    driven = drive(joint, "rapier")
+    if driven is not None and not _has("setMotorMaxForce"):
+        raise NotSupported("this release of rapier does not support a motor of bounded force")
     return {
         "kind": {Ball: "ball", Lock: "lock", Hinge: "hinge", Prismatic: "prismatic"}[type(joint)],
         "ends": [places.get(end, -1) if end != WORLD else None for end in joint.between],
-        "points": points,
-        "turns": [list(conjugate(turn)) for _, turn in frames],
-        "axis": list(axes[0]),
+        "points": [first.point, second.point],
+        "turns": [list(first.turn), list(second.turn)],
+        "axis": None if askew else list(axes[0]),
+        "motor": None if driven is None else {"speed": driven[0], "most": driven[1]},
     }
-
-
-def _frame(body: Particle | RigidBody | None) -> tuple[Any, Any]:
-    if body is None:
-        return np.zeros(3), np.array([1.0, 0.0, 0.0, 0.0])
-    turn = (1.0, 0.0, 0.0, 0.0) if isinstance(body, Particle) else body.orientation
-    return np.array(body.position), np.array(turn)
 
 
 ENGINE = Rapier()

@@ -1,14 +1,15 @@
 """Rapier by its Python package: single precision, joints and contacts by sequential impulses, one thread.
 
-Newer than the npm package behind `rapier`, with cylinders, cones and joints between bodies turned against each other.
-Every step is a call from Python. Its contacts show impulses along their normals only: with friction that would be a
-part of the force, so that it is asked of smooth surfaces only.
+Newer than the npm package behind `rapier`, with a choice of friction's model. Every step is a call from Python, which pushes
+fields before it. What it shows of a joint are impulses of rows that it has made orthogonal to each other, which are no
+forces; of a contact's friction it shows something where each point has a cone of its own (coulomb).
 """
 
 from __future__ import annotations
 
 import time
 from collections.abc import Mapping
+from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 
@@ -17,17 +18,34 @@ import rapier3d as rapier
 
 from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
 from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import Load
+from spook_tracker.engine.forces import CentralGravity, Load, Spring
 from spook_tracker.engine.joints import Ball, Hinge, Joint, Lock, Prismatic
+from spook_tracker.engine.meshes import HeightField, TriangleMesh
 from spook_tracker.engine.observe import ContactCount, ContactForce, Penetration
-from spook_tracker.engine.peers.frames import ends_of, xyzw
+from spook_tracker.engine.peers.frames import drive, ends_of, xyzw
+from spook_tracker.engine.peers.pushes import Pushes
 from spook_tracker.engine.peers.stepped import Kept, stepped
 from spook_tracker.engine.peers.surfaces import solid
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
+from spook_tracker.engine.recorded_joints import product
 from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Shape, Sphere
+from spook_tracker.engine.result import Array
+from spook_tracker.engine.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Plane, Shape, Sphere
 
 POINT_INERTIA = 1e-6  # kg m²: every moving body wants one; a particle that turns is not seen to
+RIGID_DRIVE = 1e6  # N s/m or N m s: damping of a motor, which it solves implicitly
+FREE = {Hinge: rapier.JointAxis.ANG_X, Prismatic: rapier.JointAxis.LIN_X}
+ABSENT = frozenset(  # of it and of its package for JavaScript
+    {
+        "the joint distance",  # its rope pulls alone, and so does every bound of a distance
+        "the joint relation",
+        "the observable constraint force",
+        "compliance of a surface",
+        "friction of rolling or turning",
+        "friction that differs with the direction",
+        "the force fluid",
+    }
+)
 MASKS = {
     Lock: rapier.JointAxesMask.LOCKED_FIXED_AXES,
     Ball: rapier.JointAxesMask.LOCKED_SPHERICAL_AXES,
@@ -52,27 +70,39 @@ class Rapier3D:
 
     name = "rapier3d"
     capabilities = Capabilities(
-        shapes=frozenset({Sphere, Box, Capsule, Cylinder, Plane}),
+        shapes=frozenset(
+            {Sphere, Box, Capsule, Cylinder, ConvexHull, Plane, Compound, TriangleMesh, HeightField}
+        ),
         joints=frozenset({Lock, Ball, Hinge, Prismatic}),
-        forces=frozenset({Load}),
+        forces=frozenset({CentralGravity, Load, Spring}),
         shows=frozenset({ContactForce, ContactCount, Penetration}),
         friction=True,
+        joint_friction=True,
+        motors=True,
+        springs_aside=True,
         restitution=True,
         kinematic=True,
-        absent=frozenset({"the joint distance", "the observable constraint force"}),
+        absent=ABSENT,
     )
     configurations = (
         Configuration(
             name="many-iterations",
             reason="100 solver iterations a step in place of 4: joints, stacks and friction are solved further",
             expected_order=1.0,
-            options={"sweeps": 100},
+            options={"sweeps": 100, "coulomb": False},
         ),
         Configuration(
             name="defaults",
             reason="4 solver iterations: what one gets without asking",
             expected_order=1.0,
-            options={"sweeps": 4},
+            options={"sweeps": 4, "coulomb": False},
+        ),
+        Configuration(
+            name="coulomb",
+            reason="as many-iterations, and a cone of friction at each point of contact in place of one for four "
+            "(FrictionModel.COULOMB), whose forces it shows",
+            expected_order=1.0,
+            options={"sweeps": 100, "coulomb": True},
         ),
     )
 
@@ -93,27 +123,39 @@ class _Run:
 
     def __init__(self, task: Task) -> None:
         self.task, self.scene = task, task.scene
-        joined = {frozenset(c.between) for c in self.scene.constraints if isinstance(c, Joint)}
-        if self.scene.contacts and any(frozenset(pair) not in joined for pair in self.scene.no_contact):
-            raise NotSupported("our adapter cannot ask rapier3d for single pairs that must not touch")
-        if task.contacts and any(body.material.friction for body in solid(self.scene)):
-            raise NotSupported("our adapter cannot ask rapier3d for a contact force with friction")
+        options = task.configuration.options
+        rough = any(body.material.friction for body in solid(self.scene))
+        if task.contacts and rough and not options["coulomb"]:
+            raise NotSupported(
+                f"rapier3d ({task.configuration.name}) does not support a contact force with friction: this model shows none"
+            )
         self.world = rapier.PhysicsWorld(gravity=self.scene.gravity)
         self.world.set_num_threads(1)
         asked = self.world.integration_parameters
         asked.dt = task.time_step
-        asked.num_solver_iterations = task.configuration.options["sweeps"]
+        asked.num_solver_iterations = options["sweeps"]
+        if options["coulomb"]:
+            asked.friction_model = rapier.FrictionModel.COULOMB
         self.handles = [self.world.add_body(*_body(b, self.scene.contacts)) for b in self.scene.bodies]
         self.bodies = [self.world.rigid_bodies[handle] for handle in self.handles]
         places = {body.name: handle for body, handle in zip(self.scene.bodies, self.handles, strict=True)}
         self.ground = self.world.add_body(rapier.RigidBodyBuilder(rapier.RigidBodyType.FIXED))
         for joint in self.scene.constraints:
             self._join(joint, places)
-        for load in self.scene.forces:
-            assert isinstance(load, Load)
-            body = self.world.rigid_bodies[places[load.body]]
-            body.add_force(load.force)  # stays until it is taken away
-            body.add_torque(load.torque)
+        joined = {frozenset(c.between) for c in self.scene.constraints if isinstance(c, Joint)}
+        for pair in self.scene.no_contact:
+            if frozenset(pair) not in joined:  # kept apart by a joint that holds nothing
+                free = rapier.GenericJointBuilder(rapier.JointAxesMask.empty()).contacts_enabled(False)
+                self.world.impulse_joints.insert(*(places[name] for name in pair), free.build())
+        for force in self.scene.forces:
+            if isinstance(force, Load):
+                body = self.world.rigid_bodies[places[force.body]]
+                body.add_force(force.force)  # stays until it is taken away
+                body.add_torque(force.torque)
+            elif isinstance(force, Spring):
+                self._spring(force, places)
+        fields = tuple(force for force in self.scene.forces if isinstance(force, CentralGravity))
+        self.pushes = Pushes(replace(self.scene, forces=fields))
 
     def _join(self, joint: Any, places: Mapping[str, Any]) -> None:
         first, second = ends_of(self.scene, joint)
@@ -121,12 +163,35 @@ class _Run:
         made = made.local_frame1((first.point, xyzw(first.turn))).local_frame2(
             (second.point, xyzw(second.turn))
         )
+        if (driven := drive(joint, "rapier3d")) is not None:
+            made = _driven(made, FREE[type(joint)], *driven)
         ends = [self.ground if end == WORLD else places[end] for end in joint.between]
         self.world.impulse_joints.insert(*ends, made.contacts_enabled(False).build())
 
+    def _spring(self, spring: Spring, places: Mapping[str, Any]) -> None:
+        """Its own spring joint, as stiff as it is told whatever it moves."""
+        made = rapier.SpringJointBuilder(spring.rest_length, spring.stiffness, spring.viscosity)
+        made = made.spring_model(rapier.MotorModel.FORCE_BASED).contacts_enabled(True)
+        points = [a if isinstance(e, str) else e for e, a in zip(spring.between, spring.anchors, strict=True)]
+        ends = [places[end] if isinstance(end, str) else self.ground for end in spring.between]
+        self.world.impulse_joints.insert(
+            *ends, made.local_anchor1(points[0]).local_anchor2(points[1]).build()
+        )
+
     def step(self, count: int) -> None:
         for _ in range(count):
+            if self.pushes:
+                self._push()
             self.world.step()
+
+    def _push(self) -> None:
+        where, speeds = (
+            np.array([tuple(getattr(body, name)) for body in self.bodies])
+            for name in ("translation", "linvel")
+        )
+        for body, force in zip(self.bodies, self.pushes.at(where, speeds)[0], strict=True):
+            # At once, and not through all its iterations, which would give energy.
+            body.apply_impulse(tuple(self.task.time_step * force))
 
     def read(self, keep: Kept, row: int, sample: int) -> None:
         for k, body in enumerate(self.bodies):
@@ -150,7 +215,26 @@ class _Run:
             keep.contacts[row] += sum(depth >= 0.0 for depth in depths)
             keep.depths[row] = max([keep.depths[row], *depths])
             # The impulse is told on the second.
-            keep.pair((first, second))[row] -= np.array(tuple(pair.total_impulse())) / self.task.time_step
+            told = np.array(tuple(pair.total_impulse()))
+            if self.task.configuration.options["coulomb"]:
+                told = told + sum(_rubbing(manifold) for manifold in pair.manifolds)
+            keep.pair((first, second))[row] -= told / self.task.time_step
+
+
+def _rubbing(manifold: Any) -> Array:
+    """Impulse of friction on the second body: told along two tangents, which Rapier takes from the normal alone (those of
+    Duff and others, "Building an orthonormal basis, revisited", of what points at the first)."""
+    x, y, z = toward = -np.array(tuple(manifold.data.normal))
+    sign = np.copysign(1.0, z)
+    a = -1.0 / (sign + z)
+    one = np.array([x * y * a, sign + y * y * a, -y])
+    along, across = np.sum([point.tangent_impulse for point in manifold.points] or [(0.0, 0.0)], axis=0)
+    return np.asarray(-along * one - across * np.cross(toward, one))
+
+
+def _driven(made: Any, axis: Any, speed: float, most: float | None) -> Any:
+    made = made.motor_velocity(axis, speed, RIGID_DRIVE).motor_model(axis, rapier.MotorModel.FORCE_BASED)
+    return made if most is None else made.motor_max_force(axis, most)
 
 
 def _body(body: Particle | RigidBody, contacts: bool) -> tuple[Any, list[Any]]:
@@ -168,9 +252,25 @@ def _body(body: Particle | RigidBody, contacts: bool) -> tuple[Any, list[Any]]:
         return made, []
     assert isinstance(body, RigidBody)
     rules = rapier.CoefficientCombineRule
-    surface = _shape(body.shape).density(0.0)
-    surface = surface.friction(body.material.friction).friction_combine_rule(rules.GEOMETRIC_MEAN)
-    return made, [surface.restitution(body.material.restitution).restitution_combine_rule(rules.MAX)]
+    made_of = []
+    for surface in _surfaces(body.shape):
+        rubs = (
+            surface.density(0.0).friction(body.material.friction).friction_combine_rule(rules.GEOMETRIC_MEAN)
+        )
+        made_of.append(rubs.restitution(body.material.restitution).restitution_combine_rule(rules.MAX))
+    return made, made_of
+
+
+def _surfaces(shape: Shape) -> list[Any]:
+    if not isinstance(shape, Compound):
+        return [_shape(shape)]
+    placed = []
+    for part in shape.parts:
+        turn = np.array(part.orientation)
+        if isinstance(part.shape, Cylinder):
+            turn = product(turn, np.array(TO_Z))
+        placed.append(_shape(part.shape).position((part.position, xyzw(turn))))
+    return placed
 
 
 def _shape(shape: Shape) -> Any:
@@ -183,6 +283,11 @@ def _shape(shape: Shape) -> Any:
     if isinstance(shape, Cylinder):
         made = rapier.Collider.cylinder(0.5 * shape.length, shape.radius)
         return made.position(((0.0, 0.0, 0.0), xyzw(np.array(TO_Z))))
+    if isinstance(shape, ConvexHull):
+        return rapier.Collider.convex_hull(np.array(shape.corners, dtype=np.float32))
+    if isinstance(shape, TriangleMesh | HeightField):
+        sides = np.array(shape.corners, dtype=np.float32), np.array(shape.faces, dtype=np.uint32)
+        return rapier.Collider.trimesh(*sides, rapier.TriMeshFlags.FIX_INTERNAL_EDGES)
     assert isinstance(shape, Plane)
     return rapier.Collider.halfspace(shape.normal)
 

@@ -21,7 +21,7 @@ from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.forces import CentralGravity, Load, Spring
 from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic
 from spook_tracker.engine.observe import ContactCount, ContactForce, Penetration
-from spook_tracker.engine.peers.frames import along, ends_of
+from spook_tracker.engine.peers.frames import along, drive, ends_of
 from spook_tracker.engine.peers.pushes import Pushes
 from spook_tracker.engine.peers.stepped import Kept, quiet, stepped
 from spook_tracker.engine.peers.surfaces import one_friction, one_restitution, solid
@@ -38,6 +38,7 @@ POINT_INERTIA = 1e-6  # kg m²: PhysX wants one of every body that turns
 FASTEST = 1e7  # rad/s, in place of 100
 SLOWEST_BOUNCE = 0.01  # m/s, in place of 2: slower impacts do not rebound
 FREE = (-math.inf, math.inf)
+RIGID_DRIVE, UNBOUNDED = 1e6, 1e30  # N s/m or N m s; N or N m
 SWING = (
     1e9,
     1e6,
@@ -54,8 +55,14 @@ class Sapien:
         forces=frozenset({CentralGravity, Load, Spring}),
         shows=frozenset({ContactForce, ContactCount, Penetration}),
         friction=True,
+        joint_friction=True,
+        motors=True,
+        springs_aside=True,
         restitution=True,
         kinematic=False,
+        absent=frozenset(
+            {"the force fluid", "friction of rolling or turning", "friction that differs with the direction"}
+        ),
     )
     configurations = (
         Configuration(
@@ -103,7 +110,9 @@ class _Run:
         if scene.contacts and any(frozenset(pair) not in joined for pair in scene.no_contact):
             raise NotSupported("our adapter cannot ask sapien for single pairs that must not touch")
         if task.contacts and any(body.material.friction for body in solid(scene)):
-            raise NotSupported("our adapter cannot ask sapien for a contact force with friction")
+            raise NotSupported(
+                "sapien does not support a contact force with friction: its contacts tell the part along their normals"
+            )
         friction = one_friction(scene, "sapien") if scene.contacts else 0.0
         self.material = physx.PhysxMaterial(friction, friction, one_restitution(scene, "sapien"))
         self.pushes = Pushes(scene)
@@ -161,7 +170,22 @@ class _Run:
         joint.set_limit_twist(*(FREE if twists else (0.0, 0.0)))
         if not isinstance(constraint, Ball):
             joint.set_drive_property_swing(*SWING)
+        if (driven := drive(constraint, "sapien")) is not None:
+            self._drive(joint, slides, driven, 1.0 if ends == list(constraint.between) else -1.0)
         child.entity.add_component(joint)
+
+    def _drive(self, joint: Any, slides: bool, driven: tuple[float, float | None], sign: float) -> None:
+        """The drive of its joint: a stiff damper, solved implicitly, that moves at a speed. Its bound is the impulse of a step,
+        and a twist counts against its axis."""
+        speed, most = driven
+        bound = UNBOUNDED if most is None else most * self.task.time_step
+        ahead, still = (sign * speed, 0.0, 0.0), (0.0, 0.0, 0.0)
+        if slides:
+            joint.set_drive_property_x(0.0, RIGID_DRIVE, bound, "force")
+            joint.set_drive_velocity_target(ahead, still)
+        else:
+            joint.set_drive_property_twist(0.0, RIGID_DRIVE, bound, "force")
+            joint.set_drive_velocity_target(still, (-sign * speed, 0.0, 0.0))
 
     def _rod(self, rod: Distance, ends: list[Any]) -> None:
         if not self._moves(ends[1]):
@@ -193,7 +217,11 @@ class _Run:
         speeds = np.array(
             [getattr(body, "linear_velocity", (0.0, 0.0, 0.0)) for body in self.bodies], dtype=float
         )
-        forces, torques = self.pushes.at(where, speeds)
+        spins = np.array(
+            [getattr(body, "angular_velocity", (0.0, 0.0, 0.0)) for body in self.bodies], dtype=float
+        )
+        turns = np.array([body.pose.q for body in self.bodies], dtype=float)
+        forces, torques = self.pushes.at(where, speeds, turns, spins)
         for body, force, torque in zip(self.bodies, forces, torques, strict=True):
             if isinstance(body, physx.PhysxRigidDynamicComponent):
                 body.add_force_torque(force, torque)

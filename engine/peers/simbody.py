@@ -37,7 +37,16 @@ class Simbody:
         shows=frozenset({ConstraintForce, ContactForce}),
         shows_force_of=frozenset({Distance, Ball, Hinge, Lock}),
         friction=True,
-        absent=frozenset({"restitution"}),  # what it gives back depends on the speed
+        springs_aside=True,
+        # What it gives back depends on the speed.
+        absent=frozenset(
+            {
+                "restitution",
+                "the force fluid",
+                "friction of rolling or turning",
+                "friction that differs with the direction",
+            }
+        ),
     )
     configurations = (
         Configuration(

@@ -192,8 +192,10 @@ class Model:
         elif isinstance(force, Spring):
             law = f"{force.stiffness!r}*(d-{force.rest_length!r})+{force.viscosity!r}*ddot"
             ends = [
-                self._seen(end if isinstance(end, str) else None, self._centre(end), np.eye(3))
-                for end in force.between
+                self._seen(
+                    end if isinstance(end, str) else None, np.array(self.scene.anchor(force, k)), np.eye(3)
+                )
+                for k, end in enumerate(force.between)
             ]
             made.append(_between(ends, law))
         elif isinstance(force, CentralGravity):
@@ -205,9 +207,6 @@ class Model:
         for number, one in enumerate(made):
             one.setName(f"{name}n{number}")
             self.model.addForce(one)
-
-    def _centre(self, end: Any) -> Array:
-        return np.array(self.scene.body(end).position if isinstance(end, str) else end)
 
     def _touch(self) -> None:
         """What can touch: balls and planes by pairs or all in one force, corners of boxes and planes."""

@@ -8,27 +8,33 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import pytest
 
 from spook_tracker.engine import (
     AngularMomentum,
     AngularVelocity,
     Ball,
     Box,
+    Compound,
     Distance,
     Energy,
     Final,
     Hinge,
     JointCoordinate,
+    Load,
     Lock,
     Material,
     MaximumAbsolute,
+    Motor,
     Particle,
     Plane,
     Position,
     Prismatic,
+    Relation,
     RigidBody,
     Scene,
     Sphere,
+    Spring,
     Trace,
     Velocity,
     Violation,
@@ -180,11 +186,14 @@ def slid(simulate: Any, pull: float, seconds: float = 2.0) -> float:
     return float(simulate(box_on_ground(pull), time_step=1 / 60, duration=seconds, observe=end)["end"][0])
 
 
-def sunk(simulate: Any, shape: Any = None, height: float = 0.5) -> float:
-    """How far a body rests from where it touches the ground [m] after 2 s; a cube of 1 m unless said."""
-    ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
+def sunk(simulate: Any, shape: Any = None, height: float = 0.5, under: Any = None) -> float:
+    """How far a body rests from where it touches the ground [m] after 2 s; a cube of 1 m on a plane unless said."""
+    ground = RigidBody(name="ground", motion="static", shape=under or Plane(), position=(0.0, 0.0, 0.0))
     shape = shape or Box((1.0, 1.0, 1.0))
-    body = RigidBody(name="body", mass=1.0, shape=shape, position=(0.0, 0.0, height))
+    body = RigidBody(
+        name="body", mass=1.0, shape=shape, position=(0.0, 0.0, height),
+        inertia=(1 / 6, 1 / 6, 1 / 6) if isinstance(shape, Compound) else None,
+    )  # fmt: skip
     end = {"end": Final(quantity=Position("body"))}
     run = simulate(Scene(bodies=(ground, body), gravity=GRAVITY), time_step=1 / 60, duration=2.0, observe=end)
     return float(run["end"][2]) - height
@@ -351,3 +360,74 @@ def braked(simulate: Any, kind: Any) -> list[float]:
         float(x)
         for x in np.ravel(simulate(rough(kind), time_step=1e-3, duration=6.0, observe=seen)["way"])[1:]
     ]
+
+
+def driven(simulate: Any, kind: Any, backwards: bool) -> list[float]:
+    """Speeds [rad/s or m/s] after 1 and 8 s of what a motor drives to 10 with 4 N m or N, at most, and weighs 2: 2 and 10."""
+    body = RigidBody(name="b", mass=2.0, inertia=(2.0, 2.0, 2.0), position=(0.0, 0.0, 0.0))
+    joint = kind(
+        name="j",
+        between=("b", "world") if backwards else ("world", "b"),
+        at=(0.0, 0.0, 0.0),
+        axis=(0.0, 0.6, 0.8),
+        motor=Motor(speed=10.0, max_force=4.0),
+        compliance=0.0,
+    )
+    seen = {"speed": Trace(quantity=AngularVelocity("b") if kind is Hinge else Velocity("b"), every=60)}
+    run = simulate(Scene(bodies=(body,), constraints=(joint,)), time_step=1 / 60, duration=8.0, observe=seen)
+    along = (-1.0 if backwards else 1.0) * run["speed"] @ np.array(joint.axis)
+    return [float(along[1]), float(along[8])]
+
+
+def given_way(simulate: Any, damping: float) -> tuple[float, float]:
+    """Where a mass of 3 kg is after 1 s on a distance of 3 m that gives by 1/30 m/N, let go at 4 m, in steps of 1 ms; and
+    where the damped oscillator is."""
+    weight = Particle(name="weight", mass=3.0, position=(4.0, 0.0, 0.0))
+    row = Distance(
+        name="row", between=((0.0, 0.0, 0.0), "weight"), rest_length=3.0, compliance=1 / 30, damping=damping
+    )
+    end = {"end": Final(quantity=Position("weight"))}
+    run = simulate(Scene(bodies=(weight,), constraints=(row,)), time_step=1e-3, duration=1.0, observe=end)
+    rate = 0.5 * damping * 10.0
+    turn = math.sqrt(10.0 - rate**2)
+    exact = 3.0 + math.exp(-rate) * (math.cos(turn) + rate / turn * math.sin(turn))
+    return float(run["end"][0]), exact
+
+
+def pulled_aside(simulate: Any) -> Any:
+    """Speed [m/s] and spin [rad/s] after 10 ms of a body of 2 kg that a spring of 8 N pulls up beside its centre."""
+    body = RigidBody(name="b", mass=2.0, inertia=(4.0, 4.0, 4.0), position=(0.0, 0.0, 0.0))
+    spring = Spring(
+        name="s", between=((0.5, 0.0, 1.0), "b"), stiffness=16.0, rest_length=0.5,
+        anchors=((0.0, 0.0, 0.0), (0.5, 0.0, 0.0)),
+    )  # fmt: skip
+    seen = {"v": Final(quantity=Velocity("b")), "w": Final(quantity=AngularVelocity("b"))}
+    run = simulate(Scene(bodies=(body,), forces=(spring,)), time_step=1e-3, steps=10, observe=seen)
+    return np.array([run["v"], run["w"]])
+
+
+def racked(simulate: Any) -> float:
+    """How far a rack of 2 kg goes in 1 s, pushed with 5 N, with a pinion of 0.5 m and 0.25 kg m² on it: 5/6 m."""
+    rack = RigidBody(name="rack", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.5, 0.0))
+    pinion = RigidBody(name="pinion", mass=1.0, inertia=(0.25, 0.25, 0.25), position=(0.0, 0.0, 0.0))
+    joints = (
+        Prismatic(name="slide", between=("world", "rack"), axis=(1.0, 0.0, 0.0), compliance=0.0),
+        Hinge(name="axle", between=("pinion", "world"), axis=(0.0, 0.0, 1.0), compliance=0.0),
+        Relation(name="mesh", terms=(("slide", 1.0), ("axle", -0.5)), compliance=0.0),
+    )
+    push = Load(name="push", body="rack", force=(5.0, 0.0, 0.0))
+    seen = {"x": Final(quantity=JointCoordinate("slide")), "turn": Final(quantity=JointCoordinate("axle"))}
+    scene = Scene(bodies=(rack, pinion), constraints=joints, forces=(push,))
+    run = simulate(scene, time_step=1e-3, duration=1.0, observe=seen)
+    assert float(run["turn"]) == pytest.approx(2.0 * float(run["x"]), rel=2e-3)
+    return float(run["x"])
+
+
+def carried(simulate: Any) -> list[float]:
+    """Speeds [m/s] after .1 and 1 s of a cube on a belt of 2 m/s with a friction of .5: .5 g .1 and 2."""
+    ground, box = box_on_ground(0.0).bodies
+    assert isinstance(ground, RigidBody)
+    belt = replace(ground, surface_velocity=(2.0, 0.0, 0.0))
+    speed = {"v": Trace(quantity=Velocity("box"), every=100)}
+    run = simulate(Scene(bodies=(belt, box), gravity=GRAVITY), time_step=1e-3, duration=1.0, observe=speed)
+    return [float(run["v"][1][0]), float(run["v"][10][0])]

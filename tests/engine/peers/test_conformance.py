@@ -6,6 +6,7 @@ What an engine alone does, or lacks, is in a file of its own. An engine that is 
 from __future__ import annotations
 
 import functools
+import itertools
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -15,16 +16,20 @@ import pytest
 
 from spook_tracker.engine import (
     Ball,
+    Box,
     Capsule,
     CentralGravity,
+    Compound,
     ConstraintForce,
     ContactCount,
     ContactForce,
+    ConvexHull,
     Cylinder,
     Final,
     Hinge,
     Load,
     Lock,
+    Part,
     Particle,
     Penetration,
     Position,
@@ -34,6 +39,7 @@ from spook_tracker.engine import (
     Sphere,
     Spring,
     Trace,
+    TriangleMesh,
     Universal,
     Velocity,
 )
@@ -55,7 +61,11 @@ MOTRIX, MOTRIX_MANY, MOTRIX_LOOSE = (
 )
 MERSON, HELD_STEP = ("simbody", "merson"), ("simbody", "held-step")
 P2, P2_AS_IT_COMES = ("p2", "accurate"), ("p2", "defaults")
-CANNON = ("cannon", "accurate")
+CANNON, EXUDYN = ("cannon", "accurate"), ("exudyn", "trapezoidal")
+BOX, BOX_AS_IT_COMES = ("box3d", "many-substeps"), ("box3d", "defaults")
+MUJOCO, MUJOCO_IMPLICIT, MUJOCO_AS_IT_COMES = (("mujoco", name) for name in ("rk4", "implicit", "defaults"))
+COULOMB = ("rapier3d", "coulomb")
+RAPIER_JS, RAPIER_JS_AS_IT_COMES = ("rapier", "many-iterations"), ("rapier", "defaults")
 JOINTS = (Ball, Hinge, Lock, Prismatic)
 EVERY_JOINT = (*JOINTS, Universal)
 
@@ -112,6 +122,7 @@ def test_a_fall_has_the_error_of_its_step(asked: Asked, owed: Any) -> None:
         DRAKE_LOOSE: (1e-5, JOINTS[:3]),
         JOLT: (1e-5, JOINTS),
         RAPIER_MANY: (1e-6, JOINTS),
+        BOX: (1e-5, JOINTS),
         TGS: (1e-6, JOINTS),
         PGS: (1e-6, JOINTS),
         MERSON: (1e-12, JOINTS),
@@ -131,6 +142,8 @@ def test_a_joint_holds_its_body(asked: Asked, kind: Any, owed: float) -> None:
         DRAKE_LOOSE: (0.02, JOINTS[:3]),
         JOLT: (0.02, JOINTS),
         RAPIER: (3e-3, JOINTS),
+        RAPIER_JS: (3e-3, JOINTS),
+        BOX: (0.02, JOINTS),
         TGS: (1e-3, JOINTS),
         PGS: (1e-3, JOINTS),
         MOTRIX: (2e-3, EVERY_JOINT),
@@ -152,6 +165,7 @@ def test_joints_between_moving_bodies_move_as_in_our_engine(asked: Asked, kind: 
         SAP: (1e-9, JOINTS[:3]),
         RK3: (1e-9, JOINTS[:3]),
         JOLT: (1e-4, JOINTS[:2]),
+        BOX: (1e-3, JOINTS),
         MERSON: (1e-9, JOINTS[:3]),
     }
 )
@@ -164,7 +178,7 @@ def test_the_force_of_a_joint_is_the_weight_it_holds(
     assert found["force"] == pytest.approx(peer_scenes.load_on_joint(kind, backwards), abs=owed)
 
 
-@rows(dict.fromkeys((DART, BULLET, SAP, RK3, MERSON), 1e-9) | {JOLT: 1e-6})
+@rows(dict.fromkeys((DART, BULLET, SAP, RK3, MERSON), 1e-9) | {JOLT: 1e-6, BOX: 1e-3})
 def test_the_tension_of_a_rod_at_rest_is_all_that_hangs_on_it(asked: Asked, owed: float) -> None:
     weights = tuple(Particle(name=f"{k}", mass=1.0 + k, position=(0.0, 0.0, -1.0 - k)) for k in range(2))
     rods = peer_scenes.chain(2).constraints
@@ -199,6 +213,7 @@ def test_speeds_at_the_start_are_those_of_the_scene(asked: Asked, owed: float) -
         **dict.fromkeys((RK3, MERSON, HELD_STEP), (1 / 240, 3e-5)),
         JOLT: (1 / 1000, 4e-3),  # of first order, and in single precision
         RAPIER: (1 / 1000, 2e-4),
+        BOX: (1 / 1000, 5e-4),
         TGS: (1 / 1000, 5e-4),
         PGS: (1 / 1000, 5e-4),
     }
@@ -248,6 +263,15 @@ def test_friction_holds_below_its_coefficient_and_not_above(asked: Asked, owed: 
 SOLIDS = {"box": None, "sphere": Sphere(0.5), "capsule": Capsule(0.25, 0.5)}
 TALL = {"box": None, "slim capsule": Capsule(0.2, 0.6), "cylinder": Cylinder(0.2, 1.0)}
 
+# Two halves of that cube, the lower one a corner of it aside and twice over: its centre of mass is not the body's.
+HALVES = [Part(shape=Box((1.0, 1.0, 0.5)), position=(0.0, 0.0, z)) for z in (0.25, -0.25)]
+ASIDE = Part(
+    shape=Box((0.5, 0.5, 0.5)),
+    position=(0.25, 0.25, -0.25),
+    orientation=(math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)),
+)
+PAIR = {"compound": Compound((*HALVES, ASIDE))}
+
 
 @rows(
     {
@@ -257,7 +281,12 @@ TALL = {"box": None, "slim capsule": Capsule(0.2, 0.6), "cylinder": Cylinder(0.2
             *((one, -1e-3, 1e-3, SOLIDS) for one in (SAP, JOLT)),
             (TGS, -1e-5, 1e-5, TALL),
             (MERSON, -1e-4, 1e-12, {"box": None, "sphere": SOLIDS["sphere"]}),
-            (RAPIER, -1e-3, 1e-3, {"cylinder": TALL["cylinder"]}),
+            (RAPIER, -1e-3, 1e-3, {"cylinder": TALL["cylinder"]} | PAIR),
+            (RAPIER_JS, -1e-3, 1e-3, {"cylinder": TALL["cylinder"]} | PAIR),
+            (JOLT, -1e-3, 1e-3, {"cylinder": TALL["cylinder"]} | PAIR),
+            (BULLET, -1e-3, 1e-3, {"cylinder": TALL["cylinder"]}),
+            (BOX, -6e-3, 1e-3, PAIR),
+            (MUJOCO, -1e-3, 0.0, PAIR),
             *((one, -1e-3, 0.0, SOLIDS | TALL) for one in (MOTRIX, MOTRIX_MANY, MOTRIX_LOOSE)),
         )
         for name, shape in shapes.items()
@@ -269,7 +298,25 @@ def test_a_body_rests_where_it_touches(asked: Asked, kind: str, owed: tuple[floa
     assert low < peer_scenes.sunk(engine(asked), shape) < high
 
 
-@rows({DART: (1e-5, (4, 4)), BULLET: (1e-3, (3, 4)), SAP: (1e-2, None), MERSON: (2e-3, None)})
+SHEET = TriangleMesh(((-2, -2, 0), (2, -2, 0), (2, 2, 0), (-2, 2, 0)), ((0, 1, 2), (0, 2, 3)))
+CUBE = ConvexHull(tuple(itertools.product((-0.5, 0.5), repeat=3)))
+
+
+@rows(dict.fromkeys((RAPIER_MANY, RAPIER_JS, JOLT, BOX), 1e-3) | {BOX: 6e-3})
+def test_hulls_and_balls_rest_on_meshes(asked: Asked, owed: float) -> None:
+    for shape in (CUBE, Sphere(0.5)):
+        assert abs(peer_scenes.sunk(engine(asked), shape, under=SHEET)) < owed
+
+
+@rows(
+    {
+        DART: (1e-5, (4, 4)),
+        BULLET: (1e-3, (3, 4)),
+        SAP: (1e-2, None),
+        MERSON: (2e-3, None),
+        COULOMB: (1e-2, None),
+    }
+)
 def test_the_ground_carries_the_weight_and_the_pull(
     asked: Asked, owed: tuple[float, tuple[int, int] | None]
 ) -> None:
@@ -304,6 +351,9 @@ def test_a_ball_comes_back_by_the_square_of_its_restitution(asked: Asked, owed: 
         MERSON: (1e-8, 1e-9, 1e-8),
         JOLT: (1e-3, 1e-5, 2e-3),
         CANNON: (1e-3, 1e-9, None),
+        BOX: (2e-3, 1e-5, 2e-3),
+        RAPIER: (2e-3, 1e-5, 2e-3),
+        RAPIER_JS_AS_IT_COMES: (2e-3, 1e-5, 2e-3),
     }
 )
 def test_forces_act_at_every_step(asked: Asked, owed: tuple[float, float, float | None]) -> None:
@@ -337,12 +387,55 @@ def test_forces_act_at_every_step(asked: Asked, owed: tuple[float, float, float 
 
 @by_joint(
     {(name, ""): (5e-3, (Hinge, Prismatic)) for name in ("dart", "pybullet", "jolt", "mujoco")}
-    | {MOTRIX: (2e-3, (Hinge, Prismatic))}
+    | dict.fromkeys((MOTRIX, BOX, RAPIER, RAPIER_JS_AS_IT_COMES, TGS), (3e-3, (Hinge, Prismatic)))
 )
 def test_dry_friction_in_a_joint_brakes_it_until_it_stands_and_holds_it_then(
     asked: Asked, kind: Any, owed: float
 ) -> None:
     assert peer_scenes.braked(engine(asked), kind) == pytest.approx(peer_scenes.BRAKED, abs=owed)
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+@by_joint(
+    dict.fromkeys((MUJOCO, MUJOCO_IMPLICIT, MUJOCO_AS_IT_COMES, DART, BULLET), (1e-9, (Hinge, Prismatic)))
+    | dict.fromkeys((BOX, BOX_AS_IT_COMES, JOLT, RAPIER, RAPIER_JS, TGS), (1e-3, (Hinge, Prismatic)))
+)
+def test_a_motor_drives_with_its_largest_force_up_to_its_speed(
+    asked: Asked, kind: Any, owed: float, backwards: bool
+) -> None:
+    assert peer_scenes.driven(engine(asked), kind, backwards) == pytest.approx([2.0, 10.0], rel=owed)
+
+
+@rows(
+    {
+        **dict.fromkeys((MUJOCO, RK3, MERSON, EXUDYN), 1e-6),
+        **dict.fromkeys((MUJOCO_IMPLICIT, DART, BULLET, SAP, JOLT, BOX, RAPIER_MANY, RAPIER_JS, TGS), 5e-3),
+    }
+)
+def test_a_distance_that_gives_is_a_spring_with_a_damper(asked: Asked, owed: float) -> None:
+    for damping in (0.0, 0.05):
+        found, exact = peer_scenes.given_way(engine(asked), damping)
+        assert found == pytest.approx(exact, abs=owed)
+
+
+@rows(
+    dict.fromkeys(
+        (MUJOCO, SAP, RK3, EXUDYN, DART, BULLET, TGS, MERSON, JOLT, BOX, RAPIER_MANY, RAPIER_JS), 0.01
+    )
+)
+def test_a_spring_beside_a_centre_turns_a_body(asked: Asked, owed: float) -> None:
+    expected = np.array([[0.0, 0.0, 0.04], [0.0, -0.01, 0.0]])  # F t/m up; F r t/I about −y
+    assert peer_scenes.pulled_aside(engine(asked)) == pytest.approx(expected, abs=owed * 0.04)
+
+
+@rows({MUJOCO: 1e-6, JOLT: 2e-3})
+def test_a_rack_and_its_pinion_share_what_pushes(asked: Asked, owed: float) -> None:
+    assert peer_scenes.racked(engine(asked)) == pytest.approx(5.0 / 6.0, rel=owed)
+
+
+@rows({MUJOCO_AS_IT_COMES: 0.02, JOLT: 0.02, BOX: 0.02})
+def test_a_belt_takes_along_what_lies_on_it(asked: Asked, owed: float) -> None:
+    assert peer_scenes.carried(engine(asked)) == pytest.approx([0.05 * G, 2.0], rel=owed)
 
 
 @rows(

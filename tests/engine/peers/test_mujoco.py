@@ -27,6 +27,7 @@ from spook_tracker.engine import (
     Scene,
     Trace,
     Violation,
+    Wire,
 )
 from spook_tracker.engine.find import find
 from spook_tracker.scalar_tests import falling_object, resting_stack, rolling_friction
@@ -265,3 +266,22 @@ def test_a_slow_run_is_ended_near_its_limit_though_nothing_is_recorded_between()
 
     assert run.status == "timed_out"
     assert run.steps < 1000
+
+
+def test_a_wire_over_two_points_of_the_world_is_atwood_s_machine() -> None:
+    """(m − M) g / (m + M) down, 2 m M g / (m + M) in the wire, which may go slack or may not."""
+    places = {"heavy": (0.0, 0.0, -1.0), "light": (1.0, 0.0, -1.0)}
+    weights = tuple(
+        Particle(name=name, mass=mass, position=places[name])
+        for name, mass in (("heavy", 3.0), ("light", 1.0))
+    )
+    through = (
+        ("heavy", places["heavy"]), ("world", (0.0, 0.0, 0.0)), ("world", (1.0, 0.0, 0.0)), ("light", places["light"]),
+    )  # fmt: skip
+    seen = {"z": Final(quantity=Position("heavy")), "pull": Final(quantity=ConstraintForce("wire"))}
+    for slack in (True, False):
+        wire = Wire(name="wire", through=through, slack=slack, compliance=0.0)
+        scene = Scene(bodies=weights, constraints=(wire,), gravity=(0.0, 0.0, -9.81))
+        run = simulate(scene, "rk4", time_step=1e-3, duration=0.5, observe=seen)
+        assert float(run["z"][2]) == pytest.approx(-1.0 - 0.125 * 0.5 * 9.81, abs=2e-4)
+        assert float(run["pull"]) == pytest.approx(1.5 * 9.81, rel=1e-3)

@@ -150,14 +150,14 @@ def test_the_force_of_a_contact_is_told_of_either_body_and_of_every_step() -> No
 
 
 def test_what_only_its_adapter_cannot_ask_is_said_so() -> None:
-    """Rapier has cones, and tells no direction of a contact's friction."""
+    """Rapier has cones, and its package tells nothing of a contact's friction."""
     log = RigidBody(name="log", mass=1.0, shape=Cone(0.5, 1.0), position=(0.0, 0.0, 0.5))
     plane = RigidBody(name="plane", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
     asked = {"f": Final(quantity=ContactForce("ball 0"))}
 
     with pytest.raises(NotSupported, match=r"^our adapter cannot ask rapier for the shape cone$"):
         RAPIER.simulate(Scene(bodies=(log, plane), gravity=GRAVITY), time_step=STEP, steps=1)
-    with pytest.raises(NotSupported, match="our adapter cannot ask rapier for a contact force with friction"):
+    with pytest.raises(NotSupported, match="rapier does not support a contact force with friction"):
         RAPIER.simulate(lying(0.5), time_step=STEP, steps=1, observe=asked)
 
 

@@ -5,12 +5,15 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
+import numpy as np
 import pytest
 
 from spook_tracker.engine import (
+    Box,
     Cone,
     ContactForce,
     Final,
+    Material,
     Plane,
     Position,
     RigidBody,
@@ -39,7 +42,9 @@ def test_what_it_cannot_be_asked_is_said_to_be_our_adapter_s_lack_where_it_is() 
     with pytest.raises(NotSupported, match="does not support the joint distance"):
         run(DEFAULTS)(peer_scenes.pendulum(), time_step=0.01, steps=1)
     force = {"f": Final(quantity=ContactForce("box"))}
-    with pytest.raises(NotSupported, match="cannot ask rapier3d for a contact force with friction"):
+    with pytest.raises(
+        NotSupported, match=r"rapier3d \(defaults\) does not support a contact force with friction"
+    ):
         run(DEFAULTS)(peer_scenes.box_on_ground(0.0), time_step=0.01, steps=1, observe=force)
 
 
@@ -47,6 +52,42 @@ def test_a_contact_without_friction_shows_the_weight_it_carries() -> None:
     force = {"f": Final(quantity=ContactForce("box"))}
     found = run(MANY)(peer_scenes.box_on_ground(0.0, 0.0), time_step=1 / 60, duration=1.0, observe=force)
     assert found["f"] == pytest.approx([0.0, 0.0, 9.81], abs=1e-3)
+
+
+@pytest.mark.parametrize("up", [(0.0, 0.0, 1.0), (0.48, 0.64, 0.6), (-0.48, 0.64, -0.6), (0.0, 1.0, 0.0)])
+def test_a_contact_with_friction_shows_all_that_holds_a_box_on_any_slope(up: Any) -> None:
+    """At rest it is the weight, across the slope, too; the tangents that Rapier takes depend on the normal alone."""
+    rough, normal = Material(friction=0.5), np.array(up)
+    pull = 9.81 * (0.3 * np.cross(normal, (0.6, 0.0, 0.8)) - normal)
+    ground = RigidBody(
+        name="ground", motion="static", shape=Plane(normal=up), position=(0.0, 0.0, 0.0), material=rough
+    )
+    ball = RigidBody(
+        name="box", mass=1.0, shape=Box((1.0, 1.0, 1.0)), position=tuple(0.5 * normal),
+        orientation=upright_to(normal), material=rough,
+    )  # fmt: skip
+    scene = Scene(bodies=(ground, ball), gravity=tuple(pull))
+    force = {"f": Final(quantity=ContactForce("box"))}
+    found = run("coulomb")(scene, time_step=1 / 60, duration=1.0, observe=force)
+    assert found["f"] == pytest.approx(-pull, abs=5e-3)
+
+
+def upright_to(normal: Any) -> Any:
+    turn = np.array([1.0 + normal[2], -normal[1], normal[0], 0.0])
+    return tuple(turn / np.linalg.norm(turn))
+
+
+def test_two_bodies_that_must_not_touch_fall_through_each_other() -> None:
+    boxes = tuple(
+        RigidBody(name=name, mass=1.0, shape=Box((1.0, 1.0, 1.0)), position=(0.0, 0.0, z))
+        for name, z in (("low", 0.5), ("high", 1.5))
+    )
+    ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
+    end = {"z": Final(quantity=Position("high"))}
+    scene = Scene(bodies=(ground, *boxes), gravity=(0.0, 0.0, -9.81), no_contact=(("low", "high"),))
+    assert run(MANY)(scene, time_step=1 / 60, duration=2.0, observe=end)["z"][2] == pytest.approx(
+        0.5, abs=2e-3
+    )
 
 
 def test_a_stranger_s_ten_lines_give_the_same_numbers() -> None:

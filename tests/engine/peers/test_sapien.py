@@ -39,7 +39,7 @@ def test_a_contact_without_friction_shows_the_weight_it_carries_and_one_with_it_
     force = {"f": Final(quantity=ContactForce("box"))}
     found = run("tgs")(peer_scenes.box_on_ground(0.0, 0.0), time_step=1 / 60, duration=1.0, observe=force)
     assert found["f"] == pytest.approx([0.0, 0.0, 9.81], abs=1e-3)
-    with pytest.raises(NotSupported, match="our adapter cannot ask sapien for a contact force with friction"):
+    with pytest.raises(NotSupported, match="sapien does not support a contact force with friction"):
         run("tgs")(peer_scenes.box_on_ground(0.0), time_step=0.01, steps=1, observe=force)
 
 
