@@ -20,6 +20,7 @@ CAN = replace(  # a file has no forces but of springs and actuators, and no serv
     forces=frozenset({Spring}),
     armature=True,
     motors=False,
+    kinematic=False,
 )
 START = "start"
 

@@ -7,6 +7,7 @@ of its last stage. A central is a Python callback: its errors are MuJoCo's, its 
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable
 from importlib.metadata import version
@@ -25,7 +26,7 @@ from spook_tracker.engine.peers.mujoco_file import READS, run_model
 from spook_tracker.engine.peers.mujoco_model import HALF_HINGE, Model, model
 from spook_tracker.engine.peers.stepped import Kept, stepped
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recorded_joints import cross, joint_point, turned
+from spook_tracker.engine.recorded_joints import cross, joint_point, product, turned
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
 from spook_tracker.engine.scene import Scene
@@ -53,6 +54,7 @@ class MuJoCo:
         rolling_friction=True,
         joint_friction=True,
         motors=True,
+        kinematic=SURFACES_MOVE,
         springs_aside=True,
         surface_velocity=SURFACES_MOVE,
         absent=frozenset(
@@ -220,6 +222,9 @@ class _Run:
         keep.orientations[place] = d.xquat[self.ids]
         keep.spins[place] = spin
         keep.velocities[place] = d.cvel[self.ids, 3:] + cross(spin, where - d.subtree_com[self.roots])
+        for k, body in enumerate(self.task.scene.bodies):
+            if getattr(body, "motion", "dynamic") == "kinematic":
+                _carry(keep, place, k, body, sample * self.task.time_step)
 
     def _read_constraints(self, keep: Kept, sample: int) -> None:
         scene, m, d = self.task.scene, self.model, self.data
@@ -304,6 +309,18 @@ class _Run:
             force = frames[k].T @ wrench[:3]  # on the second, along the normal
             first, second = (names[int(m.geom_bodyid[g[k]])] for g in (touching.geom1, touching.geom2))
             keep.pair((first, second))[place] -= force
+
+
+def _carry(keep: Kept, place: int, k: int, body: Any, time: float) -> None:
+    """Where a kinematic body is by now, of which MuJoCo has the surface alone."""
+    spin = np.array(body.angular_velocity)
+    rate = float(np.linalg.norm(spin))
+    keep.positions[place, k] = np.array(body.position) + time * np.array(body.velocity)
+    keep.velocities[place, k], keep.spins[place, k] = body.velocity, spin
+    if rate:
+        half = 0.5 * rate * time
+        gone = np.array([math.cos(half), *(math.sin(half) / rate * spin)])
+        keep.orientations[place, k] = product(gone, np.array(body.orientation))
 
 
 def _attraction(run: _Run, fields: list[CentralGravity]) -> Callable[[Any, Any], None]:

@@ -212,19 +212,35 @@ class _Writer:
         parts: list[tuple[Shape, Any, Any]] = [(body.shape, (0.0, 0.0, 0.0), UPRIGHT)]
         if isinstance(body.shape, Compound):
             parts = [(part.shape, part.position, np.array(part.orientation)) for part in body.shape.parts]
-        belt = ""
-        if any(body.surface_velocity):
-            belt = f" surfacevel={numbers((*body.surface_velocity, 0.0, 0.0, 0.0))}"
+        along, about = self._flow(body)
         text = ""
         for k, (shape, at, turn) in enumerate(parts):
             kind, size, q = _surface(shape)
-            name = quoteattr(body.name if k == 0 else f"{body.name}/{k}")
+            name, axes, belt = quoteattr(body.name if k == 0 else f"{body.name}/{k}"), product(turn, q), ""
+            if along.any() or about.any():
+                flow = (*turned_back(axes, along), *turned_back(axes, about))
+                belt = f" surfacevel={numbers(flow)}"
             text += (
                 f'<geom name={name} type="{kind}" size={numbers(size)} pos={numbers(at)} '
-                f'quat={numbers(product(turn, q))} mass="0" '
+                f'quat={numbers(axes)} mass="0" '
                 f"{_friction(body.material.friction, body.material)} {self.row}{belt}/>"
             )
         return text
+
+    def _flow(self, body: RigidBody) -> tuple[Array, Array]:
+        """How its surface moves along itself and turns, in its axes: as a belt, or as a plane that slides and turns in itself."""
+        along, about = np.array(body.surface_velocity), np.zeros(3)
+        if body.motion != "kinematic":
+            return along, about
+        turn = turn_of(body)
+        moved, about = (turned_back(turn, np.array(v)) for v in (body.velocity, body.angular_velocity))
+        normal = np.array(body.shape.normal) if isinstance(body.shape, Plane) else np.zeros(3)
+        leaves = abs(moved @ normal) + float(np.linalg.norm(np.cross(about, normal)))
+        if not normal.any() or leaves > 1e-12 * float(np.linalg.norm(moved) + np.linalg.norm(about)):
+            raise NotSupported(
+                f"our adapter cannot ask mujoco for the kinematic {body.name!r}, only for planes that move in themselves"
+            )
+        return along + moved, about
 
     def _site(self, end: str | None, point: Array, name: str) -> str:
         """A named point of a body, or of the world, given where it is at the start."""

@@ -26,6 +26,7 @@ from spook_tracker.engine import (
     Material,
     MaximumAbsolute,
     Motor,
+    Orientation,
     Particle,
     Plane,
     Position,
@@ -431,3 +432,19 @@ def carried(simulate: Any) -> list[float]:
     speed = {"v": Trace(quantity=Velocity("box"), every=100)}
     run = simulate(Scene(bodies=(belt, box), gravity=GRAVITY), time_step=1e-3, duration=1.0, observe=speed)
     return [float(run["v"][1][0]), float(run["v"][10][0])]
+
+
+def turned_along(simulate: Any) -> Any:
+    """Where a turntable of 1 rad/s has what stands on it, 0.3 m off its axis, after 1 s, and how far itself is turned."""
+    rough = Material(friction=0.5)
+    table = RigidBody(
+        name="table", motion="kinematic", shape=Plane(), position=(0.0, 0.0, 0.0),
+        angular_velocity=(0.0, 0.0, 1.0), material=rough,
+    )  # fmt: skip
+    cube = RigidBody(
+        name="cube", mass=1.0, shape=Box((0.1, 0.1, 0.1)), position=(0.3, 0.0, 0.05), velocity=(0.0, 0.3, 0.0),
+        angular_velocity=(0.0, 0.0, 1.0), material=rough,
+    )  # fmt: skip
+    seen = {"cube": Final(quantity=Position("cube")), "table": Final(quantity=Orientation("table"))}
+    run = simulate(Scene(bodies=(table, cube), gravity=GRAVITY), time_step=1e-3, duration=1.0, observe=seen)
+    return np.array([run["cube"][0], run["cube"][1], 2.0 * math.asin(run["table"][3])])

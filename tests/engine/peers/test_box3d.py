@@ -132,24 +132,6 @@ def test_a_motor_that_lifts_shows_what_it_gives(kind: Any, place: int) -> None:
     assert run["f"] == pytest.approx(expected, abs=1e-3)
 
 
-def test_a_kinematic_body_goes_its_way_and_takes_along_what_stands_on_it() -> None:
-    rough = Material(friction=0.5)
-    floor = RigidBody(
-        name="floor", motion="kinematic", shape=Box((4.0, 4.0, 1.0)), position=(0.0, 0.0, -0.5),
-        velocity=(1.0, 0.0, 0.0), material=rough,
-    )  # fmt: skip
-    box = RigidBody(
-        name="box", mass=1.0, shape=Box((1.0, 1.0, 1.0)), position=(0.0, 0.0, 0.5), velocity=(1.0, 0.0, 0.0),
-        material=rough,
-    )  # fmt: skip
-    seen = {name: Final(quantity=Position(name)) for name in ("floor", "box")}
-    run = BOX3D.simulate(
-        Scene(bodies=(floor, box), gravity=GRAVITY), time_step=STEP, duration=1.0, observe=seen
-    )
-
-    assert [float(run["floor"][0]), float(run["box"][0])] == pytest.approx([1.0, 1.0], abs=1e-3)
-
-
 def test_what_it_has_not_is_not_supported_by_name() -> None:
     log = RigidBody(name="log", mass=1.0, shape=Cylinder(0.5, 1.0), position=(0.0, 0.0, 0.5))
     with pytest.raises(NotSupported, match=r"^box3d \(many-substeps\) does not support the shape cylinder$"):

@@ -433,6 +433,12 @@ def test_a_rack_and_its_pinion_share_what_pushes(asked: Asked, owed: float) -> N
     assert peer_scenes.racked(engine(asked)) == pytest.approx(5.0 / 6.0, rel=owed)
 
 
+@rows({MUJOCO: 1e-3, JOLT: 1e-3, BOX: 0.03, RAPIER: 1e-3})
+def test_a_turntable_takes_along_what_stands_on_it(asked: Asked, owed: float) -> None:
+    expected = [0.3 * math.cos(1.0), 0.3 * math.sin(1.0), 1.0]
+    assert peer_scenes.turned_along(engine(asked)) == pytest.approx(expected, abs=owed)
+
+
 @rows({MUJOCO_AS_IT_COMES: 0.02, JOLT: 0.02, BOX: 0.02})
 def test_a_belt_takes_along_what_lies_on_it(asked: Asked, owed: float) -> None:
     assert peer_scenes.carried(engine(asked)) == pytest.approx([0.05 * G, 2.0], rel=owed)
