@@ -22,7 +22,7 @@ OBJECTIONS: Mapping[str, str] = {
     "p2": "it is made for games in a plane, by a small number of sweeps",
     "pybullet": "500 sweeps are ten times what it asks for, and loads are pushed from Python before each step; its own step is 1/240 s",
     "rapier": "it is asked through WebAssembly on one thread, and its iterations alone are raised, not its substeps",
-    "rapier3d": "as of rapier, by its bindings for Python, which push fields before each step; its friction for each point of contact (coulomb) is there to show what forces of friction are, and costs more",
+    "rapier3d": "as of rapier, by its bindings for Python, which push fields before each step and are asked for belts within it; its friction for each point of contact (coulomb) is there to show what forces of friction are, and costs more",
     "sapien": "PhysX is made for a GPU and for many bodies; its articulations are not asked",
     "simbody": "it is made for the motion of people and machines with a dozen joints, by integrators that hold the error, and OpenSim around it costs time; heaps at a step that is given are not its trade",
 }

@@ -27,7 +27,7 @@ from spook_tracker.engine.peers.pushes import Pushes
 from spook_tracker.engine.peers.stepped import Kept, stepped
 from spook_tracker.engine.peers.surfaces import solid
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recorded_joints import product
+from spook_tracker.engine.recorded_joints import product, turned
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
 from spook_tracker.engine.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Plane, Shape, Sphere
@@ -81,6 +81,7 @@ class Rapier3D:
         motors=True,
         springs_aside=True,
         restitution=True,
+        surface_velocity=True,
         kinematic=True,
         absent=ABSENT,
     )
@@ -139,6 +140,13 @@ class _Run:
         self.handles = [self.world.add_body(*_body(b, self.scene.contacts)) for b in self.scene.bodies]
         self.bodies = [self.world.rigid_bodies[handle] for handle in self.handles]
         places = {body.name: handle for body, handle in zip(self.scene.bodies, self.handles, strict=True)}
+        belts = {
+            handle: body
+            for handle, body in zip(self.handles, self.scene.bodies, strict=True)
+            if isinstance(body, RigidBody) and any(body.surface_velocity)
+        }
+        if belts:
+            self.world.physics_hooks = _Belts(belts, self.world)
         self.ground = self.world.add_body(rapier.RigidBodyBuilder(rapier.RigidBodyType.FIXED))
         for joint in self.scene.constraints:
             self._join(joint, places)
@@ -221,6 +229,25 @@ class _Run:
             keep.pair((first, second))[row] -= told / self.task.time_step
 
 
+class _Belts:
+    """Rapier asks it how the surfaces of a contact move along themselves, at every step."""
+
+    def __init__(self, belts: Mapping[Any, RigidBody], world: Any) -> None:
+        self.belts, self.world = belts, world
+
+    def _flow(self, handle: Any) -> Array:
+        body = self.belts.get(handle)
+        if body is None:
+            return np.zeros(3)
+        turn = self.world.rigid_bodies[handle].rotation
+        return turned(np.array([turn.w, turn.i, turn.j, turn.k]), np.array(body.surface_velocity))
+
+    def modify_solver_contacts(self, contact: Any) -> None:
+        """Of a pair with a belt: by how much the second is to go faster than the first."""
+        flow = self._flow(contact.rigid_body1) - self._flow(contact.rigid_body2)
+        contact.set_tangent_velocity(tuple(flow))
+
+
 def _rubbing(manifold: Any) -> Array:
     """Impulse of friction on the second body: told along two tangents, which Rapier takes from the normal alone (those of
     Duff and others, "Building an orthonormal basis, revisited", of what points at the first)."""
@@ -254,6 +281,8 @@ def _body(body: Particle | RigidBody, contacts: bool) -> tuple[Any, list[Any]]:
     rules = rapier.CoefficientCombineRule
     made_of = []
     for surface in _surfaces(body.shape):
+        if any(body.surface_velocity):
+            surface = surface.active_hooks(rapier.ActiveHooks.MODIFY_SOLVER_CONTACTS)
         rubs = (
             surface.density(0.0).friction(body.material.friction).friction_combine_rule(rules.GEOMETRIC_MEAN)
         )

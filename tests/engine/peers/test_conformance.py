@@ -439,7 +439,7 @@ def test_a_turntable_takes_along_what_stands_on_it(asked: Asked, owed: float) ->
     assert peer_scenes.turned_along(engine(asked)) == pytest.approx(expected, abs=owed)
 
 
-@rows({MUJOCO_AS_IT_COMES: 0.02, JOLT: 0.02, BOX: 0.02})
+@rows(dict.fromkeys((MUJOCO_AS_IT_COMES, JOLT, BOX, RAPIER), 0.02))
 def test_a_belt_takes_along_what_lies_on_it(asked: Asked, owed: float) -> None:
     assert peer_scenes.carried(engine(asked)) == pytest.approx([0.05 * G, 2.0], rel=owed)
 
