@@ -14,7 +14,6 @@ from spook_tracker.engine import (
     Box,
     ContactForce,
     Final,
-    KineticEnergy,
     Material,
     Method,
     Plane,
@@ -335,29 +334,3 @@ def test_each_contact_in_a_heap_of_balls_obeys_the_law() -> None:
             )
     assert sliding > 100
     assert sticking > 50
-
-
-def test_friction_only_takes_energy() -> None:
-    """A box set spinning and sliding: its kinetic energy falls at every step until it rests."""
-    material = Material(friction=0.4)
-    bodies = (
-        RigidBody(name="plane", position=(0, 0, 0), shape=Plane(), motion="static", material=material),
-        RigidBody(
-            name="box",
-            position=(0, 0, 0.25),
-            mass=1.0,
-            shape=Box((1, 1, 0.5)),
-            velocity=(2, 1, 0),
-            angular_velocity=(0, 0, 6),
-            material=material,
-        ),
-    )
-    result = simulate(
-        Scene(bodies=bodies, gravity=(0, 0, -GRAVITY)),
-        time_step=TIME_STEP,
-        duration=2.0,
-        observe={"k": Trace(quantity=KineticEnergy())},
-    )
-
-    assert np.diff(result["k"]).max() < 1e-12
-    assert result["k"][-1] < 1e-15

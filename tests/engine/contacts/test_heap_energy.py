@@ -8,13 +8,9 @@ import pytest
 from spook_tracker.engine import (
     AngularVelocity,
     Box,
-    Cone,
-    Cylinder,
     Energy,
     Material,
-    Maximum,
     Method,
-    Penetration,
     Plane,
     Position,
     RigidBody,
@@ -24,65 +20,12 @@ from spook_tracker.engine import (
     Velocity,
     simulate,
 )
+from tests.scenes.corpus import stack
 
 GRAVITY = (0.0, 0.0, -9.81)
 ROUGH = Material(friction=0.5)
 GROUND = RigidBody(name="ground", motion="static", shape=Plane(), position=(0, 0, 0), material=ROUGH)
-SHAPES = (Box((0.4, 0.3, 0.5)), Cylinder(0.2, 0.5), Cone(0.3, 0.5))
 SOLVERS = ("direct", "iterative")
-
-
-def stack(count: int) -> Scene:
-    """Boxes of a metre and a kilogram, one upon the other."""
-    boxes = tuple(
-        RigidBody(name=f"box {k}", mass=1.0, shape=Box((1, 1, 1)), position=(0, 0, 0.5 + k), material=ROUGH)
-        for k in range(count)
-    )
-    return Scene(bodies=(GROUND, *boxes), gravity=GRAVITY)
-
-
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_what_is_lifted_out_of_an_overlap_has_paid_for_it(solver: str) -> None:
-    """Corners and rims that swing in within a step sink a little; lifting them again won 2e-3 of the energy a step."""
-    for seed in range(4):
-        rng = np.random.default_rng(seed)
-        turn = rng.normal(size=4)
-        body = RigidBody(
-            name="body",
-            mass=float(10.0 ** rng.uniform(-6, 9)),
-            shape=SHAPES[seed % len(SHAPES)],
-            position=(0.0, 0.0, 0.6),
-            orientation=tuple(turn / np.linalg.norm(turn)),
-            angular_velocity=tuple(rng.normal(size=3)),
-            material=ROUGH,
-        )
-        result = simulate(
-            Scene(bodies=(GROUND, body), gravity=GRAVITY),
-            time_step=1 / 60,
-            duration=1.5,
-            method=Method(solver=solver),
-            observe={"energy": Trace(quantity=Energy()), "depth": Maximum(quantity=Penetration())},
-        )
-        energy = result["energy"]
-
-        assert result.status == "completed"
-        assert np.diff(energy).max() <= 1e-9 * energy[0]
-        assert result["depth"] < 1e-3
-
-
-def test_iterations_that_stop_early_win_no_energy() -> None:
-    """Twenty boxes and fifty sweeps: the load is not carried at once, and what is missing was won back with more."""
-    result = simulate(
-        stack(20),
-        time_step=1 / 60,
-        duration=1.0,
-        method=Method(solver="iterative", iterations=50),
-        observe={"energy": Trace(quantity=Energy())},
-    )
-    energy = result["energy"]
-
-    assert result.status == "completed" and result.residual > 1e-3
-    assert np.diff(energy).max() <= 1e-12 * energy[0]
 
 
 @pytest.mark.parametrize("solver", SOLVERS)

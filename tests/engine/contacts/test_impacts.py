@@ -113,39 +113,6 @@ def test_t12_joints_take_part_in_an_impact(psi: float) -> None:
     assert result["w"][hit, 2] == pytest.approx(-impulse * arm / moment, abs=1e-12)
 
 
-@pytest.mark.parametrize("psi", [0.0, 0.7, 1.0])
-def test_impacts_among_many_bodies_keep_momentum_and_gain_no_energy(psi: float) -> None:
-    """A break of balls and boxes with friction, floating: momentum to rounding, energy only falls.
-
-    Without restitution bodies stay together and a turning one sinks in a little; putting them apart again moves
-    them without an impulse and costs angular momentum.
-    """
-    rng = np.random.default_rng(3)
-    bodies = [ball("cue", -2.0, 9.0, 1.0, psi, y=0.03)]
-    for i in range(10):
-        shape = Sphere(0.15) if i % 2 else Box((0.25, 0.2, 0.3))
-        bodies.append(
-            RigidBody(
-                name=f"b{i}",
-                mass=1.0 + 0.2 * i,
-                shape=shape,
-                position=(0.4 * (i % 4), 0.4 * (i // 4) - 0.4, float(rng.uniform(-0.05, 0.05))),
-                material=Material(restitution=psi, friction=0.3),
-            )
-        )
-    observe = {
-        "p": Trace(quantity=Momentum()),
-        "l": Trace(quantity=AngularMomentum()),
-        "e": Trace(quantity=KineticEnergy()),
-    }
-    result = simulate(Scene(bodies=tuple(bodies)), time_step=1 / 240, steps=480, observe=observe)
-
-    assert result.counters["contacts"] > 5  # pairs that meet, not those that might
-    assert np.abs(result["p"] - result["p"][0]).max() < 1e-11 * 9.0
-    assert np.abs(result["l"] - result["l"][0]).max() < (1e-11 if psi > 0.0 else 0.01)
-    assert np.diff(result["e"]).max() < 1e-6 * result["e"][0]
-
-
 @pytest.mark.parametrize("gap", [0.0, 0.01])
 def test_an_impact_runs_through_a_row_of_balls(gap: float) -> None:
     """Successive impacts, or gaps: the last ball leaves with the speed of the first. Touching and simultaneous,
@@ -205,29 +172,6 @@ def test_balls_held_by_joints_go_on_after_an_impact_as_it_left_them(h: float, so
 
     assert hit * h == pytest.approx(lean / spin, abs=2 * h)
     assert np.abs(w[hit:] - (0.0, spin)).max() < 2 / 9 * h * spin**2
-
-
-@pytest.mark.parametrize("solver", ["direct", "iterative"])
-@pytest.mark.parametrize("seed", [3, 21, 39])
-def test_momentum_is_kept_where_successive_impacts_come_to_no_end(seed: int, solver: str) -> None:
-    """Eight balls of .01 to 100 kg in a row: after hundreds of blows in one step the rest is one blow of fifteen pairs,
-    of which seven are enough. Elimination met pivots that were rounding: momentum changed by up to 154 %, told completed."""
-    masses = 10.0 ** np.random.default_rng(seed).uniform(-2.0, 2.0, 8)
-    places = [0.0, 0.2, 0.6, 0.8, 1.0, 1.2, 1.4, 1.6]
-    balls = tuple(
-        ball(f"ball {k}", x, 12.43932973 if k < 2 else 0.0, float(masses[k]), 1.0)
-        for k, x in enumerate(places)
-    )
-    run = simulate(
-        Scene(bodies=balls),
-        time_step=H,
-        steps=8,
-        method=Method(impacts="successive", solver=solver),
-        observe={"p": Trace(quantity=Momentum()), "energy": Trace(quantity=KineticEnergy())},
-    )
-
-    assert np.abs(run["p"] - run["p"][0]).max() < 1e-9 * run["p"][0, 0]
-    assert np.diff(run["energy"]).max() < 1e-9 * run["energy"][0]
 
 
 def meetings(

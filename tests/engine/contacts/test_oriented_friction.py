@@ -13,7 +13,6 @@ from spook_tracker.engine import (
     Box,
     ContactForce,
     ContactPoints,
-    Energy,
     Final,
     Lock,
     Material,
@@ -207,27 +206,6 @@ def test_creep_is_slower_where_friction_is_higher() -> None:
         gravity = (0.5 * force[0], 0.5 * force[1], -GRAVITY)  # 1 N
         v = run(Scene(bodies=(floor(soft), box()), gravity=gravity), 60, Method())[-1]
         np.testing.assert_allclose(v[:2], np.array(force) * 1e-3 * rate / 4.0, rtol=1e-7, atol=1e-12)
-
-
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_a_heap_on_a_grained_floor_gains_no_energy(solver: str) -> None:
-    rng = np.random.default_rng(5)
-    bodies = [floor(grained(0.9, 0.1, 0.7))]
-    for k, (x, y, z) in enumerate(itertools.product(range(2), range(2), range(3))):
-        place = np.array([0.45 * x, 0.45 * y, 0.25 + 0.45 * z]) + rng.uniform(-0.03, 0.03, 3)
-        shape = Box((0.4, 0.3, 0.35)) if k % 2 else Sphere(0.2)
-        bodies.append(
-            box(f"b{k}", position=tuple(place), shape=shape, mass=1.0, velocity=tuple(rng.uniform(-1, 1, 3)))
-        )
-    energy = simulate(
-        Scene(bodies=tuple(bodies), gravity=(0, 0, -GRAVITY)),
-        time_step=H,
-        steps=180,
-        method=Method(solver=solver, iterations=200),  # type: ignore[arg-type]
-        observe={"e": Trace(quantity=Energy())},
-    )["e"]
-
-    assert np.diff(energy).max() < 1e-9 * abs(energy[0])
 
 
 def test_the_forces_that_are_told_lie_in_the_ellipse() -> None:

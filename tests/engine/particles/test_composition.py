@@ -12,7 +12,6 @@ from scipy.special import ellipj, ellipk
 
 from spook_tracker.engine import (
     WORLD,
-    AngularMomentum,
     CentralGravity,
     ConstraintForce,
     Distance,
@@ -21,7 +20,6 @@ from spook_tracker.engine import (
     Hinge,
     JointSpring,
     Load,
-    MaximumAbsolute,
     Method,
     MethodError,
     Particle,
@@ -32,7 +30,6 @@ from spook_tracker.engine import (
     Spring,
     Trace,
     Velocity,
-    Violation,
     simulate,
     start,
 )
@@ -121,34 +118,10 @@ def test_the_order_holds_on_an_orbit(name: str, steps: int) -> None:
     assert observed_order(*errors) == pytest.approx(ORDERS[name], abs=0.4)
 
 
-@pytest.mark.parametrize(("name", "steps"), [("order4", 60), ("order6", 60), ("order8", 30)])
-def test_the_order_holds_on_a_chain(name: str, steps: int) -> None:
-    tip = chain_tip(6, 2.0)
-    errors = [error(line(6), "5", tip, 2.0, 1 / n, name) for n in (steps, 2 * steps)]
-
-    assert observed_order(*errors) == pytest.approx(ORDERS[name], abs=0.5)
-
-
 def test_the_chain_of_26_goes_beyond_the_peers_accuracy() -> None:
     """1.9e-5 m at h = 1/60 is what a Runge-Kutta engine in joint coordinates reaches."""
     assert error(line(26), "25", chain_tip(26, 2.0), 2.0, 1 / 60, "order4") < 1.9e-5
     assert error(line(26), "25", chain_tip(26, 2.0), 2.0, 1 / 60, "order8") < 1e-9
-
-
-def test_rows_keep_their_length_to_rounding_and_energy_to_the_order() -> None:
-    result = simulate(
-        line(26),
-        time_step=1 / 500,
-        duration=5.0,
-        method=Method(composition="order6"),
-        observe={
-            "length": MaximumAbsolute(quantity=Violation()),
-            "energy": MaximumAbsolute(quantity=Energy(), from_start=True),
-        },
-    )
-
-    assert result["length"].max() < 1e-13
-    assert result["energy"] < 1e-9 * 26 * 13.5 * G
 
 
 def test_velocities_are_those_of_the_sample_and_lie_along_the_circle() -> None:
@@ -200,31 +173,6 @@ def test_reading_samples_changes_no_bit() -> None:
         )
 
         assert silent.state_hash == read.state_hash
-
-
-def test_rows_that_branch_and_close_loops_are_composed_too() -> None:
-    """A square with a diagonal, spinning freely: momentum and lengths stay, whatever the topology."""
-    corners = {"a": (1.0, 0.0), "b": (0.0, 1.0), "c": (-1.0, 0.0), "d": (0.0, -1.0)}
-    bodies = [
-        Particle(name=name, mass=1.0, position=(x, y, 0.0), velocity=(-2 * y, 2 * x, 0.5))
-        for name, (x, y) in corners.items()
-    ]
-    rows = [Distance(name=p + q, between=(p, q)) for p, q in ("ab", "bc", "cd", "da", "ac")]
-    result = simulate(
-        Scene(bodies=bodies, constraints=rows),
-        time_step=0.02,
-        steps=500,
-        method=Method(composition="order4"),
-        observe={
-            "length": MaximumAbsolute(quantity=Violation()),
-            "spin": MaximumAbsolute(quantity=AngularMomentum(), from_start=True),
-            "x": Final(quantity=Position("a")),
-        },
-    )
-
-    assert result["length"].max() < 1e-13
-    assert result["spin"].max() < 1e-11
-    assert result["x"] == pytest.approx([math.cos(20.0), math.sin(20.0), 5.0], abs=1e-5)
 
 
 def test_a_whip_is_halved_not_lost() -> None:

@@ -120,6 +120,7 @@ CASES = [
     (chain_error, CURVED_HALF_STEPS, 2.0, 1 / 200),
     (chain_error, ORDER4, 4.0, 1 / 200),
     (chain_error, ORDER6, 6.0, 1 / 100),
+    (chain_error, ORDER8, 8.0, 1 / 40),
     (orbit_error, Method(), 1.0, 0.25),
     (orbit_error, HALF_STEPS, 2.0, 1.0),
     (orbit_error, ORDER4, 4.0, 5.0),

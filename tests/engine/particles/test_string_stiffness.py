@@ -14,7 +14,6 @@ from spook_tracker.engine import (
     Energy,
     MaximumAbsolute,
     Method,
-    Momentum,
     Particle,
     Position,
     Result,
@@ -124,48 +123,6 @@ def test_string_stiffness_costs_next_to_nothing_where_it_is_not_needed() -> None
 
     assert np.abs(plain["x"] - strings["x"]).max() < 2e-3
     assert abs(strings["e"][-1] - plain["e"][-1]) < 1e-3 * GRAVITY
-
-
-def afloat(kind: str) -> Scene:
-    """Particles on taut rows that nothing holds: in a row, in a ring, and three rows from one."""
-    rng = np.random.default_rng(5)
-    count = 2 if kind == "pair" else 6
-    angle = 2.0 * math.pi * np.arange(count) / count
-    places = {
-        "pair": np.outer(np.arange(count), (1.0, 0.0, 0.0)),
-        "chain": np.outer(np.arange(count), (1.0, 0.0, 0.0)),
-        "ring": np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1),
-        "star": np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0)], float),
-    }[kind]
-    mass = 1.0 + np.arange(count) % 3
-    speeds = np.cross((0.1, 0.2, 0.6), places) + rng.normal(scale=0.3, size=(count, 3))
-    speeds -= mass @ speeds / mass.sum()  # it stays where it is, so that no long way costs digits
-    links = [(0, k) if kind == "star" else (k - 1, k) for k in range(1, count)]
-    links += [(count - 1, 0)] if kind == "ring" else []
-    return Scene(
-        bodies=tuple(
-            Particle(name=f"{k}", mass=mass[k], position=tuple(places[k]), velocity=tuple(speeds[k]))
-            for k in range(count)
-        ),
-        constraints=tuple(Distance(name=f"{a} to {b}", between=(f"{a}", f"{b}")) for a, b in links),
-    )
-
-
-@pytest.mark.parametrize("h", [H, 0.5])
-@pytest.mark.parametrize("kind", ["pair", "chain", "ring", "star"])
-@pytest.mark.parametrize("corrections", [0, 1])
-def test_it_takes_no_momentum_from_what_floats(kind: str, h: float, corrections: int) -> None:
-    """Forces across a row make a couple: were it not given back, 1e-5 of the momentum would go and more."""
-    observe = {
-        "l": MaximumAbsolute(quantity=AngularMomentum(), from_start=True),
-        "p": MaximumAbsolute(quantity=Momentum(), from_start=True),
-        "f": MaximumAbsolute(quantity=ConstraintForce()),
-    }
-    method = Method(string_stiffness=True, corrections=corrections)
-    run = simulate(afloat(kind), time_step=h, steps=400, method=method, observe=observe)
-
-    assert run.status == "completed" and run["f"].max() > 0.1
-    assert run["l"].max() < 1e-11 and run["p"].max() < 1e-11
 
 
 EDGES = {

@@ -15,7 +15,6 @@ from spook_tracker.engine import (
     JointCoordinate,
     Limit,
     Method,
-    Momentum,
     Prismatic,
     RigidBody,
     Scene,
@@ -77,30 +76,6 @@ def test_several_blows_in_a_step_end_where_a_free_slide_does(psi: float) -> None
 
     assert run["at"][1] == pytest.approx(place, abs=1e-9)
     assert run["v"][1, 0] == pytest.approx(velocity, rel=1e-9)
-
-
-def test_two_that_float_keep_their_momentum() -> None:
-    light = RigidBody(
-        name="light", mass=1.0, inertia=(0.1, 0.1, 0.1), position=(0.0, 0.0, 0.0), velocity=(SPEED, 0.0, 0.0)
-    )
-    heavy = RigidBody(name="heavy", mass=5.0, inertia=(0.1, 0.1, 0.1), position=(0.0, 0.0, 0.0))
-    guide = Prismatic(
-        name="guide", between=("heavy", "light"), axis=(1.0, 0.0, 0.0),
-        limit=Limit(lower=-HALF, upper=HALF, restitution=1.0),
-    )  # fmt: skip
-    observe = {
-        "p": Trace(quantity=Momentum()),
-        "a": Trace(quantity=Velocity("light")),
-        "b": Trace(quantity=Velocity("heavy")),
-        "at": Trace(quantity=JointCoordinate("guide")),
-    }
-    run = simulate(
-        Scene(bodies=(light, heavy), constraints=(guide,)), time_step=1 / 60, steps=200, observe=observe
-    )
-
-    assert np.abs(run["p"] - run["p"][0]).max() < 1e-11
-    assert np.abs(np.abs(run["a"] - run["b"])[:, 0] - SPEED).max() < 1e-9
-    assert np.abs(run["at"]).max() < HALF + 1e-9
 
 
 def test_a_door_between_near_stops_swings_on() -> None:

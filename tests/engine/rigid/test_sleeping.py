@@ -294,20 +294,6 @@ def test_a_sleeper_beside_what_bounces_has_no_speed_and_wakes_with_none(solver: 
     np.testing.assert_allclose(run.state["still"][7:], 0.0, rtol=0.0, atol=1e-9)
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_energy_never_rises(solver: str) -> None:
-    seen = simulate(
-        heap(),
-        time_step=TIME_STEP,
-        steps=FALLEN,
-        method=sleepy(solver),
-        observe={"energy": Trace(quantity=Energy())},
-    )
-    assert seen.counters["asleep"] == 30
-    energy = seen["energy"]
-    assert np.diff(energy).max() <= 1e-9 * energy[0]
-
-
 def test_a_creeping_slide_above_the_speed_never_sleeps_and_one_below_does() -> None:
     for speed, sleeps in ((1.01 * SLOW, False), (0.99 * SLOW, True)):
         slider = box("slider", 0.0, 0.5, velocity=(speed, 0.0, 0.0), material=SMOOTH)

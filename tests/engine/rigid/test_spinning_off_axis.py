@@ -11,7 +11,6 @@ import pytest
 
 from spook_tracker.engine import (
     WORLD,
-    AngularMomentum,
     Energy,
     Final,
     Hinge,
@@ -120,15 +119,6 @@ def test_it_turns_as_far_as_its_spin_says(name: str) -> None:
 
     assert abs(wrong(1 / 60)) < 0.02
     assert math.log2(wrong(1 / 120) / wrong(1 / 240)) == pytest.approx(2.0, abs=0.1)
-
-
-def test_what_floats_keeps_its_angular_momentum() -> None:
-    observe = {"spin": MaximumAbsolute(quantity=AngularMomentum(), from_start=True, first=1)}
-    drift = simulate(
-        beside_a_floor(boxes()), time_step=1 / 240, duration=2.0, method=CURVED, observe=observe
-    )["spin"]
-
-    assert np.max(drift) < 1e-9
 
 
 def rods(motor: Motor | None, count: int = 2) -> Scene:
