@@ -177,7 +177,6 @@ class Measurement:
         default_factory=dict
     )  # what else makes it another series: N, mass
     note: str = ""  # what this configuration is, in one sentence
-    with_previous: bool = False  # reads the simulations of the one before it: both are one piece of work
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

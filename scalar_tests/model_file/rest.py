@@ -63,8 +63,9 @@ def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
             name: Estimate(value, rounding=math.inf, scale=size, unsettled=moves)
             for name, value in values.items()
         }
-    others = [_rest(asked, pushed(asked, simulate, run, seed)) for seed in range(1, PUSHED + 1)]
+    # from the other end than those who ask for its motion, perhaps in another process at the same time
     halved = _rest(asked, watched(asked, simulate, refined=2))
+    others = [_rest(asked, pushed(asked, simulate, run, seed)) for seed in range(PUSHED, 0, -1)]
     creep = np.asarray(run["creep"])
     found: dict[str, float] = {}
     for name, value in values.items():

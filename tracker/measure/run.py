@@ -15,6 +15,8 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Literal, NoReturn
 
 import msgspec
@@ -77,7 +79,7 @@ Kind = Literal["measure", "figure", "trajectory", "study", "ladder"]
 
 @dataclass(frozen=True, order=True)
 class Task:
-    """One piece of work: the index says which measurements, figure, study or ladder configuration."""
+    """One piece of work: the index says which measurement, figure, study or ladder configuration."""
 
     position: int
     test: str
@@ -207,7 +209,7 @@ def _tasks(tests: Mapping[str, ScalarTest], request: Request) -> Iterator[Task]:
     position = 0
     for name, test in tests.items():
         wanted: list[tuple[Kind, tuple[int, ...]]] = []
-        wanted += [("measure", together) for together in _together(test)]
+        wanted += [("measure", (i,)) for i in range(len(test.measurements))]
         if request.figures:
             wanted += [("figure", (i,)) for i in range(len(test.figures))]
         if request.figures or test.seen is not None:
@@ -225,37 +227,27 @@ def _tasks(tests: Mapping[str, ScalarTest], request: Request) -> Iterator[Task]:
             position += 1
 
 
-def _together(test: ScalarTest) -> list[tuple[int, ...]]:
-    """Measurements that read the same simulations."""
-    found: list[tuple[int, ...]] = []
-    for i, measurement in enumerate(test.measurements):
-        if found and measurement.with_previous:
-            found[-1] += (i,)
-        else:
-            found.append((i,))
-    return found
-
-
 def _test_of(task: Task) -> str:
     return task.test
 
 
-def perform(source: Questions, task: Task) -> Parts | crew.Lost:
-    """Do one piece of work in this process; whatever it throws costs this piece alone."""
+def perform(source: Questions, task: Task, shared: Path | None = None) -> Parts | crew.Lost:
+    """Do one piece of work in this process; whatever it throws costs this piece alone. `shared` is a folder of all
+    processes that are at work on these tests."""
     try:
-        return _performed(source, task)
+        return _performed(source, task, shared)
     except TrackerError:
         raise
     except Exception as error:
         return crew.Lost("crashed", sentence(f"the answer cannot be taken: {type(error).__name__}: {error}"))
 
 
-def _performed(source: Questions, task: Task) -> Parts:
+def _performed(source: Questions, task: Task, shared: Path | None) -> Parts:
     test, simulate = source.tests()[task.test], source.simulate()
-    simulate = of_test(task.test, simulate, source.module() is ours)
+    simulate = of_test(task.test, simulate, source.module() is ours, shared)
     first = task.index[0]
     if task.kind == "measure":
-        return tuple(measure(task.test, test, test.measurements[i], simulate) for i in task.index)
+        return (measure(task.test, test, test.measurements[first], simulate),)
     if task.kind == "figure":
         return (draw(task.test, test.figures[first], simulate),)
     if task.kind == "trajectory":
@@ -299,7 +291,7 @@ def _perform_all(
         found = executors.answers(request.executor, *at_work)
     elif request.workers:
         limits = crew.Limits(seconds=request.time_limit, memory=request.memory_limit)
-        found = crew.answers(partial(perform, source), tasks, request.workers, limits, _test_of)
+        found = _answers(source, tasks, request.workers, limits)
     for done, (task, parts) in enumerate(found, start=1):
         if isinstance(parts, crew.Lost):
             parts = _lost(task, tests[task.test], parts)
@@ -313,6 +305,15 @@ def _perform_all(
         )
         watch(Progress(done, _total(tasks, tests, request), task.test, left[task.test] == 0, bad))
         yield task, parts
+
+
+def _answers(
+    source: Questions, tasks: Sequence[Task], workers: int, limits: crew.Limits
+) -> Iterator[tuple[Task, Parts | crew.Lost]]:
+    with TemporaryDirectory(prefix="tracker-runs-") as shared:
+        yield from crew.answers(
+            partial(perform, source, shared=Path(shared)), tasks, workers, limits, _test_of
+        )
 
 
 def _place(source: Questions) -> executors.Place:
@@ -358,16 +359,9 @@ def _lost(task: Task, test: ScalarTest, lost: crew.Lost) -> Parts:
     first = task.index[0]
     outcome = Outcome(None, lost.outcome, lost.failure)
     if task.kind == "measure":
-        return tuple(
-            tuple(
-                (
-                    series := metric_series(task.test, test, one, m),
-                    judged_sample(series.key, m, outcome, Witness(gone)),
-                )
-                for m in one.metrics
-            )
-            for one in (test.measurements[i] for i in task.index)
-        )
+        measurement = test.measurements[first]
+        series = [(m, metric_series(task.test, test, measurement, m)) for m in measurement.metrics]
+        return (tuple((s, judged_sample(s.key, m, outcome, Witness(gone))) for m, s in series),)
     if task.kind == "figure":
         return (draw(task.test, replace(test.figures[first], draw=gone), gone),)
     if task.kind == "trajectory":

@@ -17,12 +17,9 @@ from spook_tracker.tracker.judge.compare import ComparedRun, compare
 from spook_tracker.tracker.judge.comparison_document import Side
 from spook_tracker.tracker.judge.release_notes import visible
 from spook_tracker.tracker.judge.verdict import judge
-from spook_tracker.tracker.measure import run
 from spook_tracker.tracker.measure.catalogues import find
 from spook_tracker.tracker.measure.model_files import ModelFileError, catalogue
 from spook_tracker.tracker.measure.question import measure, metric_series
-from spook_tracker.tracker.measure.request import Request
-from spook_tracker.tracker.measure.workers import Lost
 from tests.tracker.judge.test_verdict import sample, series
 
 BALL = """<mujoco><worldbody><geom type="plane" size="1 1 1"/>
@@ -57,18 +54,6 @@ def test_a_file_is_a_test_and_its_content_is_its_definition(ball: Path, tmp_path
     assert _versions(str(tmp_path / "copy/ball.xml")) == before
     ball.write_text(BALL.format(height=".2"))
     assert not _versions(str(ball)) & before
-
-
-def test_motion_and_rest_are_one_piece_of_work(ball: Path) -> None:
-    """They read the same runs, which one process makes; with it the answers of both are lost, and no others."""
-    tests = catalogue(str(ball))
-    first, *others = [task for task in run._tasks(tests, Request()) if task.kind == "measure"]
-
-    lost = run._lost(first, tests["ball"], Lost("crashed", "gone"))
-
-    assert (first.index, len(others)) == ((0, 1), len(tests["ball"].measurements) - 2)
-    assert [{series.configuration for series, _ in part} for part in lost] == [{"motion"}, {"rest"}]
-    assert {(answer.outcome, answer.failure) for part in lost for _, answer in part} == {("crashed", "gone")}
 
 
 def test_a_page_says_where_in_its_folder_a_model_lies_and_nothing_of_the_machine(tmp_path: Path) -> None:

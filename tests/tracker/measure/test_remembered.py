@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import replace
+from pathlib import Path
+from threading import Event
 from typing import Any
 
 import numpy as np
@@ -111,6 +114,32 @@ def test_of_a_model_what_is_read_at_samples_is_remembered_in_any_engine(scenes: 
         assert first.state_hash == again.state_hash
 
     assert engine.runs == runs
+
+
+def test_a_run_that_another_process_is_making_is_waited_for(tmp_path: Path) -> None:
+    """And read where it is done. A scene's run is made by each: it is shorter than the file would take."""
+    begun, go_on = Event(), Event()
+    engines = [Counted(), Counted()]
+
+    def slow(run: object, **how: Any) -> Any:
+        begun.set()
+        assert go_on.wait(60.0)
+        return engines[0](falling(), **how)
+
+    first = Remembered(slow, shared=tmp_path)
+    second = Remembered(lambda run, **how: engines[1](falling(), **how), shared=tmp_path)
+    model = ModelFile(path="a.xml", format="MJCF", digest="1", time_step=0.002, watched=())
+    asked = ModelRun(model=model, samples=(0.1,))
+    with ThreadPoolExecutor(2) as pool:
+        made = pool.submit(first, asked, **STEPS)
+        assert begun.wait(60.0)
+        read = pool.submit(second, asked, **STEPS)
+        assert not wait([read], timeout=0.2).done
+        go_on.set()
+        assert made.result().state_hash == read.result().state_hash
+    second(falling(), **STEPS)
+
+    assert [engine.runs for engine in engines] == [1, 1]
 
 
 def test_another_test_begins_with_nothing() -> None:
