@@ -175,6 +175,15 @@ def test_a_body_with_many_stops_and_few_contacts_is_solved() -> None:
     assert run.residual <= 1e-9  # m/s, of the worst solve
 
 
+def test_many_bodies_on_few_points_are_factored_once_a_step() -> None:
+    """Newton's method on the whole took six factors of seventeen bodies for four points."""
+    steps = 120
+    run = simulate(whips(4, 4), duration=steps / 240, time_step=1 / 240)
+    assert run.status == "completed"
+    assert run.counters["factorisations"] <= 2 * steps
+    assert run.residual <= 1e-9  # m/s, of the worst solve
+
+
 def frame(mu: float, half_angle: float) -> Scene:
     """Two bars of 1 kg hinged at their tops, that stand on a floor."""
     length, radius = 1.0, 0.02

@@ -408,9 +408,8 @@ bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, Fr
 
 /// Joints and contacts, or contacts with friction of turning: the joints are eliminated, and iterations and Newton's method go
 /// over contacts alone, in turns with more iterations each from the best so far, which is the answer. Newton's method on the
-/// whole, at the cost of its pattern, comes before where points are redundant, whose loads its path shares evenly, or many rows
-/// between bounds: it knows no friction of turning. Where few points are beside many bodies it comes after the first turn, from
-/// the start.
+/// whole, which knows no friction of turning and costs a factor of all bodies an iteration, shares loads of redundant points
+/// evenly: it comes before where these are more than one in two bodies, else after the first turn, from the start.
 /// `kept`: work() has a copy of the system already.
 void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points, DirectSolver& direct,
                          bool kept, FrictionReport& report) {
@@ -425,9 +424,10 @@ void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points
         report.residual = residual;
         if (!(residual <= fair)) best = system;
     };
-    const auto by_newton = [&](int frozen) {
+    const auto by_newton = [&] {
         direct.newton.near_enough = fair;
-        direct.newton.max_losses = 1, direct.newton.max_frozen = frozen;
+        direct.newton.max_losses = 1;
+        direct.newton.max_frozen = points.size() < many_points ? max_frozen : 0;
         const ConeReport found = direct.newton.solve(system, points);
         direct.newton.max_losses = ConeNewton{}.max_losses, direct.newton.max_frozen = 0;
         report.rounds += found.iterations;
@@ -440,15 +440,17 @@ void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points
         take(found.residual);
     };
     const std::size_t bodies = system.mass.size();
-    const bool many = ReducedContacts::bounded_rows(system) > ReducedContacts::few_bounded_rows;
-    const bool newton = is_for_newton(system, points, FrictionModel::cone) && (many || is_redundant(system));
-    const bool few = bodies >= worth_eliminating && points.size() * bodies_a_point <= bodies;
-    if (newton && few && !kept) start = system;
-    if (newton && !few) by_newton(many ? 0 : max_frozen);
+    const std::size_t a_point = bodies < many_bodies ? bodies_a_point : of_many_a_point;
+    const bool newton = is_for_newton(system, points, FrictionModel::cone);
+    const bool redundant = newton && is_redundant(system);
+    const bool first = redundant && points.size() * a_point > bodies, later = newton && !first;
+    if (later && !kept) start = system;
+    if (first) by_newton();
     const int turns = std::any_of(points.begin(), points.end(), spook::turns) ? turning_turns : joint_turns;
     for (int turn = 0; turn < turns && !(report.residual <= (turn == 0 ? fair : near)); ++turn) {
         reduced(turn);
-        if (newton && turn == 0 && few && !(report.residual <= fair)) system = start, by_newton(max_frozen);
+        if (later && turn == 0 && !(report.residual <= (redundant ? fair : near)))
+            system = start, by_newton();
     }
     report.converged = report.residual <= fair;
     report.finite = std::isfinite(report.residual);

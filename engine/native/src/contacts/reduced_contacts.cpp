@@ -50,13 +50,6 @@ bool ReducedContacts::takes(const MixedSystem& system, const std::vector<Frictio
     return reduces && bounded > 0 && bounded <= most_bounded_rows && (turning || touching <= most_rows);
 }
 
-int ReducedContacts::bounded_rows(const MixedSystem& system) {
-    int bounded = 0;
-    for (const RowBlock& block : system.rows)
-        for (int i = 0; i < block.size; ++i) bounded += BilateralRows::is_bilateral(block, i) ? 0 : 1;
-    return bounded;
-}
-
 void ReducedContacts::analyse(const MixedSystem& system) {
     std::vector<Pattern> pattern;
     std::vector<std::pair<int, int>> further;

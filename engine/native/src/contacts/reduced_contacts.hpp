@@ -31,7 +31,6 @@ public:
     static constexpr int most_rows = 120;  // of contacts: three of one with friction
     // With stops and drives, few of which are at their bounds; and of friction of turning, which no other Newton knows.
     static constexpr int most_bounded_rows = 400;
-    static constexpr int few_bounded_rows = 48;  // cost less than a factor of the whole each iteration
 
     struct Report {
         int iterations = 0, newton_steps = 0;
@@ -40,7 +39,6 @@ public:
 
     /// Whether the system has joints to eliminate, or friction of turning, and few enough rows between bounds.
     static bool takes(const MixedSystem& system, const std::vector<FrictionPoint>& points);
-    static int bounded_rows(const MixedSystem& system);
 
     /// Starts from the multipliers of bounded rows in `system`; fills velocities and all multipliers. Points obey the cone.
     /// `iterations`: between tries of Newton's method.

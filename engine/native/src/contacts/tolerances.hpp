@@ -112,10 +112,11 @@ inline constexpr double fair = 1e-9;           // one that is an answer
 inline constexpr double near = 1e-6,
                         redundant_near =
                             3e-5;  // residuals, of the speeds: answers; the second where points are redundant
-// Bodies on joints from which on these are eliminated first, which takes one factor of all of them; where there are more
-// points than one in so many bodies, Newton's method, which takes one an iteration, ends sooner all the same.
-inline constexpr std::size_t worth_eliminating = 64, bodies_a_point = 4;
-// Beside joints: iterations, four times as many each turn, and paths of the convex part where rows are few.
+// Newton's method beside joints, which takes a factor of all bodies an iteration, comes first where redundant points are more
+// than one in so many bodies; than one in four of `many_bodies`.
+inline constexpr std::size_t bodies_a_point = 2, many_bodies = 64, of_many_a_point = 4;
+inline constexpr std::size_t many_points = 16;  // from which on it follows no convex part
+// Beside joints: iterations, four times as many each turn, and paths of the convex part where points are few.
 inline constexpr int joint_turns = 3, first_iterations = 8, max_frozen = 8;
 inline constexpr int turning_turns = 4;                         // the same with friction of turning
 inline constexpr int pgs_turns = 1, iterations_per_turn = 100;  // where Newton's path ends without an answer
