@@ -216,6 +216,21 @@ def stops(within: float) -> Law:
     return law
 
 
+def returns(within: float) -> Law:
+    """In the end every coordinate is within its limits, m or rad."""
+
+    def law(run: Run) -> None:
+        for row in run.scene.constraints:
+            if limit := getattr(row, "limit", None):
+                assert limit.lower - within < run.seen[f"at {row.name}"][-1] < limit.upper + within, row.name
+
+    return law
+
+
+def still(run: Run) -> None:
+    assert run.seen["kinetic"].max() <= 1e-18
+
+
 def holds(within: float) -> Law:
     """Joints and rows are violated by no more, m or rad."""
 
@@ -247,6 +262,7 @@ def each(*values: Any) -> tuple[tuple[Any, ...], ...]:
 
 ALONE: tuple[tuple[Any, ...], ...] = ((),)
 SETTLED = ("completed", "unsettled")
+BEYOND = ((0.2, 1.0), (-1.0, -0.2))  # stops, rad or m
 TABLE = (
     # what floats
     Row("a rack", corpus.rack, each(0.7, 1.0), BOTH, (1 / 240,), 2.0, (momentum(1e-10), spin(1e-10), falls(1e-6))),
@@ -308,6 +324,18 @@ TABLE = (
         Row(f"overlapping, {kind.__name__ if kind else 'free'}", partial(corpus.overlapping, kind), each(0, 1, 3, 4), BOTH,
             (h,), 12 * h, (momentum(1e-11), spin(1e-11), never_above()))
         for kind in (None, Distance, Ball, Hinge, Prismatic, Lock) for h in (1e-6, 1e-4, H)
+    ),
+    # .2 rad beyond a stop at h = 1e-6 s was answered with 9e4 rad/s.
+    *(
+        Row(f"beyond a stop{told}", corpus.beyond, tuple((kind, *ends, speed) for kind in (Hinge, Prismatic) for ends in BEYOND),
+            BOTH, (h,), 40 * h, (momentum(1e-11), spin(1e-11), returns(1e-6), law))
+        for told, speed, law in (("", 1.0, never_above(1e-9)), (", at rest", 0.0, still)) for h in (1e-6, 1e-4, H)
+    ),
+    # An impact is no sign that compliance explains an overlap: 1 J became 25 kJ.
+    *(
+        Row("a soft pair", corpus.soft_pair, tuple((c, depth) for c in (1e-8, 1e-6, 1e-4) for depth in (0.02, 0.3)), BOTH,
+            (h,), 40 * h, (momentum(1e-11), never_above(1e-9)))
+        for h in (1e-6, 1e-5, 1e-4, 1e-3, H)
     ),
 )  # fmt: skip
 

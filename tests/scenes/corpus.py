@@ -277,6 +277,27 @@ def _stop(below: float, above: float) -> Prismatic:
     )
 
 
+def beyond(kind: Any, lower: float, upper: float, speed: float) -> Scene:
+    """Two bars, one hung to the other off its centre, that fly and spin about a joint which begins beyond its stop."""
+    spin = (0.0, speed if kind is Hinge else 0.0, 0.0)
+    bars = (
+        body(name, Box((0.1, 0.2, 1.0)), (0.0, 0.0, 0.0), mass, (0.3 * speed, 0.0, 0.0), spin)
+        for name, mass in (("first", 2.0), ("second", 1.0))
+    )
+    ends = {"between": ("first", "second"), "at": (0.0, 0.0, 0.4), "axis": (0.0, 1.0, 0.0)}
+    return Scene(
+        bodies=tuple(bars), constraints=(kind(name="joint", limit=Limit(lower=lower, upper=upper), **ends),)
+    )
+
+
+def soft_pair(compliance: float, depth: float) -> Scene:
+    """Balls of compliant contacts that overlap and approach."""
+    soft = {"shape": Sphere(0.5), "material": Material(compliance=compliance)}
+    return Scene(
+        bodies=(ball("left", 0.0, 1.0, **soft), ball("right", 0.0, -1.0, place=(1 - depth, 0.1, 0), **soft))
+    )
+
+
 # What falls, leans and lies: energy only falls -------------------------------------------------------------------------
 
 
