@@ -58,15 +58,14 @@ void CandidateSearch::begin(StepMotion& motion, const std::vector<Vec6>& free_ve
                             ContactPoints& points) {
     const ContactOptions& options = motion.options();
     woken.clear();
-    edges.begin(motion.bodies().count());
     margins_.begin(motion.bodies(), options.time_step, motion.velocity, free_velocity,
                    options.solver == SolverKind::iterative || options.impacts == ImpactOrder::successive);
-    find_open(motion, points, Cast::When::solved);
+    find_open(motion, points);
 }
 
-void CandidateSearch::find_open(StepMotion& motion, ContactPoints& points, Cast::When when) {
+void CandidateSearch::find_open(StepMotion& motion, ContactPoints& points) {
     open_.clear();
-    look_at(detection.near(motion.poses, margins_.search()), motion, points, when);
+    look_at(detection.near(motion.poses, margins_.search()), motion, points);
 }
 
 void CandidateSearch::widen(const Cast& cast, std::vector<char>& changed, StepMotion& motion,
@@ -74,17 +73,16 @@ void CandidateSearch::widen(const Cast& cast, std::vector<char>& changed, StepMo
     if (!margins_.outrun(motion.bodies(), motion.options().time_step, cast.velocity, changed)) return;
     if (!detection.near_again(margins_.grown(), margins_.search(), near_)) {
         changed.assign(motion.bodies().count(), 1);
-        return find_open(motion, points, cast.when);
+        return find_open(motion, points);
     }
     for (const int body : margins_.grown()) changed[body] = 1;
     std::erase_if(near_, [&](const IndexPair& pair) { return open_.has(pair); });
     const auto old = static_cast<std::ptrdiff_t>(open_.pairs.size());
-    look_at(near_, motion, points, cast.when);
+    look_at(near_, motion, points);
     open_.merge(old);
 }
 
-void CandidateSearch::look_at(const std::vector<IndexPair>& near, StepMotion& motion, ContactPoints& points,
-                              Cast::When when) {
+void CandidateSearch::look_at(const std::vector<IndexPair>& near, StepMotion& motion, ContactPoints& points) {
     known_.clear();
     open_.bodies.clear();
     const std::size_t before = points.all.size();
@@ -100,8 +98,7 @@ void CandidateSearch::look_at(const std::vector<IndexPair>& near, StepMotion& mo
         if (!std::binary_search(known_.begin(), known_.end(), pair_of(near[k])))
             look_at(near[k], motion, points);
     }
-    edges.note_depths(step(motion, points), before);
-    if (skip_grazing(before, motion, points, when))
+    if (skip_grazing(before, motion, points))
         std::sort(open_.pairs.begin() + unmet, open_.pairs.end(), OpenPairs::in_order);
     for (std::size_t k = before; k < points.all.size(); ++k) {
         if (k + ahead < points.all.size())
@@ -165,8 +162,7 @@ StepContact& CandidateSearch::add_point(const ContactModel& model, ContactPoints
 /// Takes out the points from `from` on of pairs that only graze: they touch with a side or an edge, and as they move no
 /// overlap comes of it. Two bodies whose edges lie on each other touch with either face, and the one they move past is no
 /// obstacle. Whether there are such pairs: they are open then.
-bool CandidateSearch::skip_grazing(std::size_t from, const StepMotion& motion, ContactPoints& points,
-                                   Cast::When when) {
+bool CandidateSearch::skip_grazing(std::size_t from, const StepMotion& motion, ContactPoints& points) {
     if (!motion.bodies().swings || from == points.all.size()) return false;
     const double h = motion.options().time_step;
     grazing_.clear();
@@ -185,8 +181,7 @@ bool CandidateSearch::skip_grazing(std::size_t from, const StepMotion& motion, C
         const Contact& contact = points.all[deepest].contact;
         const IndexPair pair = colliders_of(contact);
         const OpenPair open = opened(pair, {contact.point.gap, contact.point.normal});
-        if (edges.is_grazing(step(motion, points), points.all[deepest], open, most, when))
-            grazing_.push_back(pair);
+        if (edges.is_grazing(step(motion, points), points.all[deepest], open, most)) grazing_.push_back(pair);
     }
     for (const IndexPair& pair : grazing_) {
         const Collider::View one = detection.collider(pair.first), two = detection.collider(pair.second);

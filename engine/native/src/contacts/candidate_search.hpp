@@ -19,7 +19,7 @@ public:
     /// Finds the points that are closed where the step begins, and the pairs near enough to meet.
     void begin(StepMotion& motion, const std::vector<Vec6>& free_velocity, ContactPoints& points);
     /// The same pairs once more, of which those that have points are known.
-    void find_open(StepMotion& motion, ContactPoints& points, Cast::When when);
+    void find_open(StepMotion& motion, ContactPoints& points);
     /// Finds more of both where some body goes further than was looked for. `changed` names bodies with another velocity than
     /// at the look before: those that have more pairs now join them.
     void widen(const Cast& cast, std::vector<char>& changed, StepMotion& motion, ContactPoints& points);
@@ -47,14 +47,13 @@ public:
     std::vector<int> woken;  // sleepers that another body met, or was moved into, since the step began
 
 private:
-    void look_at(const std::vector<IndexPair>& near, StepMotion& motion, ContactPoints& points,
-                 Cast::When when);
+    void look_at(const std::vector<IndexPair>& near, StepMotion& motion, ContactPoints& points);
     void look_at(const IndexPair& pair, const StepMotion& motion, ContactPoints& points);
     bool reachable(const StepMotion& motion, const Contact& contact) const;
     StepContact& add_point(const ContactModel& model, ContactPoints& points, const Contact& contact,
                            const Pose& first, const Pose& second, double toi);
     OpenPair opened(const IndexPair& pair, const Separation& apart) const;
-    bool skip_grazing(std::size_t from, const StepMotion& motion, ContactPoints& points, Cast::When when);
+    bool skip_grazing(std::size_t from, const StepMotion& motion, ContactPoints& points);
     bool passes(const OpenPair& open, const StepMotion& motion, const ContactPoints& points,
                 const std::vector<Vec6>& velocity) const;
     double meeting(const OpenPair& open, const Cast& cast, const StepMotion& motion,

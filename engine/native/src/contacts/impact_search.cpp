@@ -30,13 +30,11 @@ void put_on_mover(StepContact& point, bool first_moves, bool second_moves) noexc
 double CandidateSearch::meeting(const OpenPair& open, const Cast& cast, const StepMotion& motion,
                                 const ContactPoints& points) const {
     const SearchedStep at = step(motion, points);
-    const Pose at_first = motion.moved(open.first, cast.velocity),
-               at_second = motion.moved(open.second, cast.velocity);
-    const Mover first = at.mover(open.pair.first, at_first, cast.velocity),
-                second = at.mover(open.pair.second, at_second, cast.velocity);
-    const double time = time_of_impact(first, second, motion.options().time_step, edges.slop(at, open));
-    if (time < 0.0 || edges.is_internal_edge(at, first, open.first, second, open, cast, time) ||
-        edges.is_internal_edge(at, second, open.second, first, open, cast, time))
+    const OpenWays way(at, open, cast.velocity);
+    const double time =
+        time_of_impact(way.first, way.second, motion.options().time_step, edges.slop(at, open));
+    if (time < 0.0 || edges.is_internal_edge(at, way.first, open.first, way.second, open, cast, time) ||
+        edges.is_internal_edge(at, way.second, open.second, way.first, open, cast, time))
         return -1.0;
     return time;
 }
@@ -115,13 +113,11 @@ bool CandidateSearch::add_toi_point_at_start(const OpenPair& open, double time,
 /// The points of a pair that meets at `time`, with the bodies where they will be then.
 bool CandidateSearch::add_toi_points(const OpenPair& open, double time, const std::vector<Vec6>& velocity,
                                      const StepMotion& motion, ContactPoints& points) {
-    const SearchedStep at = step(motion, points);
     const int a = open.first, b = open.second;
-    const Pose begun_first = motion.moved(a, velocity), begun_second = motion.moved(b, velocity),
-               first = at.mover(open.pair.first, begun_first, velocity).body_at(time),
-               second = at.mover(open.pair.second, begun_second, velocity).body_at(time);
-    const Vec3 led = (begun_first.position - motion.poses[a].position) -
-                     (begun_second.position - motion.poses[b].position);
+    const OpenWays way(step(motion, points), open, velocity);
+    const Pose first = way.first.body_at(time), second = way.second.body_at(time);
+    const Vec3 led = (way.first_body.position - motion.poses[a].position) -
+                     (way.second_body.position - motion.poses[b].position);
     const double radius = std::max(motion.bodies().radius[a], motion.bodies().radius[b]);
     scratch_.clear();
     detection.collide_pair(open.pair, first, second,

@@ -30,6 +30,20 @@ struct Cast {
     When when = When::ahead;
 };
 
+/// The colliders of an open pair, on the rest of their ways.
+struct OpenWays {
+    OpenWays(const SearchedStep& step, const OpenPair& open, const std::vector<Vec6>& velocity)
+        : first_body(step.motion.moved(open.first, velocity)),
+          second_body(step.motion.moved(open.second, velocity)),
+          first(step.mover(open.pair.first, first_body, velocity)),
+          second(step.mover(open.pair.second, second_body, velocity)) {}
+    OpenWays(const OpenWays&) = delete;  // movers refer to its poses
+    OpenWays& operator=(const OpenWays&) = delete;
+
+    Pose first_body, second_body;
+    Mover first, second;
+};
+
 /// Of an open pair, by its place; s.
 struct Meeting {
     std::size_t open;
@@ -38,26 +52,19 @@ struct Meeting {
 
 class InternalEdges {
 public:
-    void begin(std::size_t bodies);
-    /// How deep the closed points from `from` on hold their bodies.
-    void note_depths(const SearchedStep& step, std::size_t from);
-    /// How much deeper into what supports them bodies would go with velocities between iterations; or that there are none.
-    void predict_sinking(const SearchedStep& step, const std::vector<Vec6>& velocity);
-    void forget_sinking() noexcept;
     /// To be told of the points before what follows is asked.
     void index(const SearchedStep& step);
 
-    /// The overlap at which a pair counts as met, m. Bodies that sink while iterations have not settled meet the sides of the
-    /// next part of what holds them as deep as that; round shapes and planes have no sides.
-    double slop(const SearchedStep& step, const OpenPair& open) const noexcept;
+    /// The overlap at which a pair counts as met, m.
+    static double slop(const SearchedStep& step, const OpenPair& open) noexcept;
     /// Whether `body`, that would meet another at `time` [s], does not once it is lifted out of what holds it. `facing` is
-    /// the normal they touch with already, if they do. Between iterations a body may also sink on the way, and to the side of
-    /// another as far as settled iterations may have left it falling.
+    /// the normal they touch with already, if they do. Between iterations it sinks as far as it will, and is asked about again;
+    /// to the side of another it goes over, settled iterations may have left it falling.
     bool is_internal_edge(const SearchedStep& step, const Mover& moving, int body, const Mover& other,
                           const OpenPair& open, const Cast& cast, double time, Vec3 facing = {}) const;
     /// Whether bodies that touch, and would overlap by `overlap` [m] along that normal, do not as they move.
-    bool is_grazing(const SearchedStep& step, const StepContact& point, const OpenPair& open, double overlap,
-                    Cast::When when) const;
+    bool is_grazing(const SearchedStep& step, const StepContact& point, const OpenPair& open,
+                    double overlap) const;
     /// Of what one body meets in a step, leaves out what it would not meet if that which comes before stopped it. What it meets
     /// all the same is found again with the velocities of the solve.
     void remove_occluded(const SearchedStep& step, const LargeArray<OpenPair>& pairs,
@@ -70,24 +77,22 @@ private:
         double time;
         std::size_t at;
     };
-    /// What holds a body: the points of one pair that are closed where the step begins.
+    /// A face that a body does not go into: of what holds it where the step begins, or of what it meets first.
     struct Support {
-        std::uint64_t pair = 0;
-        Vec3 normal{}, velocity{};  // out of it, of its deepest point; it goes itself, m/s
-        double depth = -unbounded;  // there, when the body meets the next part, m
-        double begun = 0.0;         // the largest where the step begins, m
-        double sinking = 0.0;       // the same with what the velocity then adds
+        std::uint64_t pair = 0;     // of what holds it
+        Vec3 normal{}, velocity{};  // out of it; it goes itself, m/s
+        double level = 0.0;         // where it touches the body along that, m,
+        double time = 0.0;          //   and when, s
+        double depth = 0.0;         // how deep the body is in it, m
+        double most = unbounded;    // how deep it may come to be on its way, m
+        bool leads_over(const Mover& held, const Mover& moving, const Mover& other, double toi, double h,
+                        double slop) const;
     };
-    /// That of the first of a body's points, which are left behind.
-    static Support next_support(const SearchedStep& step, int body, std::span<const int>& points,
-                                const Cast& cast);
-    double fallen_depth(const SearchedStep& step, const Support& support, const Mover& moving, int body,
-                        const Mover& other, Cast::When when, double time, double slop) const;
-    bool occludes(const SearchedStep& step, const OpenPair& before, double earlier, const OpenPair& after,
-                  double later, int body, const std::vector<Vec6>& velocity) const;
+    static Support next_support(const SearchedStep& step, const Mover& moving, int body,
+                                std::span<const int>& points, const std::vector<Vec6>& velocity);
+    static bool occludes(const SearchedStep& step, const OpenPair& before, double earlier,
+                         const OpenPair& after, double later, int body, const std::vector<Vec6>& velocity);
 
-    std::vector<double> depth_;              // of a body's closed contacts, m
-    std::vector<double> predicted_sinking_;  // what unsettled iterations would add to it in the step, m
     PointsOfBodies points_of_;
     std::vector<MeetingOf> meetings_of_;  // by body and time
 };

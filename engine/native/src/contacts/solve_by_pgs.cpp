@@ -20,7 +20,6 @@ bool ContactStage::find_more(bool over, bool& iterating) {
     pgs_.follow(model_->bodies, all, next_, changed_);
     const Cast cast{next_, over ? Cast::When::solved : Cast::When::iterating};
     search_.widen(cast, changed_, motion_, points_);
-    if (model_->bodies.swings) search_.edges.predict_sinking(search_.step(motion_, points_), next_);
     const std::size_t known = points_.all.size();
     const bool turned = search_.find_turned(next_, motion_, points_);
     if (find_impacts(cast) == 0 && !turned) return false;
@@ -48,7 +47,6 @@ bool ContactStage::warm_start_by_pgs(MixedSystem& system, std::size_t known, int
     const FrictionReport report = pgs_.solver().run(warm_start_iterations, enough, enough,
                                                     [&](bool over) { return find_more(over, iterating); });
     state_.counters.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
-    search_.edges.forget_sinking();
     if (!report.finite) return false;
     pgs_.find_unanswered(model_->bodies, known, points_);
     pgs_.store_unanswered(points_);
@@ -83,7 +81,7 @@ ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
     quality_ = {};
     if (iterate(system, report)) {
         points_.all.resize(begun);  // what was met on that way is not
-        search_.find_open(motion_, points_, Cast::When::solved);
+        search_.find_open(motion_, points_);
         ran_away_ = true;
         return {{}, true};
     }

@@ -131,14 +131,13 @@ inline constexpr double most_met = 0.1;          // of the open pairs: more are 
 
 // internal_edges.cpp
 namespace tolerances::internal_edges {
-inline constexpr double share = 0.25;            // of the overlap at which pairs count as met: less is none
+inline constexpr double flush =
+    10.0;  // of the overlap at which pairs count as met: less stands out of no face
 inline constexpr double same_face_cosine = 0.9;  // cosine of normals: what both lie on
 inline constexpr std::size_t max_earlier = 8;    // of the meetings of a body, that may occlude later ones
 inline constexpr double simultaneous = 0.05;     // of a step: which of two meetings comes first is not known
 inline constexpr double same_direction_cosine = 1.0 - 1e-12;  // the same of one face met twice
-inline constexpr double free_fall_allowance = 3.0;  // of a fall in a step, before iterations hold it
-inline constexpr double residual_motion = 10.0;     // of that overlap: what they leave of motion at rest
-inline constexpr double side_cosine = 0.5;          // of the normal of a meeting with what holds
+inline constexpr double side_cosine = 0.5;                    // of the normal of a meeting with what holds
 }  // namespace tolerances::internal_edges
 
 // overlap_search.cpp
