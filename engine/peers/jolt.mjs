@@ -135,18 +135,24 @@ serve(async (task) => {
   // Two joints of bodies that turn or slide against what stands: `a` x + `b` y = 0 of their coordinates.
   function relate({ kind, names, axes, factors }) {
     const [one, two] = names.map((name) => made.get(name));
-    const settings = kind === "gear" ? new J.GearConstraintSettings() : new J.RackAndPinionConstraintSettings();
-    settings.mSpace = J.EConstraintSpace_WorldSpace;
-    settings.mRatio = factors[1] / factors[0]; // gear: x = -ratio y; rack, x of the pinion: x = ratio y
-    if (kind === "gear") [settings.mHingeAxis1, settings.mHingeAxis2] = axes.map(vec);
-    else {
+    const ratio = factors[1] / factors[0];
+    const gear = kind === "gear";
+    const settings = gear ? new J.GearConstraintSettings() : new J.RackAndPinionConstraintSettings();
+    settings.mSpace = J.EConstraintSpace_LocalToBodyCOM;
+    if (gear) {
+      // Its impulse on the second leaves out the ratio (GearConstraintPart), so the second axis, which keeps its length in the
+      // axes of its body, has it. Angles are not mended then: they would be by a ratio of 1.
+      settings.mRatio = 1;
+      settings.mHingeAxis1 = vec(axes[0]);
+      settings.mHingeAxis2 = vec(axes[1].map((x) => ratio * x));
+    } else {
       [settings.mHingeAxis, settings.mSliderAxis] = axes.map(vec);
-      settings.mRatio *= -1;
+      settings.mRatio = -ratio; // x of the pinion: x = ratio y
     }
     const held = settings.Create(one.moving, two.moving);
-    const type = kind === "gear" ? J.GearConstraint : J.RackAndPinionConstraint;
+    const type = gear ? J.GearConstraint : J.RackAndPinionConstraint;
     // Drift is mended by the joints' own coordinates, which count the other way where what stands is their second end.
-    if (one.moving === one.second && two.moving === two.second)
+    if (one.moving === one.second && two.moving === two.second && (ratio === 1 || !gear))
       J.castObject(held, type).SetConstraints(one.constraint, two.constraint);
     system.AddConstraint(held);
   }

@@ -9,6 +9,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from spook_tracker.engine.bodies import WORLD, RigidBody
 from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.couplings import Relation
@@ -17,11 +19,11 @@ from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Pris
 from spook_tracker.engine.meshes import HeightField, TriangleMesh
 from spook_tracker.engine.observe import ConstraintForce, Penetration
 from spook_tracker.engine.peers import node
+from spook_tracker.engine.peers.described import UPRIGHT, numbered
 from spook_tracker.engine.peers.described import described as common
-from spook_tracker.engine.peers.described import numbered
 from spook_tracker.engine.peers.frames import drive
 from spook_tracker.engine.protocol import RIGID, Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recorded_joints import joint_point
+from spook_tracker.engine.recorded_joints import joint_point, turned_back
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Plane, Sphere
@@ -129,9 +131,16 @@ def _relation(scene: Scene, relation: Relation) -> dict[str, Any]:
     return {
         "kind": "gear" if kinds[1] is Hinge else "rack",
         "names": [name for name, _ in terms],
-        "axes": [list(joint.axis) for joint in joints],  # type: ignore[union-attr]
+        "axes": [_in_its_body(scene, joint, ground) for joint in joints],
         "factors": [sign * factor for sign, (_, factor) in zip(signs, terms, strict=True)],
     }
+
+
+def _in_its_body(scene: Scene, joint: Any, ground: set[str]) -> list[float]:
+    """A joint's axis in the axes of the body that moves."""
+    moving = next(scene.body(end) for end in joint.between if end not in ground)
+    turn = moving.orientation if isinstance(moving, RigidBody) else UPRIGHT
+    return [float(x) for x in turned_back(np.array(turn), np.array(joint.axis))]
 
 
 def _motor(joint: Any) -> dict[str, float] | None:
