@@ -2,7 +2,8 @@
 
 Joint coordinates where the joints make a tree (a rod between particles is a hinge if all stays in a plane, else a
 ball), constraints for what closes a loop, or for all. It has no loop of its own: every step is a call from Python,
-and what pushes besides gravity is pushed from there. Springs, central gravity and loads act at the step's start.
+and what pushes besides gravity is pushed from there. Springs, central gravity and loads act at the step's start. The sensors
+in its joints tell forces wrong about a ball and in a chain that turn: those are not asked of joint coordinates.
 """
 
 from __future__ import annotations
@@ -25,14 +26,24 @@ from spook_tracker.engine.peers.joint_tree import (
 from spook_tracker.engine.peers.pybullet_file import READS, run_model
 from spook_tracker.engine.peers.pybullet_model import HALF_HINGE, Model
 from spook_tracker.engine.peers.stepped import Kept, quiet, stepped
-from spook_tracker.engine.protocol import Capabilities, Configuration, Task
-from spook_tracker.engine.recorded_joints import conjugate, cross, joint_point, product, turned
+from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
+from spook_tracker.engine.recorded_joints import (
+    conjugate,
+    cross,
+    joint_point,
+    product,
+    turned,
+    turned_back,
+)
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
 from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Sphere
 
 with quiet():  # it says when it was built
     import pybullet as bullet
+
+
+AT_REST = 1e-6  # rad/s
 
 
 class PyBullet:
@@ -162,6 +173,7 @@ class _Run(Model):
         if child is not None:  # a sensor in the joint: force and torque on the child, about its centre
             told = bullet.getJointStateMultiDof(*self.ids[child], physicsClientId=self.client)[2]
             force, torque = np.array(told[:3]), np.array(told[3:])
+            torque = torque + self._unsensed(constraint, child, keep, row, moved)
         else:
             force, torque = self._of_points(constraint, moved)
         if isinstance(constraint, Distance):
@@ -173,6 +185,29 @@ class _Run(Model):
             torque = torque - cross(at, force)
         sign = 1.0 if constraint.between[1] == body.name else -1.0
         return sign * np.concatenate([force, torque])
+
+    def _unsensed(self, tie: Any, child: str, keep: Kept, row: int, moved: Array) -> Any:
+        """The torque that a sensor leaves out: about a hinge's axis what its motor or friction gives, and one ω×Iω of the two
+        it counts. Of what turns about a ball, or in a tree of several bodies, it leaves out more: that is not supported.
+        """
+        node, made = self.nodes[child], self.ids[child][0]
+        tree = [name for name, ids in self.ids.items() if ids[0] == made and not fixed(self.nodes[name].body)]
+        if len(tree) > 1 or isinstance(tie, Ball):
+            if any(np.abs(self._state(name)[3]).max() > AT_REST for name in tree):
+                raise NotSupported(
+                    f"pybullet (joints) does not support the force of {tie.name!r}, which turns: its sensors tell it wrong "
+                    "for a ball joint and in a chain"
+                )
+            spin = np.zeros(3)
+        else:
+            spin = keep.spins[row, node.index]
+        if not isinstance(tie, Hinge):
+            return np.zeros(3)
+        given = bullet.getJointState(*self.ids[child], physicsClientId=self.client)[3]
+        turn = keep.orientations[row, node.index]
+        inertia = np.array(getattr(node.body, "inertia", np.zeros(3)))
+        twice = cross(spin, turned(turn, inertia * turned_back(turn, spin)))
+        return given * turned(moved, np.array(tie.axis)) - twice
 
     def _of_points(self, constraint: Any, moved: Array) -> tuple[Array, Array]:
         """Force and torque about the joint's point: what Bullet says of a point is on its second end."""

@@ -22,6 +22,7 @@ from spook_tracker.engine.peers.model_loop import (
     resident,
     said,
 )
+from spook_tracker.engine.peers.pybullet_model import SEEN_FROM
 from spook_tracker.engine.peers.stepped import overheard, quiet
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result
@@ -95,7 +96,7 @@ class _Simulation(LoadedModel):
         bullet.setGravity(*run.model.gravity, physicsClientId=client)
         bullet.setPhysicsEngineParameter(
             fixedTimeStep=time_step, numSolverIterations=SWEEPS, numSubSteps=0, solverResidualThreshold=0.0,
-            deterministicOverlappingPairs=1, physicsClientId=client,
+            deterministicOverlappingPairs=1, contactBreakingThreshold=SEEN_FROM, physicsClientId=client,
         )  # fmt: skip
         self._let_go()
         self.size = self._size()

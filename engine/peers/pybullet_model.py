@@ -36,6 +36,9 @@ with quiet():  # it says when it was built
 
 SWEEPS = 500  # of the solver, in place of 50
 ERP = 0.9  # share of a constraint's error that is mended in a step; 0.2 unless told
+SLOWEST_BOUNCE = 0.01  # m/s: slower impacts do not rebound
+SEEN_FROM = 0.02  # m: how far apart surfaces are a contact to Bullet, unless told; it is kept for all worlds of the process
+BOUNCING_ERP = 0.01  # share of a depth that is mended in a step where bodies bounce, in place of 0.2
 POINT_INERTIA = 1e-9  # kg m²: Bullet wants one of every moving body
 NO_BOUND = 1e10  # N, rad/s: Bullet bounds forces of constraints and speeds of joints
 HALF_HINGE = 0.5  # m from a hinge to each of the two points that hold it where it is a constraint
@@ -62,11 +65,16 @@ class Model:
             numSolverIterations=SWEEPS,
             numSubSteps=0,
             solverResidualThreshold=0.0,
-            restitutionVelocityThreshold=0.01,
+            restitutionVelocityThreshold=SLOWEST_BOUNCE,
+            contactBreakingThreshold=SLOWEST_BOUNCE * task.time_step if self.restitution else SEEN_FROM,
             deterministicOverlappingPairs=1,
             jointFeedbackMode=bullet.JOINT_FEEDBACK_IN_WORLD_SPACE,
             physicsClientId=client,
         )
+        if self.restitution:
+            # A contact seen from afar stops what comes, which then touches without a speed to bounce with; and what is mended
+            # of a depth is added to the speed of the rebound.
+            bullet.setPhysicsEngineParameter(contactERP=BOUNCING_ERP, physicsClientId=client)
         for name, node in self.nodes.items():
             if node.parent is None:
                 self._tree([name])
