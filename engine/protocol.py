@@ -42,9 +42,7 @@ from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Compound, Shape
 
 RIGID = 1e-8  # m/N or rad/(N m): a softer row is a spring, which an engine must be able to hold as such
-NOWHERE = frozenset(
-    {"the joint tyre", "the force of the joint tyre", "restitution of the slip"}
-)  # no engine here has it
+NOWHERE = frozenset({"restitution of the slip"})  # no engine here has it
 _FROM_ENGINE: tuple[type[Quantity], ...] = (
     ConstraintForce,
     ContactForce,

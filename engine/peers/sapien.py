@@ -27,7 +27,7 @@ from spook_tracker.engine.peers.stepped import Kept, quiet, stepped
 from spook_tracker.engine.peers.surfaces import one_friction, one_restitution, solid
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
 from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Shape, Sphere
+from spook_tracker.engine.shapes import Box, Capsule, Plane, Shape, Sphere
 
 with quiet(), warnings.catch_warnings():  # it looks for a display
     warnings.simplefilter("ignore")
@@ -50,7 +50,7 @@ class Sapien:
 
     name = "sapien"
     capabilities = Capabilities(
-        shapes=frozenset({Sphere, Box, Capsule, Cylinder, Plane}),
+        shapes=frozenset({Sphere, Box, Capsule, Plane}),
         joints=frozenset({Distance, Lock, Ball, Hinge, Prismatic}),
         forces=frozenset({CentralGravity, Load, Spring}),
         shows=frozenset({ContactForce, ContactCount, Penetration}),
@@ -60,8 +60,14 @@ class Sapien:
         springs_aside=True,
         restitution=True,
         kinematic=False,
+        # A cylinder is a prism to it, which rests deeper on its side and rolls too slowly.
         absent=frozenset(
-            {"the force fluid", "friction of rolling or turning", "friction that differs with the direction"}
+            {
+                "the shape cylinder",
+                "the force fluid",
+                "friction of rolling or turning",
+                "friction that differs with the direction",
+            }
         ),
     )
     configurations = (
@@ -129,7 +135,13 @@ class _Run:
         moves = isinstance(body, Particle) or body.motion == "dynamic"
         made = physx.PhysxRigidDynamicComponent() if moves else physx.PhysxRigidStaticComponent()
         turn = (1.0, 0.0, 0.0, 0.0) if isinstance(body, Particle) else body.orientation
-        if isinstance(body, RigidBody) and body.shape is not None and self.scene.contacts:
+        # Where nothing can touch, shapes it does not have are let through.
+        if (
+            isinstance(body, RigidBody)
+            and body.shape is not None
+            and self.scene.contacts
+            and type(body.shape) in Sapien.capabilities.shapes
+        ):
             made.attach(_shape(body.shape, self.material))
         if moves:
             made.mass = body.mass
@@ -149,10 +161,10 @@ class _Run:
 
     def _hold(self, constraint: Any) -> None:
         """PhysX wants the second end to move; the first may be the world or stand."""
-        ends = list(constraint.between)
         if isinstance(constraint, Distance):
-            self._rod(constraint, ends)
+            self._rod(constraint)
             return
+        ends = list(constraint.between)
         frames = list(ends_of(self.scene, constraint))
         if not self._moves(ends[1]):
             ends, frames = ends[::-1], frames[::-1]
@@ -187,15 +199,20 @@ class _Run:
             joint.set_drive_property_twist(0.0, RIGID_DRIVE, bound, "force")
             joint.set_drive_velocity_target(still, (-sign * speed, 0.0, 0.0))
 
-    def _rod(self, rod: Distance, ends: list[Any]) -> None:
-        if not self._moves(ends[1]):
+    def _rod(self, rod: Distance) -> None:
+        """A point of the world is where it is; one of a body is beside its centre, in its axes."""
+        ends = list(zip(rod.between, rod.anchors, strict=True))
+        if not self._moves(ends[1][0]):
             ends = ends[::-1]
-        child = self.by_name[ends[1]]
+        (first, beside), (second, aside) = ends
+        if not isinstance(second, str) or not self._moves(second):
+            return
+        child = self.by_name[second]
         joint = physx.PhysxDistanceJointComponent(child)
-        joint.parent = self.by_name[ends[0]] if isinstance(ends[0], str) else None
-        joint.pose_in_parent = sapien.Pose() if isinstance(ends[0], str) else sapien.Pose(ends[0])
-        joint.pose_in_child = sapien.Pose()
-        length = self.scene.length(rod)
+        joint.parent = self.by_name[first] if isinstance(first, str) else None
+        joint.pose_in_parent = sapien.Pose(beside if isinstance(first, str) else first)
+        joint.pose_in_child = sapien.Pose(aside)
+        length = self.scene.length(rod) if rod.rest_length is None else rod.rest_length
         joint.set_limit(length, length)
         child.entity.add_component(joint)
 
@@ -274,11 +291,8 @@ def _shape(shape: Shape, material: Any) -> Any:
         made: Any = physx.PhysxCollisionShapePlane(material)
         made.local_pose = sapien.Pose((0.0, 0.0, 0.0), along(shape.normal))
         return made
-    kind = (
-        physx.PhysxCollisionShapeCapsule if isinstance(shape, Capsule) else physx.PhysxCollisionShapeCylinder
-    )
-    assert isinstance(shape, Capsule | Cylinder)
-    made = kind(shape.radius, 0.5 * shape.length, material)
+    assert isinstance(shape, Capsule)
+    made = physx.PhysxCollisionShapeCapsule(shape.radius, 0.5 * shape.length, material)
     made.local_pose = sapien.Pose((0.0, 0.0, 0.0), along((0.0, 0.0, 1.0)))
     return made
 

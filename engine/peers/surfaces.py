@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from itertools import combinations, combinations_with_replacement
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, RigidBody
+from spook_tracker.engine.bodies import WORLD, Material, RigidBody
 from spook_tracker.engine.joints import Joint
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.scene import Scene
@@ -26,34 +27,38 @@ def pairs_apart(scene: Scene) -> list[tuple[str, str]]:
     return sorted(pair for pair in pairs if names.issuperset(pair))
 
 
+def _of_all(
+    scene: Scene, given: Callable[[Material], float], joined: Callable[[float, float], float]
+) -> set[float]:
+    """What a coefficient comes to in every pair of surfaces that may touch."""
+    counts = [(given(b.material), b.motion == "dynamic") for b in solid(scene)] if scene.contacts else []
+    return {
+        joined(a[0], b[0])
+        for a, b in combinations_with_replacement(sorted(set(counts)), 2)
+        if (a[1] or b[1]) and (a != b or counts.count(a) > 1)
+    }
+
+
 def one_restitution(scene: Scene, engine: str) -> float:
     """The restitution of every pair, for engines that multiply those of two bodies where we take the larger.
 
     Raises NotSupported where two pairs differ: no numbers for single bodies give both then.
     """
-    if not scene.contacts:
-        return 0.0
-    kinds = {(b.material.restitution, b.motion == "dynamic") for b in solid(scene)}
-    counts = [(b.material.restitution, b.motion == "dynamic") for b in solid(scene)]
-    found = {
-        max(a[0], b[0])
-        for a, b in combinations_with_replacement(sorted(kinds), 2)
-        if (a[1] or b[1]) and (a != b or counts.count(a) > 1)
-    }
+    found = _of_all(scene, lambda material: material.restitution, max)
     if len(found) > 1:
         raise NotSupported(f"{engine} does not support surfaces of different restitution in one scene")
     return max(found, default=0.0)
 
 
 def one_friction(scene: Scene, engine: str) -> float:
-    """The friction of all surfaces, for engines that do not take the geometric mean of two.
+    """The friction of every pair, for engines that do not take the geometric mean of two: it is given to all surfaces.
 
-    Raises NotSupported where two differ.
+    Raises NotSupported where two pairs differ: they have a coefficient for each surface, which would give pairs others.
     """
-    found = {body.material.friction for body in solid(scene)}
+    found = _of_all(scene, lambda material: material.friction, lambda a, b: a if a == b else math.sqrt(a * b))
     if len(found) > 1:
-        raise NotSupported(f"{engine} does not support surfaces of different friction in one scene")
-    return found.pop() if found else 0.0
+        raise NotSupported(f"our adapter cannot ask {engine} for pairs of different friction in one scene")
+    return max(found, default=0.0)
 
 
 def shares(scene: Scene, kind: str, engine: str) -> dict[str, float]:
