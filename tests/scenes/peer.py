@@ -174,17 +174,22 @@ def box_on_ground(pull: float, friction: float = 0.5) -> Scene:
     return Scene(bodies=(ground, box), gravity=(pull * G, 0.0, -G))
 
 
-def unlike() -> Scene:
-    """That cube on a plane of another friction."""
-    ground, box = box_on_ground(0.0).bodies
+def unlike(*frictions: float, pull: float = 0.0) -> Scene:
+    """Cubes of these frictions, far from each other, on a plane of 0.5 with `pull` of their weight sideways."""
+    ground, box = box_on_ground(pull).bodies
     assert isinstance(box, RigidBody)
-    return Scene(bodies=(ground, replace(box, material=Material(friction=0.1))))
+    boxes = (
+        replace(box, name=f"box {k}" if k else "box", position=(0.0, 3.0 * k, 0.5), material=Material(friction=f))
+        for k, f in enumerate(frictions)
+    )  # fmt: skip
+    return Scene(bodies=(ground, *boxes), gravity=(pull * G, 0.0, -G))
 
 
-def slid(simulate: Any, pull: float, seconds: float = 2.0) -> float:
+def slid(simulate: Any, pull: float, seconds: float = 2.0, scene: Scene | None = None) -> float:
     """How far that cube slid [m]: none below its friction of 0.5, ½ (pull − 0.5) g t² above."""
     end = {"end": Final(quantity=Position("box"))}
-    return float(simulate(box_on_ground(pull), time_step=1 / 60, duration=seconds, observe=end)["end"][0])
+    asked = scene or box_on_ground(pull)
+    return float(simulate(asked, time_step=1 / 60, duration=seconds, observe=end)["end"][0])
 
 
 def sunk(simulate: Any, shape: Any = None, height: float = 0.5, under: Any = None) -> float:

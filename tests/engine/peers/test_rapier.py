@@ -222,3 +222,14 @@ def test_a_belt_carries_what_lies_on_it_by_the_geometric_mean_of_frictions() -> 
 
     assert float(run["belt"][0]) == pytest.approx(4.0, rel=1e-3)
     assert float(run["x"][0]) == pytest.approx(4.0 - slipping, rel=1e-3)
+
+
+def test_what_is_faster_than_its_bound_is_not_supported() -> None:
+    def end(speed: float) -> Any:
+        ball = Particle(name="ball", mass=1.0, position=(0.0, 0.0, 0.0), velocity=(speed, 0.0, 0.0))
+        seen = {"x": Final(quantity=Position("ball"))}
+        return RAPIER.simulate(Scene(bodies=(ball,)), time_step=STEP, steps=60, observe=seen)["x"][0]
+
+    assert end(390.0) == pytest.approx(390.0, rel=1e-3)
+    with pytest.raises(NotSupported, match=r"speeds of 399\.99 m/s and more"):
+        end(600.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -11,10 +12,12 @@ import pytest
 from spook_tracker.engine import (
     Ball,
     ContactForce,
+    Cylinder,
     Final,
     MaximumAbsolute,
     RigidBody,
     Scene,
+    Tyre,
     Violation,
 )
 from spook_tracker.engine.find import find
@@ -78,3 +81,18 @@ def test_small_steps_hold_chains_that_gauss_seidel_does_not(links: int) -> None:
     assert opened(links, 1.0, "pgs") > 10.0 * opened(links, 1.0, "tgs")
     assert opened(links, 100.0, "tgs") < 0.01
     assert opened(links, 100.0, "pgs") > 1.0
+
+
+def test_cylinders_which_are_prisms_to_it_are_not_supported_and_tyres_are_not_asked() -> None:
+    log = RigidBody(name="log", mass=1.0, shape=Cylinder(0.5, 1.0), position=(0.0, 0.0, 0.5))
+    with pytest.raises(NotSupported, match="does not support the shape cylinder"):
+        run("tgs")(Scene(bodies=(log, replace(log, name="other"))), time_step=1 / 60, steps=1)
+    alone = run("tgs")(Scene(bodies=(log,)), time_step=1 / 60, steps=1)
+    assert alone.status == "completed"
+    wheel = RigidBody(name="wheel", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.3))
+    tyre = Tyre(
+        name="tyre", between=("world", "wheel"), axis=(0.0, 1.0, 0.0), radius=0.3, stiffness=1e4, longitudinal=1e4,
+        cornering=1e4, friction=1.0,
+    )  # fmt: skip
+    with pytest.raises(NotSupported, match="our adapter cannot ask sapien for the joint tyre"):
+        run("tgs")(Scene(bodies=(wheel,), constraints=(tyre,)), time_step=1 / 60, steps=1)

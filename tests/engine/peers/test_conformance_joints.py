@@ -1,0 +1,64 @@
+"""What engines behind the protocol are asked of joints: gears, rods, slides and what a hinge carries, by closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from spook_tracker.engine import AngularVelocity, ConstraintForce, Distance, Final, Orientation, simulate
+from tests.engine.peers.test_conformance import (
+    BOX,
+    BULLET,
+    DART,
+    JOLT,
+    MUJOCO,
+    PGS,
+    RAPIER,
+    RAPIER_JS,
+    TGS,
+    Asked,
+    engine,
+    rows,
+)
+from tests.scenes import peer_joints
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+@pytest.mark.parametrize("ratio", [-3.0, -1.0, 0.5, 1.0])
+@rows({MUJOCO: 1e-6, JOLT: 1e-4})
+def test_gears_share_what_turns_them_by_their_ratio(
+    asked: Asked, owed: float, ratio: float, backwards: bool
+) -> None:
+    found, exact = peer_joints.geared(engine(asked), ratio, backwards)
+    assert found == pytest.approx(exact, rel=owed)
+
+
+@rows(dict.fromkeys((BULLET, JOLT, BOX, MUJOCO), 0.02))
+def test_the_torque_of_a_hinge_has_what_brakes_it_and_what_turns_its_body(asked: Asked, owed: float) -> None:
+    seen = {
+        "f": Final(quantity=ConstraintForce("j")),
+        "w": Final(quantity=AngularVelocity("b")),
+        "q": Final(quantity=Orientation("b")),
+    }
+    found = engine(asked)(peer_joints.spun(3.0), time_step=1e-3, steps=100, observe=seen)
+    exact = peer_joints.load_on_spun(found["q"], float(found["w"][2]), 3.0)
+
+    assert found["w"][2] < 4.9
+    assert found["f"] == pytest.approx([0.0, 0.0, 0.0, *exact], abs=owed * float(np.linalg.norm(exact)))
+
+
+@rows(dict.fromkeys((MUJOCO, JOLT, BOX, TGS, PGS), 2e-3))
+def test_a_rod_holds_points_beside_centres_at_its_length(asked: Asked, owed: float) -> None:
+    """As our engine does, which keeps 1 m to the point half a metre aside; and a rod longer than the start's distance."""
+    aside = Distance(name="rod", between=((0, 0, 0), "b"), anchors=((0, 0, 0), (-0.5, 0, 0)), compliance=0.0)
+    longer = Distance(name="rod", between=("b", (0, 0, 0)), rest_length=1.6, compliance=0.0)
+    expected = peer_joints.rodded(simulate, aside)
+    assert peer_joints.rodded(engine(asked), aside) == pytest.approx(expected, abs=owed)
+    assert np.linalg.norm(peer_joints.rodded(engine(asked), longer)) == pytest.approx(1.6, abs=owed)
+
+
+@rows(dict.fromkeys((MUJOCO, DART, BULLET, JOLT, BOX, TGS, PGS, RAPIER, RAPIER_JS), 1e-4))
+def test_a_slide_leaves_a_body_as_it_is_turned_about_its_axis(asked: Asked, owed: float) -> None:
+    way, turned = peer_joints.slid_turned(engine(asked))
+    assert way == pytest.approx(1.0, abs=owed)
+    assert np.abs(turned).max() < owed
