@@ -16,7 +16,7 @@ OBJECTIONS: Mapping[str, str] = {
     "jolt": "it is asked through WebAssembly on one thread, where its C++ has all cores; 100 iterations are beyond any game",
     "mjx": "it is made for thousands of worlds on an accelerator: one world on one core is its worst case",
     "motrixsim": "it is made for many worlds at once on all cores, and is asked one on one; its single precision is a choice for learning",
-    "mujoco": "soft contacts and regularised friction are a choice, for inverse dynamics and control; asked as if they were hard, it is stiffer than its makers advise for speed; a motor is its velocity servo, whose gain we choose: what it drives comes to its speed in one step",
+    "mujoco": "soft contacts and regularised friction are a choice, for inverse dynamics and control; asked as if they were hard, it is stiffer than its makers advise for speed; a motor is its row of dry friction told a speed to hold, from Python in every stage, which its manual does not know",
     "mujoco_warp": "as of mjx: it is made for a GPU, and is compiled for a CPU here",
     "newton": "it is made for many worlds on a GPU: in single precision, one world on one core, none of its six solvers is in its place",
     "p2": "it is made for games in a plane, by a small number of sweeps",

@@ -380,7 +380,8 @@ READING = (
     "error soonest, whatever step that takes. What an engine cannot be asked (a joint, a shape, a force it does not show) is not",
     "supported, by name, and no mark against it. What pushes besides gravity does so from Python in dart, motrixsim, newton,",
     "pybullet and sapien, before every step, and where it is the pull of the sun in planetarium in rapier3d, too, and in mujoco,",
-    "in every stage: there the run times of these seven are Python's more than theirs. All others push in their own loop.",
+    "in every stage, where there is a motor, too: there the run times of these seven are Python's more than theirs. All",
+    "others push in their own loop.",
 )
 
 

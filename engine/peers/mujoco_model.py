@@ -43,6 +43,7 @@ from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Box, Capsule, Compound, Cylinder, Plane, Shape, Sphere
 
 POINT_INERTIA = 1e-12  # kg m²: MuJoCo wants one of every moving body; a point mass has none
+UNBOUNDED = 1e10  # N or N m
 HALF_HINGE = 0.5  # m from a hinge to each of the two points that hold it as equalities
 
 
@@ -54,7 +55,7 @@ class Model:
     tree: Mapping[str, str]  # constraint -> the body it ties to its parent
     equalities: Mapping[str, tuple[int, ...]]  # constraint -> its equalities
     point_bodies: tuple[str, ...]
-    speeds: tuple[float, ...] = ()  # of its motors, in order, rad/s or m/s
+    speeds: Mapping[str, float] = field(default_factory=dict)  # of motors, by their tendons, rad/s or m/s
     wires: Mapping[str, int] = field(default_factory=dict)  # those that may go slack -> their tendons
 
 
@@ -63,22 +64,22 @@ def numbers(values: Iterable[float]) -> str:
     return '"' + " ".join(repr(float(value)) for value in values) + '"'
 
 
-def model(scene: Scene, *, joint_coordinates: bool, option: str, row: str) -> Model:
-    """The whole model; `option` and `row`, how stiff what holds and touches is, are XML attributes of the configuration."""
+def model(scene: Scene, *, joint_coordinates: bool, option: str, row: str, hard: str = "") -> Model:
+    """The whole model; `option` and `row`, how stiff what holds and touches is, are XML attributes of the configuration, and
+    so is `hard`, how stiff motors are."""
     nodes = grown(scene) if joint_coordinates else alone(scene)
-    return _Writer(scene, nodes, row).write(option)
+    return _Writer(scene, nodes, row, hard).write(option)
 
 
 class _Writer:
-    def __init__(self, scene: Scene, nodes: dict[str, Node], row: str) -> None:
-        self.scene, self.nodes, self.row = scene, nodes, row
+    def __init__(self, scene: Scene, nodes: dict[str, Node], row: str, hard: str) -> None:
+        self.scene, self.nodes, self.row, self.hard = scene, nodes, row, hard
         self.normal = plane_of_motion(scene)
         self.tree = {node.tie.name: name for name, node in nodes.items() if node.tie is not None}
         self.equalities: dict[str, tuple[int, ...]] = {}
         self.equality_lines: list[str] = []
         self.tendon_lines: list[str] = []
-        self.motor_lines: list[str] = []
-        self.speeds: list[float] = []
+        self.speeds: dict[str, float] = {}
         self.wires: dict[str, int] = {}
         self.world_sites: list[str] = []
         self.sites: dict[str, list[str]] = {name: [] for name in nodes}
@@ -87,7 +88,9 @@ class _Writer:
         }
         self.one_friction = len(materials) <= 1
         if not self.one_friction and len(scene.bodies) > 50:
-            raise NotSupported("mujoco does not support surfaces of different friction in a large scene")
+            raise NotSupported(
+                "our adapter cannot ask mujoco for surfaces of different friction among more than 50 bodies"
+            )
         if not self.one_friction and any(_is_compound(body) for body in scene.bodies):
             raise NotSupported(
                 "our adapter cannot ask mujoco for a compound among surfaces of different friction"
@@ -116,13 +119,12 @@ class _Writer:
                 "</worldbody>",
                 f"<tendon>{''.join(self.tendon_lines)}</tendon>" if self.tendon_lines else "",
                 f"<equality>{''.join(self.equality_lines)}</equality>" if self.equality_lines else "",
-                f"<actuator>{''.join(self.motor_lines)}</actuator>" if self.motor_lines else "",
                 f"<contact>{contact}</contact>" if contact else "",
                 "</mujoco>",
             ]
         )
         points = tuple(b.name for b in self.scene.bodies if isinstance(b, Particle))
-        return Model(xml, self.tree, self.equalities, points, tuple(self.speeds), self.wires)
+        return Model(xml, self.tree, self.equalities, points, self.speeds, self.wires)
 
     def _branch(self, top: str, lines: list[str]) -> None:
         """A body with all that hangs from it, without recursion: chains may be long."""
@@ -192,20 +194,22 @@ class _Writer:
         )
 
     def _motor(self, tie: AxialJoint, sign: float) -> None:
-        """A velocity servo; how stiff, which depends on what it turns, is told once the model is compiled."""
+        """Dry friction of the joint as a tendon's, a row of bounded force, which the run lets hold a speed in place of none."""
         motor = tie.motor
         if motor is None or motor.max_force == 0.0:
             return
-        speed, most = float(motor.speed), motor.max_force  # type: ignore[arg-type]
-        bound = "" if most is None else f" forcerange={numbers((-float(most), float(most)))}"  # type: ignore[arg-type]
-        self.motor_lines.append(f"<velocity joint={quoteattr(tie.name)}{bound}/>")
-        self.speeds.append(sign * speed)
+        most = UNBOUNDED if motor.max_force is None else float(motor.max_force)  # type: ignore[arg-type]
+        name = f"{tie.name}/motor"
+        self.tendon_lines.append(
+            f'<fixed name={quoteattr(name)} frictionloss="{most!r}" {_of_friction(self.hard)}>'
+            f'<joint joint={quoteattr(tie.name)} coef="{sign!r}"/></fixed>'
+        )
+        self.speeds[name] = float(motor.speed)  # type: ignore[arg-type]
 
     def _loss(self, tie: Constraint) -> str:
         """Dry friction of a slide [N] or a hinge [N m], as stiff as everything else."""
         size = max(frictions(tie)[0])
-        row = self.row.replace("solref", "solreffriction").replace("solimp", "solimpfriction")
-        return f'frictionloss="{size!r}" {row}' if size else ""
+        return f'frictionloss="{size!r}" {_of_friction(self.row)}' if size else ""
 
     def _geom(self, body: RigidBody) -> str:
         assert body.shape is not None
@@ -386,6 +390,10 @@ class _Writer:
 
 def _is_compound(body: Particle | RigidBody) -> bool:
     return isinstance(body, RigidBody) and isinstance(body.shape, Compound)
+
+
+def _of_friction(row: str) -> str:
+    return row.replace("solref", "solreffriction").replace("solimp", "solimpfriction")
 
 
 def _armature(tie: Constraint) -> str:
