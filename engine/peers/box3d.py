@@ -41,6 +41,7 @@ LOAD, SPRING, ATTRACTION = range(3)
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 Z_TO_X = np.array([math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0])  # the turn from where its hinges' axes lie
 UNBOUNDED = 1e30  # N or N m
+FADING = 1e-4  # 1: rate of a damper's spring over the damper's own, of which its pull has the square
 MOST_POINTS = 16  # contact points a body, at most
 
 
@@ -247,7 +248,8 @@ class _Run:
     def _spring(self, spring: Spring, ends: list[int]) -> None:
         """Its own, which is told by the frequency and damping ratio of what it moves: that of two centres does not change."""
         inverse = sum(1.0 / mass for end in ends if end >= 0 and (mass := _mass(self.bodies[end])))
-        rate = math.sqrt(spring.stiffness * inverse)  # rad/s
+        # rad/s; a damper alone has the rate of a spring that does nothing beside it
+        rate = max(math.sqrt(spring.stiffness * inverse), FADING * spring.viscosity * inverse)
         if rate == 0.0:
             return
         numbers = (spring.rest_length, 0.5 * rate / math.pi, 0.5 * spring.viscosity * inverse / rate)

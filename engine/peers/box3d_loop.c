@@ -4,6 +4,8 @@
 #include <stdlib.h>
 
 enum { BALL = 1, HINGE, PRISMATIC, LOCK, DISTANCE };
+#define WITHOUT_BOUND 1e18f  // m/s; its square is a number, too
+
 enum { LOAD, SPRING, ATTRACTION };
 
 // What pushes: a load (force and torque on `first`), a spring (anchors, stiffness, rest length, viscosity), an attraction
@@ -29,13 +31,14 @@ static b3Vec3 vector(const double* from) { return (b3Vec3){(float)from[0], (floa
 
 static b3Quat turn(const double* from) { return (b3Quat){vector(from + 1), (float)from[0]}; }
 
-// Sleep and damping off, one thread. `most`: bodies, joints and pushes at most. `threshold`: the speed [m/s] below which
+// Sleep, damping and its bound of speeds off, one thread. `most`: bodies, joints and pushes at most. `threshold`: the speed [m/s] below which
 // nothing bounces; `stiffest`: of joints [Hz], of which a substep takes a quarter of its rate; negative: Box3D's own.
 Loop* spook_new(const double* gravity, const int* most, double threshold, double stiffest) {
     b3WorldDef def = b3DefaultWorldDef();
     def.gravity = vector(gravity);
     def.enableSleep = false;
     def.workerCount = 1;
+    def.maximumLinearSpeed = WITHOUT_BOUND;
     if (threshold >= 0.0) {
         def.restitutionThreshold = (float)threshold;
     }

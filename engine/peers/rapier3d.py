@@ -33,6 +33,7 @@ from spook_tracker.engine.result import Array
 from spook_tracker.engine.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Plane, Shape, Sphere
 
 POINT_INERTIA = 1e-6  # kg m²: every moving body wants one; a particle that turns is not seen to
+WITHOUT_BOUND = 1e18  # m/s; its square is a number of single precision, too
 RIGID_DRIVE = 1e6  # N s/m or N m s: damping of a motor, which it solves implicitly
 FREE = {Hinge: rapier.JointAxis.ANG_X, Prismatic: rapier.JointAxis.LIN_X}
 ABSENT = frozenset(  # of it and of its package for JavaScript
@@ -135,6 +136,7 @@ class _Run:
         asked = self.world.integration_parameters
         asked.dt = task.time_step
         asked.num_solver_iterations = options["sweeps"]
+        asked.normalized_max_linear_velocity = WITHOUT_BOUND
         if options["coulomb"]:
             asked.friction_model = rapier.FrictionModel.COULOMB
         self.handles = [self.world.add_body(*_body(b, self.scene.contacts)) for b in self.scene.bodies]
