@@ -36,7 +36,13 @@ from spook_tracker.engine.observe import (
     Quantity,
     Violation,
 )
-from spook_tracker.engine.recording import Recording, needs_every_step, observed, wanted_samples
+from spook_tracker.engine.recording import (
+    Recording,
+    hinges_counted,
+    needs_every_step,
+    observed,
+    wanted_samples,
+)
 from spook_tracker.engine.result import Result
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Compound, Shape
@@ -110,7 +116,7 @@ class Task:
     scene: Scene
     time_step: float  # s
     steps: int
-    every_step: bool  # else only the start and the end
+    every_step: bool  # else only the start and the end, and no turns to count
     samples: npt.NDArray[
         np.int64
     ]  # steps something is read at, with the start and the end: all that must be kept
@@ -118,6 +124,7 @@ class Task:
     constraint_forces: bool  # whether they are wanted
     contacts: bool  # whether contact forces, counts or depths are wanted
     time_limit: float | None  # s, of the processor where the adapter can tell, else of wall time
+    counted: tuple[str, ...] = ()  # hinges whose turns are counted where not all steps are kept
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -349,12 +356,14 @@ def run(
     chosen = configuration_of(adapter, configuration)
     refuse_unsupported(adapter, chosen, scene, observe)
     asked = [type(what.quantity) for what in observe.values()]
+    counted = hinges_counted(scene, observe)
     task = Task(
         scene=sprung(adapter.capabilities, scene),
         time_step=float(time_step),
         steps=count,
-        every_step=needs_every_step(observe, count),
+        every_step=needs_every_step(observe, count) or bool(counted),
         samples=wanted_samples(observe, count),
+        counted=counted,
         configuration=chosen,
         constraint_forces=ConstraintForce in asked,
         contacts=not {ContactForce, ContactCount, ContactPoints, Penetration}.isdisjoint(asked),

@@ -16,7 +16,7 @@ from spook_tracker.engine import recorded_joints
 from spook_tracker.engine.bodies import Particle, RigidBody
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.forces import CentralGravity, Spring
-from spook_tracker.engine.joints import AxialJoint, Distance
+from spook_tracker.engine.joints import AxialJoint, Distance, Hinge
 from spook_tracker.engine.observe import (
     AngularMomentum,
     AngularVelocity,
@@ -64,16 +64,15 @@ class Recording:
     contact_forces: Mapping[tuple[str, str], Array] = field(default_factory=dict)  # (s, 3) N, on the first
     contact_count: Array | None = None  # (s,)
     penetration: Array | None = None  # (s,) m, the deepest
+    turned: Mapping[str, Array] = field(default_factory=dict)  # (s,) rad, hinges whose turns were counted
     status: Status = "completed"
     failure: str = ""
 
 
 def wanted_samples(observe: Mapping[str, Observable], steps: int) -> npt.NDArray[np.int64]:
-    """The steps at which something is read, with the start and the end, ascending; all where turns must be counted."""
+    """The steps at which something is read, with the start and the end, ascending."""
     wanted = np.zeros(steps + 1, dtype=bool)
     wanted[[0, steps]] = True
-    if any(isinstance(what.quantity, JointCoordinate) for what in observe.values()):
-        wanted[:] = True
     for what in observe.values():
         last = steps if what.last is None else min(what.last, steps)
         if isinstance(what, Final):
@@ -84,13 +83,14 @@ def wanted_samples(observe: Mapping[str, Observable], steps: int) -> npt.NDArray
 
 
 def needs_every_step(observe: Mapping[str, Observable], steps: int) -> bool:
-    """Whether something is read between the start and the end, or turns are counted on the way."""
-    return any(
-        isinstance(what.quantity, JointCoordinate)
-        or not isinstance(what, Final)
-        or what.last not in (None, steps)
-        for what in observe.values()
-    )
+    """Whether something is read between the start and the end."""
+    return any(not isinstance(what, Final) or what.last not in (None, steps) for what in observe.values())
+
+
+def hinges_counted(scene: Scene, observe: Mapping[str, Observable]) -> tuple[str, ...]:
+    """Those whose angle is read, and whose turns must be counted on the way."""
+    asked = {what.quantity.joint for what in observe.values() if isinstance(what.quantity, JointCoordinate)}
+    return tuple(c.name for c in scene.constraints if isinstance(c, Hinge) and c.name in asked)
 
 
 def observed(
@@ -162,6 +162,8 @@ def quantity(scene: Scene, recording: Recording, asked: Quantity) -> Array:
     if isinstance(asked, Violation):
         return _violation(scene, recording, asked.constraint)
     if isinstance(asked, JointCoordinate):
+        if asked.joint in recording.turned:
+            return recording.turned[asked.joint]
         return recorded_joints.coordinate(
             scene, scene.constraint(asked.joint), recording.positions, recording.orientations
         )

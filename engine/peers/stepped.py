@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import ctypes
+import math
 import os
 import sys
 import tempfile
@@ -15,11 +16,14 @@ from typing import Any
 import numpy as np
 
 from spook_tracker.engine.protocol import Task
+from spook_tracker.engine.recorded_joints import coordinate
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
 
+TURN = 2.0 * math.pi  # rad
 BLOCK = 1000  # steps between two looks at the clock where nothing is recorded between, at most
 LOOK = 0.05  # s after which it is looked at again, or sooner
+UNSEEN = 16  # steps between two looks at hinges whose turns are counted, at most
 MOST_HEARD = 100_000  # bytes of what an engine has written last
 
 
@@ -86,6 +90,45 @@ class Kept:
         return self.pairs[pair]
 
 
+class _Turns:
+    """Counts turns of hinges by looks that are close enough together for an eighth of a turn between them."""
+
+    def __init__(self, task: Task, read: Callable[[Kept, int, int], None]) -> None:
+        self.task, self.read = task, read
+        self.joints = [task.scene.constraint(name) for name in task.counted]
+        places = {body.name: k for k, body in enumerate(task.scene.bodies)}
+        self.ends = [[places[end] for end in joint.between if end in places] for joint in self.joints]
+        self.angles = np.zeros(len(self.joints))
+        self.now = np.zeros((len(task.samples), len(self.joints)))  # rad, a row a sample
+        self.steps = 1 if self.joints else BLOCK  # until the next look
+
+    def look(self, kept: Kept, row: int) -> None:
+        """At what has just been read."""
+        fastest = 0.0
+        for k, (joint, ends) in enumerate(zip(self.joints, self.ends, strict=True)):
+            where, turns = kept.positions[row : row + 1], kept.orientations[row : row + 1]
+            angle = float(coordinate(self.task.scene, joint, where, turns)[0])
+            self.angles[k] = angle + TURN * round((self.angles[k] - angle) / TURN)
+            fastest = max(fastest, sum(float(np.linalg.norm(kept.spins[row, end])) for end in ends))
+        soonest = 0.125 * TURN / (self.task.time_step * fastest) if fastest else math.inf
+        self.steps = max(1, int(min(soonest, 2 * self.steps, UNSEEN))) if math.isfinite(fastest) else 1
+
+    def glance(self, sample: int) -> None:
+        """Between samples; nothing is kept but the turns."""
+        if self.joints:
+            seen = Kept(1, len(self.task.scene.bodies))
+            self.read(seen, 0, sample)
+            if np.isfinite(seen.orientations).all():
+                self.look(seen, 0)
+
+    def keep(self, kept: Kept, row: int) -> None:
+        """At a sample."""
+        if self.joints:
+            if np.isfinite(kept.orientations[row]).all():
+                self.look(kept, row)
+            self.now[row] = self.angles
+
+
 def stepped(
     task: Task,
     step: Callable[[int], None],
@@ -102,11 +145,13 @@ def stepped(
     kept = Kept(len(samples), len(task.scene.bodies))
     done, failure, status, spent, worked, block = 0, "", "completed", 0.0, 0.0, 1
     entered = time.process_time()
+    turns = _Turns(task, read)
     read(kept, 0, 0)
+    turns.keep(kept, 0)
     kept.count = 1
     for row, sample in enumerate(samples[1:], start=1):
         while done < sample and status == "completed":
-            taken = min(block, sample - done)
+            taken = min(block, sample - done, turns.steps)
             since, began = time.process_time(), time.perf_counter()
             try:
                 step(taken)
@@ -124,9 +169,12 @@ def stepped(
             elif task.time_limit is not None and time.process_time() - entered > task.time_limit:
                 status = "timed_out"
                 failure = f"the time limit of {task.time_limit:g} s was reached before step {done + 1}"
+            elif done < sample:
+                turns.glance(done)
         if status != "completed":
             break
         read(kept, row, sample)
+        turns.keep(kept, row)
         kept.count = row + 1
         if not (np.isfinite(kept.positions[row]).all() and np.isfinite(kept.velocities[row]).all()):
             status, failure = "not_finite", f"a value is not finite by step {done}"
@@ -146,6 +194,7 @@ def stepped(
         contact_forces={pair: kept.pair(pair)[:count] for pair in kept.pairs},
         contact_count=kept.contacts[:count],
         penetration=kept.depths[:count],
+        turned={name: turns.now[:count, k] for k, name in enumerate(task.counted)},
         status=status,  # type: ignore[arg-type]
         failure=failure,
     )
