@@ -13,17 +13,21 @@
 #include <vector>
 
 #include "contacts/contact_points.hpp"
-#include "contacts/impact_queue.hpp"
 #include "contacts/open_pairs.hpp"
 #include "contacts/solve_islands.hpp"
 #include "contacts/solve_quality.hpp"
 #include "contacts/step_motion.hpp"
+#include "contacts/successive_impacts.hpp"
 
 namespace spook {
 
 class ImpactSolver {
 public:
     void begin_step(const ContactModel& model);
+    /// From now on in this step plastic impacts are met in the impact as well.
+    void meet_plastic_too() noexcept { plastic_too_ = true; }
+    bool plastic_too() const noexcept { return plastic_too_; }
+
     /// Approach, push and part in the impact of every point, from the current velocities. `reach`: see SearchMargins.
     /// Whether an impact is needed.
     bool measure(const StepMotion& motion, const std::vector<double>& reach, ContactPoints& points);
@@ -43,7 +47,7 @@ public:
     /// What took part in it.
     const std::vector<RowBlock>& hit_rows() const noexcept { return work_.hit.rows; }
 
-    ImpactQueue& queue() noexcept { return queue_; }
+    const SuccessiveImpacts& order() const noexcept { return order_; }
     IslandSolver& solver() noexcept { return solver_; }
     const IslandSolver& solver() const noexcept { return solver_; }
 
@@ -62,10 +66,9 @@ private:
                     SolveQuality& quality);
 
     IslandSolver solver_;
-    ImpactQueue queue_;
-    bool needed_ = false;
-    bool plastic_too_ = false;  // impacts without rebound are met as well: others may follow from them
-    int rounds_ = 0;            // impacts of this step
+    SuccessiveImpacts order_;
+    bool needed_ = false, plastic_too_ = false;
+    int rounds_ = 0;  // impacts of this step
     /// Of one impact; energies, shares and flags by island.
     struct Arrays {
         MixedSystem hit, start, plastic;

@@ -17,12 +17,12 @@ struct StepContact {
     Vec3 tangent;                // first tangent along world axes or the material's direction, unit
     double friction = 0.0;       // mu; where it differs with the direction, the smaller one
     double toi = -1.0;           // when it touches within the step, s; negative if the pair is closed
+    double meeting_gap = 0.0;    // at an impact, m: other points of the pair may still be open
     double begun = 0.0;          // gap along its normal with both bodies where the step began, m
     double approach = 0.0;       // C v, m/s, negative when closing
     double dv_ext = 0.0;         // C (free velocity − v), m/s, negative when pressed together
     int extras = -1;             // the place of its ContactExtras, −1 if it has none
     bool event = false;          // acts at the time of its impact, not at the start of the step
-    bool queued = false;         // will act at that time, see ImpactQueue
     bool at_start = false;       // an impact with the point of the step's start already
     bool solved = false;         // in an earlier round of this step: these start the next
     bool answered = false;       // the same, by a solve and not by warm_start_by_pgs()

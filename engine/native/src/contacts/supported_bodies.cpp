@@ -6,8 +6,8 @@
 // whatever t, and however many impacts come (tests/engine/contacts/test_elastic_balls.py). One that comes to rest in it has no more of k, or
 // it would be lifted by the rest, see lay_down(). A supported one stays on its way with v, its support taking the kick:
 // all of it is left for the rest of the step, and the energy changes by (t/h) k·(v₊ − v) − ½ |v₊ − v₁|² with v₁ after the
-// impact. That is a gain where the impact gives a speed along the forces. So a supported body that moves along them already is not
-// advanced, see ImpactQueue::advance(). Another body that an impact sends along them, or against
+// impact. That is a gain where the impact gives a speed along the forces. So a supported body that moves along them already is not advanced, but
+// where what it meets can only push against them, see find_events(). Another body that an impact sends along them, or against
 // them, is let go, and free from then on. What still would be won, at most ½ |k|² by falling in the rest of the step,
 // is paid in height.
 #include "contacts/supported_bodies.hpp"
@@ -65,6 +65,14 @@ void SupportedBodies::find(const ContactBodies& bodies) {
         more = false;
         for (auto at = pairs_.rbegin(); at != pairs_.rend(); ++at) more = carry(*at) || more;
     }
+}
+
+bool pushes_against_forces(const StepContact& point, const ContactBodies& bodies,
+                           const std::vector<Vec6>& dv_ext) {
+    const int a = point.contact.first, b = point.contact.second;
+    if (point.toi < 0.0 || std::min(bodies.solver_index[a], bodies.solver_index[b]) >= 0) return false;
+    const Vec3 n = point.contact.point.normal;
+    return bodies.solver_index[a] >= 0 ? dot(n, linear(dv_ext[a])) < 0.0 : dot(n, linear(dv_ext[b])) > 0.0;
 }
 
 void SupportedBodies::release(int body, double part, const Vec6& dv_ext) {

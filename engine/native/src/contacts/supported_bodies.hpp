@@ -41,5 +41,8 @@ private:
 
 /// Whether a body's velocity, or a change of it, is along its kick, or against it.
 bool is_along(Vec3 kick, Vec3 velocity);
+/// Whether a point is an impact of what stands still that pushes the other one against the forces.
+bool pushes_against_forces(const StepContact& point, const ContactBodies& bodies,
+                           const std::vector<Vec6>& dv_ext);
 
 }  // namespace spook

@@ -73,9 +73,9 @@ namespace tolerances::contact_judge {
 inline constexpr double sunk = 0.02;  // of the smaller body's radius: an overlap that a solve has left
 }
 
-// impact_queue.cpp
-namespace tolerances::impact_queue {
-inline constexpr int event_bodies = 8;  // larger islands that something holds keep to the step's start
+// impact_events.cpp
+namespace tolerances::impact_events {
+inline constexpr std::size_t event_bodies = 8;  // larger islands keep to the step's start
 }
 
 // contact_pgs.cpp

@@ -1,6 +1,7 @@
-// The impacts of a step in the order of their times: which come next, and the bodies that are moved to when they do.
+// Successive impacts: which comes next, and the free balls that are moved to its time.
 #pragma once
 
+#include <cstdint>
 #include <vector>
 
 #include "contacts/contact_points.hpp"
@@ -10,7 +11,7 @@
 
 namespace spook {
 
-class ImpactQueue {
+class SuccessiveImpacts {
 public:
     /// Of a step.
     void begin(const ContactModel& model);
@@ -18,35 +19,26 @@ public:
     bool possible() const noexcept { return !clock_.empty(); }
     /// Whether impacts come one after the other between the bodies of a point.
     bool come_in_order(const ContactModel& model, const StepContact& point) const;
-    /// Balls that are followed will be moved to their impacts: these act with the normals and arms of their meetings.
-    void keep_meetings(const OpenPairs& open_pairs, const StepMotion& motion, ContactPoints& points);
     /// Of impacts that come in order those to be answered next, of the others all, as places in `points`: of what may meet in
-    /// this step the points that are closed when the first of those that are approached closes; where impacts are successive, those that
-    /// are approached themselves. Balls are moved to that time.
-    void find_next(MixedSystem& system, const OpenPairs& open_pairs, StepMotion& motion,
-                   ContactPoints& points, std::vector<std::size_t>& hit_points);
+    /// this step the points that are approached, and closed when the first of them is. Free balls are moved there, as to the time
+    /// of a single impact.
+    void find_earliest(MixedSystem& system, const OpenPairs& open_pairs, StepMotion& motion,
+                       ContactPoints& points, std::vector<std::size_t>& hit_points);
     /// An open point among balls that are moved by successive impacts is moved to the time of their last one.
     void move_to_last_impact(const StepMotion& motion, StepContact& point) const;
 
 private:
-    struct Island {
-        double first = unbounded;  // the next impact, s
-        int members = 0;
-        bool balls = true, flies = true,
-             known = true;  // all in it: are, are held by nothing, are where the queue says
-        bool followed = false;
-    };
     Vec6 path_until(const StepMotion& motion, std::size_t body, double time) const;
     double gap_at(const StepMotion& motion, const StepContact& point, double time) const;
     double last_impact_time(const StepContact& point) const noexcept;
     double closing_time(const StepMotion& motion, const StepContact& point) const;
     void apply_forces_before(std::size_t body, double part, StepMotion& motion, MixedSystem& system);
-    void find_islands(const OpenPairs& open_pairs, const StepMotion& motion, const ContactPoints& points);
+    const Islands& connected(const MixedSystem& system, const OpenPairs& open_pairs,
+                             const ContactBodies& bodies, const ContactPoints& points);
     int island(const ContactBodies& bodies, std::size_t body) const noexcept;
-    Island& of(const ContactBodies& bodies, const StepContact& point) noexcept {
-        return islands_[connected_.islands().of_body[bodies.solver_body(point.contact)]];
-    }
     void find_closing(const StepMotion& motion, const ContactPoints& points);
+    bool closes_then(const StepMotion& motion, const ContactPoints& points, std::size_t k) const;
+    void find_orderly(const StepMotion& motion, const ContactPoints& points);
     void advance(MixedSystem& system, StepMotion& motion);
 
     std::vector<double> clock_;          // by body: up to when its way in the step is known, s
@@ -54,9 +46,10 @@ private:
     std::vector<signed char> in_order_;  // bodies: 1 if impacts come one by one in this step, −1 if not
     // Of one call:
     IslandFinder connected_;
-    std::vector<Island> islands_;
-    std::vector<double> closing_;  // when each point closes, s
-    std::vector<char> hit_;        // bodies
+    std::vector<double> first_, closing_;  // the next impact of each island, s; when each point closes
+    std::vector<char> orderly_, balls_;    // islands
+    std::vector<char> hit_;                // bodies
+    std::vector<std::uint64_t> pairs_;     // by island
 };
 
 }  // namespace spook
