@@ -289,14 +289,14 @@ def _asked_later(runs: Sequence[Any]) -> list[str]:
 
 
 def _asked_in_part(samples: Mapping[str, ranks.Samples]) -> list[str]:
-    """Engines whose time was over before they had been asked everything."""
+    """Engines whose time was over before all their ladders, which are asked last."""
     tests = {
-        name: len({definition.test for definition, _ in told.values()}) for name, told in samples.items()
+        name: len({definition.test for definition, _ in told.values() if definition.kind == "ladder"})
+        for name, told in samples.items()
     }
     part = [f"{name} {count}" for name, count in tests.items() if count < tests[OURS]]
-    return (
-        [f"Asked only some of the {tests[OURS]} tests, for lack of time: {', '.join(part)}."] if part else []
-    )
+    text = f"Asked for ladders of only some of {tests[OURS]} tests, for lack of time: {', '.join(part)}."
+    return [text] if part else []
 
 
 def _not_asked(samples: ranks.Samples) -> list[str]:
