@@ -110,6 +110,7 @@ class _Reader:
     def __init__(self, path: Path, folder: Path) -> None:
         self.path, self.folder = path, folder
         self.files: dict[Path, None] = {}
+        self.parsed_files: dict[Path, None] = {}
         self.attached: dict[Path, ElementTree.Element | None] = {}  # none while it is read
         self.spliced = 0  # elements that came from other files
 
@@ -161,6 +162,7 @@ class _Reader:
     def parsed(self, path: Path, named_in: Path | None = None) -> ElementTree.Element:
         """The XML of one file of the model."""
         content = self.taken(path, named_in or path, MOST_XML).read_bytes()
+        self.parsed_files.setdefault(path)
         try:  # whatever it declares: engines take bytes for UTF-8
             text = content.decode("utf-8-sig")
         except UnicodeDecodeError:
@@ -227,10 +229,10 @@ class _Reader:
         if not written.is_absolute() and all(
             not candidate.resolve().is_relative_to(self.folder) for candidate in candidates
         ):
-            self.inside(candidates[0], _where(said or name, file))
+            self.inside(candidates[0], _where(said or name, file, *self.parsed_files))
         inside = [c for c in candidates if c.resolve().is_relative_to(self.folder)]
         there = next((candidate for candidate in inside if candidate.is_file()), (inside or candidates)[0])
-        return self.taken(there, file if there.is_file() else _where(said or name, file))
+        return self.taken(there, file if there.is_file() else _where(said or name, file, *self.parsed_files))
 
     # MJCF
 
@@ -428,11 +430,13 @@ def _copies(element: ElementTree.Element) -> float:
     return product_of(element.get("count", "1"))
 
 
-def _where(said: str, file: Path) -> str:
-    """A file, and its line that says something."""
-    text = file.read_text(encoding="utf-8-sig", errors="replace")
-    place = text.find(said)
-    return f"{file}, line {text.count(chr(10), 0, place) + 1}," if place >= 0 else str(file)
+def _where(said: str, *files: Path) -> str:
+    """The first of these files that says something, and its line; else the first."""
+    for file in files:
+        text = file.read_text(encoding="utf-8-sig", errors="replace")
+        if (place := text.find(said)) >= 0:
+            return f"{file}, line {text.count(chr(10), 0, place) + 1},"
+    return str(files[0])
 
 
 def _room(element: ElementTree.Element) -> float:

@@ -143,5 +143,5 @@ def _of_model(
             "install it with: pip install 'spook-tracker[mujoco]'"
         ) from None
     if asked.model.format not in READS:
-        raise NotSupported(f"spook reads no {asked.model.format}")
+        raise NotSupported(f"spook reads {' and '.join(READS)}, no {asked.model.format}")
     return run_model(asked, time_step, duration or 0.0, time_limit, method)

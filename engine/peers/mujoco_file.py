@@ -6,6 +6,7 @@ is; a time step other than its own is set in the compiled model.
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 from importlib import import_module
@@ -18,6 +19,7 @@ import numpy.typing as npt
 
 from spook_tracker.engine.errors import EngineError
 from spook_tracker.engine.model_file import Drive, ModelRun, Watched
+from spook_tracker.engine.peers.lacking import place_in, place_of, texts_of
 from spook_tracker.engine.peers.model_loop import Array, LoadedModel, elsewhere
 from spook_tracker.engine.peers.mujoco_shown import Shown
 from spook_tracker.engine.protocol import NotSupported
@@ -47,7 +49,7 @@ def run_model(run: ModelRun, time_step: float, duration: float, time_limit: floa
     try:
         first = load(run)
     except (ValueError, OSError, RuntimeError) as error:
-        raise NotSupported(f"mujoco refuses {Path(run.model.path).name}: {_line(error)}") from None
+        raise NotSupported(f"mujoco refuses {refusal(run, error)}") from None
     loads = [time.perf_counter() - began]
     if run.timed:
         for _ in range(LOADS - 1):
@@ -78,6 +80,19 @@ def load(run: ModelRun) -> Any:
 
 def _unheard(message: str) -> None:
     """MuJoCo would print it and write a log where one stands; a state it resets is found by its counters."""
+
+
+def refusal(run: ModelRun, error: object) -> str:
+    """What MuJoCo says of a file, with the line where the file says what it names, and what helps."""
+    path, said = Path(run.model.path), _line(error)
+    texts, line = texts_of(path), ""
+    if not re.search(r"\bline [1-9]", said):
+        if mesh := re.search(r"file '[^']*?([^'/]+)'", said):
+            line = place_of(texts, mesh[1]) or place_of(texts, re.sub(r"^\d+_", "", mesh[1]))
+        elif element := re.search(r"name '([^']+)'", said):
+            line = place_in(texts, "body", element[1])
+    helps = "; MuJoCo reads meshes as .stl, .obj and .msh: convert it" if "no decoder" in said else ""
+    return f"{path.name}{f', {line}' if line else ''}: {said}{helps}"
 
 
 def _line(error: object) -> str:

@@ -5,7 +5,7 @@ it has one way into the scene, or a name it is refused by: nothing is passed ove
 
 - Bodies without joints between them are one rigid body, in its principal axes.
 - A body with several joints gets light bodies between them, of LIGHT of its mass.
-- A servo of bounded force drives a light carriage on a level rail of the world, which goes as the joint does.
+- Tendons along joints, and servos of bounded force or of several joints, pull light carriages that go as the sums of joints do.
 - Damping, springs and actuators that are linear in place and speed are one compliant row of their joint.
 - Contacts are rigid, as all of this engine's are, whatever solref and solimp say.
 """
@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -23,9 +24,11 @@ import numpy.typing as npt
 from spook_tracker.engine.bodies import WORLD, PairFriction, RigidBody
 from spook_tracker.engine.check import Rotation
 from spook_tracker.engine.couplings import Relation
+from spook_tracker.engine.forces import Force, Load
 from spook_tracker.engine.joints import Ball, Constraint, Hinge, JointSpring, Limit, Lock, Motor, Prismatic
-from spook_tracker.engine.peers.lacking import Lacks
-from spook_tracker.engine.peers.mujoco_drives import FADING, Drives
+from spook_tracker.engine.peers.lacking import Lacks, texts_of
+from spook_tracker.engine.peers.mujoco_drives import Drives
+from spook_tracker.engine.peers.mujoco_rails import FADING, Rails, relaxation, servo_name
 from spook_tracker.engine.peers.mujoco_surfaces import surfaces
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.scene import Scene
@@ -38,7 +41,9 @@ APART = 1e-6  # of the model's extent: how far a tie may be open at the start
 FREE, BALL, SLIDE, HINGE = (
     int(getattr(mujoco.mjtJoint, f"mjJNT_{k}")) for k in ("FREE", "BALL", "SLIDE", "HINGE")
 )
-CONNECTED, WELDED, JOINED = (int(getattr(mujoco.mjtEq, f"mjEQ_{k}")) for k in ("CONNECT", "WELD", "JOINT"))
+CONNECTED, WELDED, JOINED, OF_TENDONS = (
+    int(getattr(mujoco.mjtEq, f"mjEQ_{k}")) for k in ("CONNECT", "WELD", "JOINT", "TENDON")
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,20 +64,16 @@ class Translated:
     moving: Mapping[str, float]  # mass [kg] of rigid bodies that are the file's own
     joints: tuple[str, ...]  # by number; empty for a free one
     drives: Drives
+    has_carriages: bool  # light bodies on rails, which stiff springs pull: explicit methods would need steps as short as these
 
 
-def translate(model: Any, data: Any, *, conservative: bool = False, text: str = "") -> Translated:
-    """The scene that starts as `data` is. Raises NotSupported with all that is lacking, by name and line of `text`.
+def translate(model: Any, data: Any, *, conservative: bool = False, path: Path | None = None) -> Translated:
+    """The scene that starts as `data` is. Raises NotSupported with all that is lacking, by name and by line of the file `path`.
 
     `conservative`: without contacts, limits, actuators, and what damps or rubs.
     """
     mujoco.mj_forward(model, data)
-    return _Translation(model, data, conservative).done(text)
-
-
-def servo_name(actuator: int) -> str:
-    """Of the carriage that a servo of bounded force drives."""
-    return f"servo {actuator}"
+    return _Translation(model, data, conservative).done(path)
 
 
 def still(model: Any) -> npt.NDArray[np.int64]:
@@ -89,6 +90,7 @@ class _Translation:
         self.weld = still(model)
         self.lacks = Lacks()
         self.bodies: list[RigidBody] = []
+        self.forces: list[Force] = []
         self.constraints: list[Constraint] = []
         self.main: dict[int, RigidBody] = {}
         self.joints = [""] * model.njnt
@@ -106,16 +108,18 @@ class _Translation:
             else 0
         )
 
-    def done(self, text: str) -> Translated:
+    def done(self, path: Path | None) -> Translated:
         """The scene, if nothing is lacking."""
         m = self.m
         self.refuse_what_we_lack()
         self.drives = Drives(m, self.d, self.has("ACTUATION"), self.lacks)
+        self.rails = Rails(m, self.d, self.light, self.lacks)
         for body in range(1, m.nbody):
             if self.weld[body] == body:
                 self.body(body)
         for body in self.main:
             self.hang(body)
+        self.pull()
         if self.has("EQUALITY") and self.has("CONSTRAINT"):
             for tie in range(m.neq):
                 if m.eq_active0[tie]:
@@ -133,12 +137,15 @@ class _Translation:
                 for part in parts[1:]
             ]
         if self.lacks:
-            raise NotSupported(f"spook does not support {self.lacks.sentence(text)}")
+            raise NotSupported(
+                f"spook does not support {self.lacks.sentence(texts_of(path) if path else None)}"
+            )
         if not self.bodies:
             raise NotSupported("nothing in the model moves")
         scene = Scene(
             bodies=(*self.bodies, *fixed),
             constraints=tuple(self.constraints),
+            forces=tuple(self.forces),
             gravity=tuple(np.asarray(m.opt.gravity) if self.has("GRAVITY") else np.zeros(3)),
             contacts=touching,
             no_contact=tuple(apart),
@@ -150,6 +157,7 @@ class _Translation:
             {one.name: float(one.mass or 0.0) for one in self.main.values()},
             tuple(self.joints),
             self.drives,
+            bool(self.rails.bodies),
         )
 
     def has(self, flag: str) -> bool:
@@ -162,7 +170,7 @@ class _Translation:
         return found if found and found != WORLD else f"{kind} {number}"
 
     def lack(self, what: str, kind: str, number: int) -> None:
-        self.lacks.add(what, kind, self.name(kind, number))
+        self.lacks.of(what, self.m, kind, number)
 
     def refuse_what_we_lack(self) -> None:
         """Parts of a model that would move something and that no scene of ours can say."""
@@ -171,25 +179,8 @@ class _Translation:
             if count:
                 self.lacks.add(what)
         if not self.conservative and (m.opt.density or m.opt.viscosity):
-            self.lacks.add("a medium (option density, viscosity)")
-        for body in map(int, np.flatnonzero(m.body_gravcomp)):
-            if self.weld[body]:
-                self.lack("gravity compensation", "body", body)
-        for tendon in range(m.ntendon):
-            if why := self.acts(tendon):
-                self.lack(f"a tendon with {why}", "tendon", tendon)
-
-    def acts(self, tendon: int) -> str:
-        """What a tendon would pull with, if anything: those that only measure are none of a scene's business."""
-        m = self.m
-        held = {
-            "stiffness": m.tendon_stiffness[tendon] and self.has("SPRING"),
-            "damping": m.tendon_damping[tendon] and self.has("DAMPER"),
-            "friction": m.tendon_frictionloss[tendon] and self.has("FRICTIONLOSS"),
-            "a limit": m.tendon_limited[tendon] and self.has("LIMIT"),
-            "armature": m.tendon_armature[tendon] if hasattr(m, "tendon_armature") else 0.0,
-        }
-        return next((what for what, there in held.items() if there), "")
+            for geom in map(int, np.flatnonzero(np.asarray(m.geom_fluid)[:, 0])):
+                self.lack("a medium that acts by the shape of geoms (fluidshape)", "geom", geom)
 
     # Bodies
 
@@ -226,6 +217,14 @@ class _Translation:
         )
         self.main[body] = made
         self.bodies.append(made)
+        lifted = set(np.asarray(m.body_gravcomp)[parts[masses > 0.0]].tolist())
+        if len(lifted) > 1:
+            self.lack(
+                "gravity compensation that is not the same in all that is welded together", "body", body
+            )
+        elif self.has("GRAVITY") and (share := lifted.pop()):
+            up = -share * mass * np.asarray(m.opt.gravity)
+            self.forces.append(Load(name=f"lift of {name}", body=name, force=tuple(up)))
 
     def speed(self, body: int, point: Array) -> tuple[Array, Array]:
         """Of a point of a body, and of its turning, in the world's axes."""
@@ -238,7 +237,7 @@ class _Translation:
         whole = self.main.get(int(self.weld[body]))
         if whole is None:
             return Placed("", place.copy(), turn.copy())
-        axes = _matrix(whole.orientation)
+        axes = matrix(whole.orientation)
         return Placed(whole.name, axes.T @ (place - whole.position), axes.T @ turn)
 
     # Joints
@@ -315,7 +314,7 @@ class _Translation:
             limit = Limit(
                 lower=m.jnt_range[number, 0] - here,
                 upper=m.jnt_range[number, 1] - here,
-                damping=_relaxation(m.jnt_solref[number]),
+                damping=relaxation(m.jnt_solref[number]),
             )
         self.constraints.append(
             form(
@@ -337,7 +336,7 @@ class _Translation:
                 self.lack(PUSHES_AWAY, "joint", number)
                 continue
             servo = JointSpring(stiffness=stiff, rest=pulls_to, damping=damping / stiff, max_force=most)
-            self.carriage(number, servo_name(actuator), self.light * float(m.dof_M0[dof]), servo)
+            self.rails.add(servo_name(actuator), [(number, 1.0)], self.joints, spring=servo)
 
     def passive(self, number: int) -> tuple[float, float, float]:
         """Stiffness and damping of a joint by itself, and where its spring rests [m or rad]."""
@@ -368,31 +367,26 @@ class _Translation:
         whole = whole or FADING * damping
         return JointSpring(stiffness=whole, rest=pull / whole, damping=damping / whole)
 
-    def carriage(self, number: int, name: str, mass: float, servo: JointSpring) -> None:
-        """What goes as the joint does, a metre a radian, on a level rail of the world that a servo of bounded force pulls."""
-        gravity = np.asarray(self.m.opt.gravity)
-        rail = np.eye(3)[int(np.argmin(np.abs(gravity)))]
-        rail = rail - gravity * (rail @ gravity) / max(gravity @ gravity, 1e-300)
-        rail /= np.linalg.norm(rail)
-        self.bodies.append(
-            RigidBody(
-                name=name,
-                position=(0.0, 0.0, 0.0),
-                mass=mass,
-                inertia=(mass,) * 3,
-                velocity=tuple(rail * self.qvel(number)),
+    def pull(self) -> None:
+        """What acts on sums of joint coordinates: tendons, and servos of several joints."""
+        m, d = self.m, self.d
+        for tendon in range(m.ntendon):
+            self.rails.tendon(tendon, self.name("tendon", tendon), self.has, self.joints, self.at_site)
+        for actuator, arms in self.drives.servos.items():
+            self.rails.add(
+                servo_name(actuator),
+                arms,
+                self.joints,
+                spring=self.drives.shared(actuator, float(d.actuator_length[actuator])),
+                armature=self.drives.rotor(actuator),
             )
-        )
-        self.constraints += [
-            Prismatic(
-                name=f"rail of {name}", between=(WORLD, name), axis=tuple(rail), compliance=0.0, spring=servo
-            ),
-            Relation(
-                name=f"rack of {name}",
-                terms=((self.joints[number], 1.0), (f"rail of {name}", -1.0)),
-                compliance=0.0,
-            ),
-        ]
+        self.bodies += self.rails.bodies
+        self.constraints += self.rails.constraints
+
+    def at_site(self, site: int) -> tuple[str, Array]:
+        """The rigid body that carries a site, or the world, and where it is."""
+        whole = self.main.get(int(self.weld[self.m.site_bodyid[site]]))
+        return whole.name if whole else WORLD, self.d.site_xpos[site].copy()
 
     # Equality constraints
 
@@ -400,6 +394,11 @@ class _Translation:
         kind = int(self.m.eq_type[tie])
         if kind == JOINED:
             return self.couple(tie)
+        if kind == OF_TENDONS:
+            made = self.rails.tie(tie, self.joints, APART)
+            return (
+                self.lack(made, "equality", tie) if isinstance(made, str) else self.constraints.append(made)
+            )
         if kind not in (CONNECTED, WELDED):
             return self.lack(f"equality constraints of kind {_word(mujoco.mjtEq(kind))}", "equality", tie)
         (one, here, axes), (two, there, others) = self.ends(tie)
@@ -452,16 +451,10 @@ class _Translation:
             Relation(
                 name=f"equality {self.name('equality', tie)}",
                 terms=((self.joints[one], 1.0), (self.joints[two], -float(c[1]))),
-                damping=_relaxation(m.eq_solref[tie]),
+                damping=relaxation(m.eq_solref[tie]),
             )
         )
         return None
-
-
-def _relaxation(solref: Any) -> float:
-    """In what time [s] a violation goes: the time constant, or damping over stiffness where these are given (below zero)."""
-    first, second = float(solref[0]), float(solref[1])
-    return first if first > 0.0 else second / first if first else 0.0
 
 
 def _word(value: Any) -> str:
@@ -476,7 +469,7 @@ def _quaternion(axes: Array) -> Rotation:
     return w, x, y, z
 
 
-def _matrix(turn: Any) -> Array:
+def matrix(turn: Any) -> Array:
     found = np.zeros(9)
     mujoco.mju_quat2Mat(found, np.asarray(turn))
     return found.reshape(3, 3)

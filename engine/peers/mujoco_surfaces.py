@@ -96,7 +96,7 @@ class _Surfaces:
             values = getattr(m, f"geom_{kind}", np.zeros(m.ngeom))
             for geom in range(m.ngeom):
                 if np.any(values[geom]) and self.meets[geom].any():
-                    self.lacks.add(what, "geom", self.label(geom))
+                    self.lacks.of(what, self.m, "geom", geom)
         if m.opt.enableflags & int(mujoco.mjtEnableBit.mjENBL_OVERRIDE):
             self.lacks.add("one friction and softness for all contacts (flag override)")
         for pair, (one, two) in enumerate(zip(m.pair_geom1, m.pair_geom2, strict=True)):
@@ -168,7 +168,7 @@ class _Surfaces:
                         else self.moving(whole, name, same, len(alike))
                     )
                 except SceneError as error:
-                    self.lacks.add(f"a surface as this one: {error}", "geom", self.label(same[0]))
+                    self.lacks.of(f"a surface as this one: {error}", self.m, "geom", same[0])
                     continue
                 if one is not None:
                     geoms[name] = same[0]
@@ -227,7 +227,7 @@ class _Surfaces:
         for geom in geoms:
             shape = self.shape(geom)
             if shape is None or isinstance(shape, Plane | HeightField):
-                self.lacks.add(f"a geom of kind {self.kind(geom)} on what moves", "geom", self.label(geom))
+                self.lacks.of(f"a geom of kind {self.kind(geom)} on what moves", self.m, "geom", geom)
                 continue
             place = turn.T @ (self.d.geom_xpos[geom] - body.position)
             axes = turn.T @ self.d.geom_xmat[geom].reshape(3, 3)
@@ -243,7 +243,7 @@ class _Surfaces:
     def standing(self, name: str, geom: int) -> RigidBody | None:
         shape = self.shape(geom)
         if shape is None:
-            self.lacks.add(f"a geom of kind {self.kind(geom)}", "geom", self.label(geom))
+            self.lacks.of(f"a geom of kind {self.kind(geom)}", self.m, "geom", geom)
             return None
         place, turn = self.d.geom_xpos[geom], self.d.geom_xmat[geom].reshape(3, 3)
         if isinstance(shape, HeightField):

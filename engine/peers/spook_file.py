@@ -26,8 +26,19 @@ from spook_tracker.engine.observe import (
     Violation,
 )
 from spook_tracker.engine.peers.model_loop import Array, LoadedModel, elsewhere, resident
-from spook_tracker.engine.peers.mujoco_file import LOADS, alter, bodies_of, driven, load, size_of, start_at
-from spook_tracker.engine.peers.mujoco_scene import Placed, Translated, servo_name, translate
+from spook_tracker.engine.peers.mujoco_file import (
+    LOADS,
+    alter,
+    bodies_of,
+    driven,
+    load,
+    refusal,
+    size_of,
+    start_at,
+)
+from spook_tracker.engine.peers.mujoco_medium import Medium
+from spook_tracker.engine.peers.mujoco_rails import servo_name
+from spook_tracker.engine.peers.mujoco_scene import Placed, Translated, matrix, translate
 from spook_tracker.engine.peers.mujoco_shown import Shown
 from spook_tracker.engine.peers.mujoco_surfaces import hull_of
 from spook_tracker.engine.protocol import NotSupported
@@ -36,9 +47,9 @@ from spook_tracker.engine.run import Run, start
 from spook_tracker.engine.scene import Scene
 
 READS = ("MJCF", "URDF")
-ACCURATE = (  # from the best on: the first that a scene allows
-    Method(runge_kutta="order8", tolerance=1e-11),
-    Method(composition="order6"),
+# The most accurate settings, from the best on: the first that a scene allows
+EXPLICIT = (Method(runge_kutta="order8", tolerance=1e-11), Method(composition="order6"))
+IMPLICIT = (
     Method(half_step_velocities=True, corrections=2),
     Method(half_step_velocities=True),
     PLAIN,
@@ -72,10 +83,7 @@ def compiled(run: ModelRun) -> Any:
     try:
         return load(run)
     except (ValueError, OSError, RuntimeError) as error:
-        said = " ".join(str(error).split())[:240]
-        raise NotSupported(
-            f"spook reads by MuJoCo's parser, which refuses {Path(run.model.path).name}: {said}"
-        ) from None
+        raise NotSupported(f"spook reads by MuJoCo's parser, which refuses {refusal(run, error)}") from None
 
 
 class _Simulation(LoadedModel):
@@ -94,24 +102,32 @@ class _Simulation(LoadedModel):
         self.size = size_of(run, model, self.data)
         watched = bodies_of(run, model)
         self.made: Translated = translate(
-            model, self.data, conservative=run.conservative or run.swing > 0.0, text=_text(run)
+            model, self.data, conservative=run.conservative or run.swing > 0.0, path=Path(run.model.path)
         )
         self.watched = [self.made.bodies[body] for body in watched]
         self.freedom = 3 * len(self.made.moving)
         self.pushed = [f"push on {name}" for name in self.made.moving]
         self.masses = np.array([*self.made.moving.values()])[:, None]  # kg
+        medium = (model.opt.density or model.opt.viscosity) and not (run.conservative or run.swing)
+        self.medium = Medium(model, self.made.bodies) if medium else None
+        changing = self.varies or (not run.conservative and self.made.drives.changes())
+        self.controlled, self.varies = changing, changing or self.medium is not None
         self.held = self._started(method)
         self.read()
 
     def _started(self, method: Method) -> Run:
         scene = self.made.scene
+        loads = [
+            Load(name=f"medium on {body}", body=body) for body in (self.medium.names if self.medium else ())
+        ]
         if self.is_pushed:
-            loads = (
+            loads += [
                 Load(name=load, body=body) for load, body in zip(self.pushed, self.made.moving, strict=True)
-            )
-            scene = replace(scene, forces=(*scene.forces, *loads))
+            ]
+        scene = replace(scene, forces=(*scene.forces, *loads))
         refused: MethodError | None = None
-        for one in ACCURATE if self.run.accurate else (method,):
+        accurate = IMPLICIT if self.made.has_carriages else (*EXPLICIT, *IMPLICIT)
+        for one in accurate if self.run.accurate else (method,):
             try:
                 return start(scene, time_step=self.step, method=one, observe=self._observed(scene))
             except MethodError as error:
@@ -148,8 +164,14 @@ class _Simulation(LoadedModel):
         self.held.set_loads(dict(zip(self.pushed, forces.tolist(), strict=True)))
 
     def control(self) -> None:
-        if not self.varies:
-            return
+        """What acts through the next step: the medium as it is at its begin, and controls where they vary."""
+        if self.medium:
+            for name, (force, torque) in self.medium.wrenches(self.held.state).items():
+                self.held.set_load(f"medium on {name}", force=tuple(force), torque=tuple(torque))
+        if self.controlled:
+            self._drive()
+
+    def _drive(self) -> None:
         self.data.time = self.held.time
         self.drive.apply(self.data)
         drives = self.made.drives
@@ -161,6 +183,10 @@ class _Simulation(LoadedModel):
             for actuator, arm in drives.bounded(joint):
                 rest = drives.servo(joint, actuator, arm, here)[1]
                 self.held.set_rest(f"rail of {servo_name(actuator)}", rest)
+        for actuator in drives.servos:
+            rest = drives.rest(actuator, float(self.data.actuator_length[actuator]))
+            self.held.set_rest(f"rail of {servo_name(actuator)}", rest)
+        drives.pass_on(self.step)
 
     def read(self) -> None:
         self.now = self.held.state
@@ -182,7 +208,7 @@ class _Simulation(LoadedModel):
         for one in bodies:
             place, turn = one.place, one.turn
             if one.name:
-                axes = _matrix(self.now[one.name][3:7])
+                axes = matrix(self.now[one.name][3:7])
                 place, turn = self.now[one.name][:3] + axes @ place, axes @ turn
             places.append(place)
             turns.append(_quaternion(turn))
@@ -220,16 +246,6 @@ class _Simulation(LoadedModel):
         if self.run.timed:
             found["megabytes"] = np.array(self.megabytes)
         return found
-
-
-def _text(run: ModelRun) -> str:
-    return Path(run.model.path).read_text(encoding="utf-8", errors="replace")
-
-
-def _matrix(turn: Array) -> Array:
-    found = np.zeros(9)
-    mujoco.mju_quat2Mat(found, turn)
-    return found.reshape(3, 3)
 
 
 def _quaternion(axes: Array) -> Array:

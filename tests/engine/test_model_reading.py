@@ -142,6 +142,10 @@ BOMB = '<!DOCTYPE m [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><mujoco><worldbody
         ('<mujoco><worldbody><include/></worldbody></mujoco>', "does not name"),
         (CART.replace("meshes", "elsewhere"), r"robot.xml, line 2, names .*elsewhere.wheel.stl, which is no file"),
         ('<mujoco><worldbody><include file="parts\\gone.xml"/></worldbody></mujoco>', "parts/gone.xml, which is no file"),
+        (
+            '<mujoco><include file="parts/hand.xml"/></mujoco>',
+            r"hand.xml, line 2, names .*elsewhere.wheel.stl, which is no file",
+        ),
         (ATTACHED.replace("arm.xml", "loop.xml"), "loop.xml, which attaches it"),
         (ATTACHED.replace("arm.xml", "doubled0.xml"), r"includes or attaches more than 1e\+06 elements"),
         ("<mujoco><worldbody>" + '<replicate count="10000"><body/></replicate>' * 60 + "</worldbody></mujoco>", "elements with all copies"),
@@ -183,6 +187,7 @@ def test_what_cannot_be_read_is_one_sentence_that_names_the_file(
     (tmp_path / "models/parts/bomb.png").write_bytes(
         b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + struct.pack(">II", 30000, 30000)
     )
+    (tmp_path / "models/parts/hand.xml").write_text(CART.replace("meshes", "elsewhere"))
     (tmp_path / "models/parts/torn.dae").write_bytes(b"<COLLADA\xff\x00")
     (tmp_path / "models/parts/loop.xml").write_text(ATTACHED.replace("parts/arm.xml", "loop.xml"))
     for k in range(21):
@@ -198,7 +203,8 @@ def test_what_cannot_be_read_is_one_sentence_that_names_the_file(
 
     assert "\n" not in str(raised.value)
     assert any(
-        name in str(raised.value) for name in ("robot.xml", "loop.xml", "model.sdf", ".dae", ".obj", ".png")
+        name in str(raised.value)
+        for name in ("robot.xml", "hand.xml", "loop.xml", "model.sdf", ".dae", ".obj", ".png")
     )
 
 
