@@ -1,4 +1,4 @@
-"""Five facts about kinds of engines, as questions put to every engine in every setting: FACTS, a catalogue.
+"""Eight facts about kinds of engines, as questions put to every engine in every setting: FACTS, a catalogue.
 
     tracker run --engine mujoco --catalogue bench.engine_facts:FACTS
 
@@ -17,16 +17,21 @@ asks what makes itself MuJoCo again, in XLA or Warp, how far it is from MuJoCo w
 from __future__ import annotations
 
 import contextlib
+import math
+from collections.abc import Callable
 from functools import partial
 
 import numpy as np
 
+import spook_tracker.scalar_tests.pendulum.scene as pendulum
 from spook_tracker.engine import (
+    PLAIN,
     Ball,
     Energy,
     Final,
     Hinge,
     Limit,
+    MaximumAbsolute,
     Particle,
     Position,
     Result,
@@ -39,9 +44,11 @@ from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.scalar_tests.beam.scene import COUNT as BOXES
 from spook_tracker.scalar_tests.beam.scene import scene as beam
 from spook_tracker.scalar_tests.case import Example, Measurement, Metric, ScalarTest, Simulate
-from spook_tracker.scalar_tests.chain import level_chain
+from spook_tracker.scalar_tests.chain import LENGTH, MASS, hanging_chain, level_chain
 from spook_tracker.scalar_tests.door.scene import forces, least_norm_forces
 from spook_tracker.scalar_tests.inclined_plane.scene import scene as slope
+from spook_tracker.scalar_tests.resting_stack import EDGE
+from spook_tracker.scalar_tests.resting_stack import scene as stack
 
 TIME_STEP = 1.0 / 60.0  # s
 LINKS, SWING = 26, 22.0  # s, as long as the thesis lets its chain swing
@@ -49,6 +56,9 @@ HINGES = 10
 FALL_STEPS = 30  # half a second
 STANDING, LANDED, STAND = 0.3, 1.0, 10.0  # slope, below the friction coefficient of 0.5; s
 FLIGHT, FLIGHT_STEPS = 10.0, 1000  # m, in one second
+ORDER_LASTS = 1.0  # s
+RATIOS = tuple(10.0**k for k in range(7))
+HUNG_LINKS, LEAN, CARRIED_LASTS, GIVES_WAY = 10, 0.01, 2.0, 0.01  # rad, s, of a link's or a box's length
 ARM_LINKS, LINK, LINK_MASS, STOP, ARM_FALL = 6, 0.1, 0.1, 0.5, 2.0  # m, kg, rad either way, s
 ROUNDED = 1e-3  # J, of the 1.8 J that it lacks when it hangs straight down
 TWIN_STEP, TWIN_LASTS, EQUAL, SLIDING = 1.0 / 240.0, 1.0, 1e-9, 0.7  # s, s, m, slope
@@ -106,6 +116,56 @@ def lost_digits(simulate: Simulate) -> dict[str, float]:
     seen = {"place": Final(quantity=Position("ball"))}
     end: Result = simulate(built, time_step=1.0 / FLIGHT_STEPS, steps=FLIGHT_STEPS, observe=seen)
     return {"lost_digits": abs(float(end["place"][0]) / FLIGHT - 1.0)}
+
+
+def order(simulate: Simulate) -> dict[str, float]:
+    """How fast a pendulum's error falls with its step, from 1/60 to 1/240 s: log₄ of the ratio of the errors [1].
+
+    Where the coarser error is rounding already, this is no order; it is what came out.
+    """
+    errors = []
+    for time_step in (TIME_STEP, TIME_STEP / 4.0):
+        times, found = pendulum.traced_angle(simulate, time_step, ORDER_LASTS, PLAIN)
+        errors.append(float(np.abs(found - pendulum.angle(times)).max()))
+    return {"order": math.log(errors[0] / errors[1], 4.0)}
+
+
+def hung(simulate: Simulate) -> dict[str, float]:
+    """The greatest load, of a power of ten times a link's mass, that a chain of ten links carries (0: not even its own)."""
+    seen = {"places": Trace(quantity=Position())}
+
+    def carried(ratio: float) -> bool:
+        built = hanging_chain(HUNG_LINKS, TIME_STEP, load=ratio * MASS, compliance=0.0, tilt=LEAN)
+        result = simulate(built, time_step=TIME_STEP, duration=CARRIED_LASTS, observe=seen)
+        if result.status not in ("completed", "unsettled"):
+            return False
+        places = np.insert(result["places"], 0, 0.0, axis=1)
+        stretched = np.linalg.norm(np.diff(places, axis=1), axis=2) - LENGTH
+        return bool(np.abs(stretched).max() <= GIVES_WAY * LENGTH)
+
+    return {"hung": _greatest(carried)}
+
+
+def stacked(simulate: Simulate) -> dict[str, float]:
+    """The greatest mass, of a power of ten times that of a box, of a box that it carries (0: not even its equal)."""
+    seen = {"moved": MaximumAbsolute(quantity=Position(), from_start=True)}
+
+    def carried(ratio: float) -> bool:
+        result = simulate(
+            stack(2, (MASS, ratio * MASS)), time_step=TIME_STEP, duration=CARRIED_LASTS, observe=seen
+        )
+        return result.status in ("completed", "unsettled") and bool(result["moved"].max() <= GIVES_WAY * EDGE)
+
+    return {"stacked": _greatest(carried)}
+
+
+def _greatest(carried: Callable[[float], bool]) -> float:
+    held = 0.0
+    for ratio in RATIOS:
+        if not carried(ratio):
+            break
+        held = ratio
+    return held
 
 
 def _flying() -> RigidBody:
@@ -272,6 +332,30 @@ FACTS = {
         lost_digits,
         lambda: Example(scene=Scene(bodies=(_flying(),)), time_step=1.0 / FLIGHT_STEPS),
         (1.0 / FLIGHT_STEPS,),
+    ),
+    "fact_order": _fact(
+        "Of what order is a swing",
+        "order",
+        "1",
+        "log₄ of the largest error of a pendulum's angle within a second at 1/60 s over that at 1/240 s",
+        order,
+        lambda: Example(scene=pendulum.scene(TIME_STEP), time_step=TIME_STEP),
+    ),
+    "fact_hung": _fact(
+        f"How heavy a load does a chain of {HUNG_LINKS} links carry",
+        "hung",
+        "1",
+        f"greatest power of ten (up to 10⁶) of a load over a link's mass with no link off by 1 % for {CARRIED_LASTS:g} s",
+        hung,
+        lambda: Example(scene=hanging_chain(HUNG_LINKS, TIME_STEP), time_step=TIME_STEP),
+    ),
+    "fact_stacked": _fact(
+        "How heavy a box does a box carry",
+        "stacked",
+        "1",
+        f"greatest power of ten (up to 10⁶) of masses with neither moved by 1 % of its edge for {CARRIED_LASTS:g} s",
+        stacked,
+        lambda: Example(scene=stack(2), time_step=TIME_STEP),
     ),
 }
 

@@ -18,6 +18,7 @@ SINGLE = (
     "box3d",
     "jolt",
     "motrixsim",
+    "newton",
     "rapier",
     "rapier3d",
     "sapien",

@@ -46,6 +46,7 @@ OURS = engine_places.OURS
 FACTS = "bench.engine_facts:FACTS"
 # Take seconds to compile a scene: asked last, where time is short.
 COMPILED = ("mujoco_warp", "newton", "mjx")
+TWINS = ("mujoco_warp", "mjx")  # of MuJoCo, asked how far from it: each fact would compile a dozen scenes
 FACT_LIMIT = 5.0  # s of one simulation
 KEPT = Path(__file__).parents[1] / "build" / "engines" / "jax"  # what JAX compiles, as Warp keeps its own
 # Of every engine, ours included: short runs are timed three times, what takes longer than this many seconds twice, visiting
@@ -116,7 +117,7 @@ def measure(
             print(f"{name}: the {minutes:g} minutes are over; of it only what was finished", flush=True)
         tracker.record(document, database)
         if not tests:
-            if name not in COMPILED:  # the time of a fact would go into compiling it
+            if name not in TWINS:
                 measure_facts([name], facts)
             took = time.perf_counter() - begin
             recorded.add_occasion(
@@ -145,8 +146,12 @@ def without_a_run(names: Sequence[str], database: str) -> list[str]:
 
 
 def _newest(history: tracker.History) -> dict[str, Any]:
-    """The newest run of each engine."""
-    return {run.engine.name: run for run in history.runs()}
+    """The run of each engine that started last, of whatever version."""
+    return {run.engine.name: run for run in sorted(history.runs(), key=_started)}
+
+
+def _started(run: Any) -> str:
+    return str(run.started)
 
 
 def nights(history: tracker.History) -> dict[str, list[Any]]:
@@ -156,7 +161,7 @@ def nights(history: tracker.History) -> dict[str, list[Any]]:
     """
     found: dict[str, list[Any]] = {}
     whole: set[str] = set()
-    for run in reversed(history.runs()):
+    for run in sorted(history.runs(), key=_started, reverse=True):
         name = run.engine.name
         told = found.setdefault(name, [])
         if name in whole or (told and name != OURS and told[0].engine.version != run.engine.version):
@@ -213,7 +218,7 @@ def page(database: str, of_facts: str = "") -> str:
         "",
         *engine_places.choice(run),
         *engine_places.single(run),
-        *_facts(facts),
+        *engine_kinds.table(facts),
         *engine_settings.SETTINGS,
         *engine_kinds.ARM,
         *engine_kinds.TWINS,
@@ -316,17 +321,15 @@ def _rungs(samples: Mapping[str, ranks.Samples], runs: Mapping[str, Sequence[Any
         bound = _limits(found)
         others = len(found) - outcomes["value"] - outcomes["timed_out"] - outcomes["not_supported"]
         took = _minutes(runs[name])
-        rows.append(
-            (
-                name,
-                outcomes["value"],
-                outcomes["timed_out"],
-                bound or "-",
-                others,
-                outcomes["not_supported"],
-                took,
-            )
+        row = (
+            name,
+            outcomes["value"],
+            outcomes["timed_out"],
+            bound or "-",
+            others,
+            outcomes["not_supported"],
         )
+        rows.append((*row, took))
     return [
         "## Rungs of the ladders, and what was left out",
         "",
@@ -383,61 +386,6 @@ READING = (
     "in every stage, where there is a motor, too: there the run times of these seven are Python's more than theirs. All",
     "others push in their own loop.",
 )
-
-
-def _facts(samples: Mapping[str, ranks.Samples]) -> list[str]:
-    """The facts, a row for each setting of each engine."""
-    cells: dict[tuple[str, str], dict[str, str]] = {}
-    columns: dict[str, str] = {}
-    for name, told in samples.items():
-        for definition, sample in told.values():
-            assert definition.time_step is not None
-            place = f"{definition.test} {definition.time_step:g}"
-            steps = (
-                f", h = 1/{round(1.0 / definition.time_step)} s" if definition.test == "fact_chain" else ""
-            )
-            columns.setdefault(place, f"{HEADS[definition.test]}{steps}")
-            setting = definition.configuration if name != OURS else "plain"
-            answered = sample.outcome in ("value", "unsettled", "out_of_limit")
-            said = "-" if sample.outcome == "not_supported" else sample.outcome.replace("_", " ")
-            cells.setdefault((name, setting), {})[place] = number(sample.value, 2) if answered else said
-    if not cells:
-        return []
-    rows = [
-        f"| {name} ({setting}) | " + " | ".join(row.get(place, "-") for place in columns) + " |"
-        for (name, setting), row in cells.items()
-        if set(row.values()) != {"-"}
-    ]
-    shown, lacking = engine_kinds.carried(
-        {
-            f"{name} ({setting})": [row.get(place, "-") for place in columns]
-            for (name, setting), row in cells.items()
-        }
-    )
-    for words in lacking:
-        print(f"left out, the table does not show it: {words}", flush=True)
-    return [
-        "## What kinds of engines do",
-        "",
-        KINDS,
-        "",
-        *shown,
-        *([""] if shown else []),
-        "| engine (setting) | " + " | ".join(columns.values()) + " |",
-        "|---|" + "---|" * len(columns),
-        *rows,
-        "",
-    ]
-
-
-HEADS = {
-    "fact_chain": "chain of 26: energy gained [%]",
-    "fact_door": "door on 10 hinges: unevenness",
-    "fact_beam": "80 boxes: sag in 0.5 s [m]",
-    "fact_creep": "box held by friction: creep in 10 s [m]",
-    "fact_digits": "uniform motion: relative error",
-}
-KINDS = "Five questions whose answers follow from how an engine is made, in every setting of what compiles no scene (`bench/engine_facts.py` states them):"
 
 
 def _behind(races: Sequence[ranks.Race], known: Causes) -> list[str]:

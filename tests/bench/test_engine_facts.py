@@ -11,9 +11,11 @@ import pytest
 import bench.engine_kinds as engine_kinds
 from bench.engine_facts import FACTS, TWINS
 from bench.engine_places import SINGLE
-from spook_tracker.engine import simulate
+from spook_tracker.engine import PLAIN, Method, simulate
 from spook_tracker.engine.find import find
 from spook_tracker.engine.result import SimulationFailed
+from spook_tracker.scalar_tests.case import Simulate
+from spook_tracker.scalar_tests.hanging_chain.stability import predicted_break
 from tests.places import ROOT
 
 PAGE = ROOT / "docs" / "engines.md"
@@ -56,6 +58,9 @@ def test_the_page_says_what_its_table_of_kinds_shows() -> None:
         ("spook (plain)", 3, "1.4", "A beam of 80 locked boxes"),
         ("spook (plain)", 4, "0.1", "A box"),
         ("rapier (defaults)", 5, "1.7×10⁻¹⁴", "Uniform motion"),
+        ("newton (xpbd)", 6, "2", "A pendulum"),
+        ("sapien (pgs)", 7, "1000", "A load on a light chain"),
+        ("newton (xpbd)", 8, "10⁶", "A heavy box on a light one"),
     ],
 )
 def test_a_sentence_that_the_table_does_not_carry_is_left_out(
@@ -140,3 +145,25 @@ def test_ours_shows_none_of_them() -> None:
     assert FACTS["fact_door"].measurements[0].measure(simulate)["unevenness"] < 1e-12
     assert FACTS["fact_beam"].measurements[0].measure(simulate)["sag"] < 1e-12
     assert FACTS["fact_creep"].measurements[0].measure(simulate)["creep"] < 1e-12
+
+
+def test_ours_carries_a_load_up_to_its_explicit_bound_and_any_box() -> None:
+    assert FACTS["fact_hung"].measurements[0].measure(simulate)["hung"] <= predicted_break()
+    assert FACTS["fact_hung"].measurements[0].measure(simulate)["hung"] > 0.1 * predicted_break()
+    assert FACTS["fact_stacked"].measurements[0].measure(simulate)["stacked"] == 1e6
+
+    few = partial(simulate, method=Method(solver="iterative", iterations=5))
+    assert FACTS["fact_stacked"].measurements[0].measure(few)["stacked"] < 1e3
+
+
+def test_a_pendulum_shows_the_order_of_a_method() -> None:
+    def by(method: Method) -> Simulate:
+        return lambda scene, **options: simulate(scene, **(options | {"method": method}))
+
+    for method, order in (
+        (PLAIN, 1.0),
+        (Method(half_step_velocities=True, corrections=2), 2.0),
+        (Method(composition="order4"), 4.0),
+    ):
+        found = FACTS["fact_order"].measurements[0].measure(by(method))["order"]
+        assert found == pytest.approx(order, abs=0.1), method

@@ -174,3 +174,15 @@ def test_featherstone_comes_apart_on_an_arm_with_stops_that_mujoco_holds() -> No
         with pytest.raises(SimulationFailed, match="not finite"):
             measurement.measure(run("featherstone"))
         assert measurement.measure(run("mujoco"))["energy_gain"] < 1e-4
+
+
+def test_xpbd_is_of_order_one_and_carries_a_hundred_times_a_link_or_a_box() -> None:
+    asked = {
+        name: engine_facts.FACTS[f"fact_{name}"].measurements[0].measure
+        for name in ("order", "hung", "stacked")
+    }
+
+    assert asked["order"](run("xpbd"))["order"] == pytest.approx(1.0, abs=0.05)
+    assert asked["hung"](run("xpbd"))["hung"] == 100.0
+    assert asked["stacked"](run("xpbd"))["stacked"] == 100.0
+    assert asked["stacked"](run("mujoco"))["stacked"] >= 1e4
