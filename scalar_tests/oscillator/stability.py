@@ -49,9 +49,13 @@ def predicted_growth(speed: float, theta: float) -> float:
 
 def _growth(matrix: np.ndarray, speed: float, theta: float, steps: int) -> float:
     """Largest |eigenvalue| per step. Where the method says that the pair is complex, however nearly double,
-    the determinant gives it to rounding; trace and determinant would lose half the digits there."""
-    if one_row_oscillates(MASS, 1.0 / stiffness_of(speed), theta * TIME_STEP, TIME_STEP):
-        return math.pow(float(np.linalg.det(matrix)), 0.5 / steps)
+    the determinant gives it to rounding; trace and determinant would lose half the digits there. Of another
+    method's pair, real and of unlike signs, there is no such root."""
+    determinant = float(np.linalg.det(matrix))
+    if determinant > 0.0 and one_row_oscillates(
+        MASS, 1.0 / stiffness_of(speed), theta * TIME_STEP, TIME_STEP
+    ):
+        return math.pow(determinant, 0.5 / steps)
     return growth(matrix, steps)
 
 
