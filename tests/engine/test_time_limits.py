@@ -188,7 +188,7 @@ def test_the_clock_runs_while_a_scene_is_compiled(side: int, limit: float) -> No
 
 
 def test_a_held_run_tells_in_time_how_far_it_came() -> None:
-    scene, method = wedged(600, Method(half_step_velocities=True))
+    scene, method = wedged(300, Method(half_step_velocities=True))
     with start(scene, time_step=TIME_STEP, method=method, observe={"energy": Energy()}) as run:
         began = time.process_time()
         with pytest.raises(SimulationFailed) as failed:

@@ -23,6 +23,10 @@ from tests.team.repository import git  # noqa: E402
 from tests.team.workflow_service import Service  # noqa: E402 (needs yaml)
 
 TRACK = ROOT / ".github" / "workflows" / "track.yml"
+# What the adapter can be asked, and a scene each of bodies, contacts and constraints that it cannot.
+SOME = """from spook_tracker.scalar_tests.catalogue import CATALOGUE as ALL
+CATALOGUE = {name: ALL[name] for name in ("falling_object", "pendulum", "spinning_top", "resting_stack", "oscillator_spring")}
+"""
 WRITTEN = ["tracking/__init__.py", "tracker.toml", ".github/workflows/physics.yml", "tracking/adapter.py"]
 
 
@@ -43,6 +47,7 @@ def test_the_first_night_is_green_and_a_planted_breach_red(
     clone, origin, programs = tmp_path / "marble", tmp_path / "origin.git", tmp_path / "programs"
     clone.mkdir()
     assert init(clone, monkeypatch, "marble", "--build", "true").exit_code == 0
+    (clone / "tracking" / "some.py").write_text(SOME)
     git(clone, "init", "-q", "-b", "main")
     git(clone, "add", ".")
     git(clone, "commit", "-q", "-m", "Begin")
@@ -54,7 +59,7 @@ def test_the_first_night_is_green_and_a_planted_breach_red(
     for name in [name for name in os.environ if name.startswith("TRACKER")]:
         monkeypatch.delenv(name)
     service = Service(origin, tmp_path / "ci", programs)
-    given = called(clone)["with"] | {"options": "--quick --workers 1"}
+    given = called(clone)["with"] | {"options": "--quick --workers 1 --catalogue tracking.some"}
 
     first = service.run(TRACK, "schedule", "main", **given)
     adapter = clone / "tracking" / "adapter.py"

@@ -1,7 +1,7 @@
-"""Every kind of page, at four widths, light and dark: nothing is cut, nothing overlaps, and axe finds nothing.
+"""Every kind of page, at four widths, light and dark: nothing complains, is cut or overlaps, charts are drawn, axe finds nothing.
 
-How a page is laid out is asked in all eight looks. Axe takes its time: each page meets it in two of them, in turn,
-so that all eight come up; in all of all with SPOOK_TEST_EVERY_LOOK (`make looks`, weekly).
+How a page is laid out is asked at every width, and in the dark at one, as colours move nothing. Axe takes its time: each
+page meets it in one look, in turn, so that all eight come up; with SPOOK_TEST_EVERY_LOOK (`make looks`, weekly) all of all.
 """
 
 import os
@@ -14,7 +14,8 @@ from spook_tracker.tracker.website.options import SiteOptions
 from spook_tracker.tracker.website.publish import publish
 from tests.histories.synthetic import DocumentHistory, with_rival
 from tests.places import ROOT
-from tests.website.browser import CONTRAST, LIVE, SEEN, STILL, arrive, look, wait_for
+from tests.website.browser import CONTRAST, LIVE, SEEN, STILL, look, wait_for
+from tests.website.test_browser import DRAWN, complaints, visit
 from tests.website.test_causes import nights
 from tests.website.test_causes import recorded as recorded  # a fixture
 
@@ -32,7 +33,7 @@ document.querySelector('figure.replay')?.scrollIntoView();
 """
 AXE = """
 const done = arguments[arguments.length - 1];
-axe.run(document, { resultTypes: ['violations'], iframes: false }).then(
+axe.run(document, { resultTypes: ['violations'], iframes: false, preload: false }).then(
   (found) => done(found.violations.flatMap((v) => v.nodes.map((n) => `${v.id} (${v.impact}): ${n.target.join(' ')}`))));
 """
 LAID_OUT = """
@@ -103,50 +104,51 @@ def settle(driver):
     )
 
 
-def by_axe(place):
-    """The looks in which a page meets axe: two of the eight, with all eight in any four pages."""
-    if os.environ.get("SPOOK_TEST_EVERY_LOOK"):
-        return {(width, dark) for width in WIDTHS for dark in (False, True)}
-    return {(WIDTHS[place % 4], False), (WIDTHS[(place + 2) % 4], True)}
+def looks(place):
+    """The looks in which a page is seen, and whether by axe, too: all eight of them in any eight pages."""
+    every = bool(os.environ.get("SPOOK_TEST_EVERY_LOOK"))
+    width, theme = WIDTHS[place % 4], place // 4 % 2 == 1
+    dark = WIDTHS if every else (width,)
+    return [
+        *((w, False, every or (w == width and not theme)) for w in WIDTHS),
+        *((w, True, every or theme) for w in dark),
+    ]
 
 
 @pytest.mark.parametrize("page", PAGES)
 def test_a_page_is_accessible_at_every_width(driver, site, axe, page):
     """With all that unfolds unfolded, and a replay or a run in view that has begun."""
-    asked = by_axe(PAGES.index(page))
-    found = []
-    for dark in (False, True):
-        look(driver, width=WIDTHS[0], height=900, dark=dark)
-        arrive(driver, (site / page).resolve().as_uri())
-        driver.execute_script(axe)
-        driver.execute_script(OPENED)
-        assert driver.execute_script("return document.documentElement.dataset.theme") == (
-            "dark" if dark else "light"
-        )
-        found += [
-            f"{page} {'dark' if dark else 'light'}: pale: {text}" for text in driver.execute_script(CONTRAST)
-        ]
-        for width in WIDTHS:
-            look(driver, width=width, height=900, dark=dark)
-            settle(driver)
-            where = f"{page} {width} px {'dark' if dark else 'light'}"
-            found += [f"{where}: {told}" for told in driver.execute_script(LAID_OUT)]
-            if (width, dark) in asked:
-                found += [f"{where}: {told}" for told in driver.execute_async_script(AXE)]
+    visit(driver, site, page, width=WIDTHS[0], dark=False)
+    driver.execute_script(axe)
+    driver.execute_script(OPENED)
+    found, shown = [], None
+    for width, dark, by_axe in looks(PAGES.index(page)):
+        look(driver, width=width, dark=dark)
+        where = f"{page} {width} px {'dark' if dark else 'light'}"
+        if dark != shown:
+            theme = "dark" if dark else "light"
+            wait_for(driver, "document.documentElement.dataset.theme === arguments[0]", theme)
+            found += [f"{where}: pale: {text}" for text in driver.execute_script(CONTRAST)]
+            shown = dark
+        settle(driver)
+        found += [f"{where}: {told}" for told in driver.execute_script(LAID_OUT)]
+        if by_axe:
+            found += [f"{where}: {told}" for told in driver.execute_async_script(AXE)]
+    drawn = driver.execute_async_script(DRAWN) if page != "document.html" else []
 
     assert found == []
+    assert [place for place, traces in enumerate(drawn) if traces == 0] == []
+    assert complaints(driver) == []
 
 
 def test_in_turn_the_pages_meet_axe_in_every_look():
-    assert {look for place in range(4) for look in by_axe(place)} == {
-        (width, dark) for width in WIDTHS for dark in (False, True)
-    }
+    met = {(width, dark) for place in range(8) for width, dark, by_axe in looks(place) if by_axe}
+    assert met == {(width, dark) for width in WIDTHS for dark in (False, True)}
 
 
 def test_axe_and_the_measure_of_texts_find_what_is_wrong(driver, site, axe):
     """Both can fail: a picture without a name, text over text, text beyond the edge."""
-    look(driver, width=360)
-    arrive(driver, (site / "data.html").as_uri())
+    visit(driver, site, "data.html", width=360)
     driver.execute_script(axe)
     driver.execute_script(
         "document.querySelector('main').insertAdjacentHTML('beforeend', '<img src=\"badge.svg\">"

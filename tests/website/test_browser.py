@@ -13,15 +13,8 @@ from spook_tracker.tracker.judge.judged import commit_of
 from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.website.publish import publish
 from tests.histories.synthetic import SEVEN, history
-from tests.website.browser import CONTRAST, LIVE, SEEN, arrive, look, wait_for
+from tests.website.browser import SEEN, arrive, look, wait_for
 
-PAGES = (
-    "index.html", "tests/pendulum.html", "tests/friction.html", "error-time.html", "stability.html",
-    "compare.html", "regressions.html", "versions.html", "data.html", "document.html", *LIVE,
-)  # fmt: skip
-WIDE = """return [[...document.querySelectorAll('body *')].filter((e) => e.getBoundingClientRect().right > 361 &&
-  !e.closest('.scroll, .bar nav, svg, .plot, .visually-hidden, .skip')).map((e) => e.tagName + '.' + e.className),
-  document.documentElement.scrollWidth <= 360]"""
 COMPARED = "document.getElementById('told').dataset.shown === arguments[0]"
 DRAWN = """
 const [done] = arguments;
@@ -54,7 +47,7 @@ def visit(driver: Any, site: Path, page: str, *, scripts: bool = True, **how: An
     look(driver, **how)
     driver.get("about:blank")
     driver.get_log("browser")
-    address = (site / page.partition("#")[0]).as_uri() + page[len(page.partition("#")[0]) :]
+    address = (site / page.partition("#")[0]).resolve().as_uri() + page[len(page.partition("#")[0]) :]
     if scripts:
         arrive(driver, address)
     else:
@@ -65,25 +58,6 @@ def complaints(driver: Any) -> list[str]:
     """What the browser logged, but for its remarks on drawing scenes without a graphics card."""
     messages = [entry["message"] for entry in driver.get_log("browser")]
     return [m for m in messages if "GL Driver Message" not in m and "software WebGL" not in m]
-
-
-@pytest.mark.parametrize("page", PAGES)
-def test_a_page_opens_from_a_file_without_complaint_draws_every_chart_and_its_text_stands_out(
-    driver: Any, site: Path, page: str
-) -> None:
-    """And nothing is wider than a narrow screen. In the dark: tests/website/test_access.py."""
-    visit(driver, site, page, width=360, height=740)
-    wide = driver.execute_script(WIDE)
-    look(driver)
-    pale = driver.execute_script(CONTRAST)
-
-    drawn = driver.execute_async_script(DRAWN) if page != "document.html" else []
-
-    assert wide == [[], True]
-    assert [place for place, traces in enumerate(drawn) if traces == 0] == []
-    assert complaints(driver) == []
-    assert driver.execute_script("return document.documentElement.dataset.theme") == "light"
-    assert pale == []
 
 
 def test_hostile_names_and_versions_show_as_text(driver: Any, site: Path) -> None:

@@ -193,7 +193,7 @@ def publish(
                     folder.add(address, mark, partial(bytes, content))
         for address, content in drawn.nightly_files().items():
             folder.add(address, digest(content), partial(bytes, content))
-        for address, content in tonight_scripts(told).items() if told.nights else ():
+        for address, content in tonight_scripts(told).items():
             folder.add(address, digest(content), partial(bytes, content))
         files = _data(told, events, causes, str(whose["site_title"]))
         if told.nights:

@@ -15,7 +15,10 @@ NIGHTS = "charts/nights.js"  # day and commit of every night, for the axes of ch
 def tonight_scripts(book: Book) -> dict[str, bytes]:
     """Address and content of both."""
     choices = [[one.key, one.told(book.nights[one.index])] for one in book.earlier]
-    tonight = {"measured": _measured(book.tonight), "earlier": choices}
+    tonight = {
+        "measured": _measured(book.tonight) if book.nights else "Nothing is measured yet.",
+        "earlier": choices,
+    }
     days = [[day(night.started), _commit(night)] for night in book.nights]
     return {
         TONIGHT: f"const TONIGHT = {embedded(tonight)};\n".encode("utf-8", "replace"),

@@ -239,7 +239,7 @@ def test_whatever_is_killed_the_history_is_whole(url: str, tmp_path: Path) -> No
     filled(url, tmp_path)
     desk = Desk(url, tmp_path)
     before = stored(url)
-    lasts = dict.fromkeys(COMMANDS, 3.0)  # s, as far as is known
+    lasts = dict.fromkeys(COMMANDS, 1.0)  # s, as far as is known
     missed = 0
 
     for number in range(ROUNDS):
