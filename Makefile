@@ -41,7 +41,7 @@ help:
 	@echo "make aa        twenty nights of one build beside two busy processes: is any of them red?"
 	@echo "make crashes   200 commands killed at random moments, on each database: is the history whole?"
 	@echo "make hostile   10 000 documents that mean harm, on each database: refused, or stored as what they say?"
-	@echo "make executors the whole catalogue on processes and on a Dask cluster of two workers: the same bits?"
+	@echo "make executors the whole catalogue on processes and on a Dask cluster of three workers: the same bits?"
 	@echo "make package   a wheel built from the archive of the sources, installed by pip, at work, and weighed"
 	@echo "make release VERSION=1.2.3   check, test and package, then the changelog dated and the commit tagged"
 	@echo "make wasm      the engine for the website's live page (Debian's clang-19; see the page it makes)"

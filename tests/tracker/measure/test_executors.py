@@ -1,4 +1,4 @@
-"""The same run whatever measures it: processes here, threads, a real Dask cluster of two workers; to the bit."""
+"""The same run whatever measures it: processes here, threads, a real Dask cluster of three workers; to the bit."""
 
 from __future__ import annotations
 
@@ -51,14 +51,15 @@ def by_processes() -> RunDocument:
 
 @pytest.fixture(scope="module")
 def cluster() -> Iterator[Any]:
-    """A scheduler and two worker processes of Dask on this machine."""
+    """A scheduler and three worker processes of Dask on this machine: two may die, and no piece waits until Dask has started
+    another, which on a busy machine may come to nothing."""
     distributed = pytest.importorskip("distributed", reason="Dask is not installed here")
     before = os.environ.get("PYTHONPATH")
     os.environ["PYTHONPATH"] = os.pathsep.join(filter(None, [str(TOYS), before]))
     sys.path.insert(0, str(TOYS))  # which its processes take over
     try:
         with distributed.LocalCluster(
-            n_workers=2, threads_per_worker=1, dashboard_address=None, silence_logs=50
+            n_workers=3, threads_per_worker=1, dashboard_address=None, silence_logs=50
         ) as started:
             yield started
     finally:
@@ -109,20 +110,21 @@ def test_an_executor_of_ones_own_gives_the_same_bits(by_processes: RunDocument) 
 
 @pytest.mark.timeout(PATIENCE)
 @pytest.mark.filterwarnings("ignore")  # Dask's own, of its own parts
-def test_two_workers_of_dask_give_the_same_bits(by_processes: RunDocument, cluster: Any) -> None:
+def test_workers_of_dask_give_the_same_bits(by_processes: RunDocument, cluster: Any) -> None:
     document = run(Questions(), Request(tests=TESTS, executor=dask(cluster), **ASKED))
 
     assert answered(document) == answered(by_processes)
     assert [worker.fingerprint for worker in document.workers] == [machine().fingerprint]
     assert not by_processes.workers
-    assert len(cluster.scheduler_info["workers"]) == 2
+    assert len(cluster.scheduler_info["workers"]) == 3
 
 
+@pytest.mark.timeout(120)
 @pytest.mark.filterwarnings("ignore")
 def test_a_worker_that_dies_costs_its_piece(cluster: Any) -> None:
     distributed = pytest.importorskip("distributed")
     with distributed.Client(cluster) as client:
-        client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 2))
+        client.run_on_scheduler(lambda dask_scheduler: setattr(dask_scheduler, "allowed_failures", 0))
 
     found = dict(executors.answers(dask(cluster), dies_of_two, [1, 2, 3], here))
 
