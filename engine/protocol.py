@@ -173,6 +173,8 @@ def _of_scene(can: Capabilities, scene: Scene) -> Iterator[str]:
             yield "rigid bodies"
         if body.motion == "kinematic" and not can.kinematic:
             yield "kinematic bodies"
+        if body.motion == "dynamic" and body.inertia_axes != (1.0, 0.0, 0.0, 0.0):
+            yield "principal axes of inertia beside those of the body"
         if touching and body.shape is not None:
             yield from _of_surface(can, body)
     for constraint in scene.constraints:
@@ -218,8 +220,6 @@ def _of_surface(can: Capabilities, body: RigidBody) -> Iterator[str]:
         yield "friction that differs with the direction"
     if any(body.surface_velocity) and not can.surface_velocity:
         yield "a surface that moves along itself"
-    if body.inertia_axes != (1.0, 0.0, 0.0, 0.0):
-        yield "principal axes of inertia beside those of the body"
 
 
 def is_spring(can: Capabilities, constraint: Constraint) -> bool:

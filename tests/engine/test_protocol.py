@@ -82,6 +82,16 @@ def test_an_unknown_configuration_is_answered_with_those_there_are() -> None:
         (
             Scene(
                 bodies=(
+                    RigidBody(
+                        name="a", mass=1.0, inertia=((2, 0.5, 0), (0.5, 2, 0), (0, 0, 2)), position=(0, 0, 0)
+                    ),
+                )
+            ),
+            "principal axes of inertia beside those of the body",
+        ),
+        (
+            Scene(
+                bodies=(
                     RigidBody(name="floor", motion="static", position=(0, 0, 0), shape=Plane()),
                     box("a", position=(0, 0, 1), material=Material(friction=0.5, restitution=0.5)),
                 )
