@@ -226,9 +226,10 @@ void spook_joint_forces(Loop* loop, double* forces) {
             // It counts what the motor gives twice.
             t = b3MulSub(t, b3RevoluteJoint_GetMotorTorque(joint), b3RotateVector(axes, b3Vec3_axisZ));
         } else if (type == b3_prismaticJoint) {
-            // It tells what is along x, y, z of the joint as along z, x, y.
+            // It tells what is along x, y, z of the joint as along z, x, y, and turns a torque that is in world axes.
             b3Vec3 told = b3InvRotateVector(axes, f);
             f = b3RotateVector(axes, (b3Vec3){told.z, told.x, told.y});
+            t = b3InvRotateVector(axes, t);
         }
         const double row[6] = {f.x, f.y, f.z, t.x, t.y, t.z};
         for (int k = 0; k < 6; ++k) {

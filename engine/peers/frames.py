@@ -8,12 +8,14 @@ from typing import Any
 import numpy as np
 
 from spook_tracker.engine.bodies import WORLD, Particle
-from spook_tracker.engine.joints import frictions
+from spook_tracker.engine.joints import Prismatic, frictions
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.recorded_joints import conjugate, joint_point, product, turned_back
 from spook_tracker.engine.result import Array
 from spook_tracker.engine.scene import Scene
 
+RIGID_DRIVE = 1e6  # N s/m or N m s, at least
+FIRM = 1e3  # 1: what a drive resists in a step, over what is to be moved
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 
 
@@ -48,6 +50,30 @@ def drive(joint: Any, engine: str) -> tuple[float, float | None] | None:
     if dry:
         raise NotSupported(f"{engine} does not support friction in {joint.name!r}, which a motor drives")
     return float(motor.speed), None if motor.max_force is None else float(motor.max_force)
+
+
+def drive_damping(scene: Scene, joint: Any, time_step: float) -> float:
+    """Of a drive that is a damper solved implicitly [N s/m or N m s]: enough for all that it may have to move."""
+    load = _moved(scene) if isinstance(joint, Prismatic) else turned_inertia(scene, joint)
+    return max(RIGID_DRIVE, FIRM * load / time_step)
+
+
+def turned_inertia(scene: Scene, joint: Any) -> float:
+    """Moment of inertia of all that moves, about a joint, at most [kg m²]."""
+    at = joint_point(scene, joint)
+    return sum(
+        mass * float(np.sum((np.array(body.position) - at) ** 2)) + max(getattr(body, "inertia", (0.0,)))
+        for body, mass in _masses(scene)
+    )
+
+
+def _moved(scene: Scene) -> float:
+    return sum(mass for _, mass in _masses(scene))
+
+
+def _masses(scene: Scene) -> list[tuple[Any, float]]:
+    """Bodies that move by what pushes them, with their masses [kg]."""
+    return [(b, float(b.mass or 0.0)) for b in scene.bodies if getattr(b, "motion", "dynamic") == "dynamic"]
 
 
 def along(axis: tuple[float, float, float]) -> Array:

@@ -6,16 +6,18 @@ Contact forces are not shown: Jolt keeps them. Its gears and racks hold two bodi
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, RigidBody
+from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
 from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.couplings import Relation
 from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, frictions
+from spook_tracker.engine.joints import AxialJoint, Ball, Distance, Hinge, Joint, Lock, Prismatic, frictions
 from spook_tracker.engine.meshes import HeightField, TriangleMesh
 from spook_tracker.engine.observe import ConstraintForce, Penetration
 from spook_tracker.engine.peers import node
@@ -33,6 +35,7 @@ SCRIPT = Path(__file__).with_suffix(".mjs")
 KINDS: dict[type[Any], str] = {Ball: "ball", Lock: "lock", Hinge: "hinge", Prismatic: "prismatic"}
 FOUND = node.package(PACKAGE)
 UNBOUNDED = 1e30  # N or N m
+LIGHTEST = 1e-6  # kg m²: a body whose moments are less has those of a ball of 1 m in Jolt (SetMassProperties)
 
 
 class Jolt:
@@ -95,7 +98,11 @@ class Jolt:
         return BuildInfo(self.name, installed, "", False, "", (), "npm package, WebAssembly run by Node", "")
 
     def record(self, task: Task) -> Recording:
-        return node.run(SCRIPT, described(task), task.time_limit)
+        factor = _heavier(task.scene)
+        heavier = replace(task, scene=_weighed(task.scene, factor))
+        found = node.run(SCRIPT, described(heavier), task.time_limit)
+        forces = {name: of / factor for name, of in found.constraint_forces.items()}
+        return replace(found, constraint_forces=forces)
 
 
 def described(task: Task) -> dict[str, Any]:
@@ -113,6 +120,52 @@ def described(task: Task) -> dict[str, Any]:
     shapes = [b.shape for b in task.scene.bodies if isinstance(b, RigidBody)]
     told["options"]["edges"] &= any(isinstance(shape, TriangleMesh | HeightField) for shape in shapes)
     return {**told, "relations": relations, "forces_of": shown, "depth": task.contacts}
+
+
+def _heavier(scene: Scene) -> float:
+    """By how much all masses and forces grow together, which moves nothing otherwise, so that Jolt keeps all moments."""
+    sizes = [
+        np.linalg.norm(np.array(b.inertia))
+        for b in scene.bodies
+        if isinstance(b, RigidBody) and b.motion == "dynamic"
+    ]
+    least = min(sizes, default=1.0)
+    return 1.0 if least > 2.0 * LIGHTEST else 2.0 ** math.ceil(math.log2(2.0 * LIGHTEST / least))
+
+
+def _weighed(scene: Scene, factor: float) -> Scene:
+    """The scene with all masses and forces that much larger."""
+
+    def of(body: Any) -> Any:
+        if getattr(body, "motion", "dynamic") != "dynamic":
+            return body
+        moments = {} if isinstance(body, Particle) else {"inertia": tuple(factor * x for x in body.inertia)}
+        return replace(body, mass=factor * body.mass, **moments)
+
+    def held(row: Any) -> Any:
+        if isinstance(row, Distance):
+            return replace(row, compliance=row.compliance / factor if row.compliance > RIGID else 0.0)
+        if not isinstance(row, AxialJoint):
+            return row
+        motor = row.motor
+        if motor is not None and motor.max_force is not None:
+            motor = replace(motor, max_force=factor * motor.max_force)  # type: ignore[operator]
+        return replace(row, friction=factor * row.friction, motor=motor)
+
+    def pushed(force: Any) -> Any:
+        if isinstance(force, Load):
+            push, torque = (np.multiply(factor, part) for part in (force.force, force.torque))
+            return replace(force, force=tuple(push), torque=tuple(torque))
+        if isinstance(force, Spring):
+            return replace(force, stiffness=factor * force.stiffness, viscosity=factor * force.viscosity)
+        return force
+
+    return replace(
+        scene,
+        bodies=tuple(map(of, scene.bodies)),
+        constraints=tuple(map(held, scene.constraints)),
+        forces=tuple(map(pushed, scene.forces)),
+    )
 
 
 def _relation(scene: Scene, relation: Relation) -> dict[str, Any]:
@@ -155,7 +208,7 @@ def _constraint(task: Task, constraint: Any, places: dict[str, int]) -> dict[str
     if isinstance(constraint, Distance):
         length = scene.length(constraint) if constraint.rest_length is None else constraint.rest_length
         points = [list(scene.anchor(constraint, k)) for k in (0, 1)]
-        soft = constraint.compliance > RIGID
+        soft = constraint.compliance > 0.0
         return {
             "kind": "distance",
             "name": constraint.name,

@@ -37,6 +37,7 @@ with quiet():  # it says whether it is profiled
 
 PASSED_OVER = re.compile(r"^([\w@]+) at line: \d+$", re.MULTILINE)
 HARMLESS = {"size"}  # how much memory MuJoCo may take
+GROUND = " ground"  # no name of a scene begins so
 ON_AN_ARM = """<mujoco><worldbody><body name="b" pos="1 0 0"><joint pos="-1 0 0" axis="0 0 1"/>
 <inertial pos="0 0 0" mass="1" diaginertia="1 1 1"/></body></worldbody></mujoco>"""
 
@@ -117,9 +118,10 @@ class _Run:
             option=f'timestep="{task.time_step!r}"',
             row=f'solref="{2.0 * task.time_step!r} 1"' if options["stiff"] else "",
         )
+        xml = _tied_to_a_body(made.xml)
         with overheard() as heard:
             try:
-                self.model = motrixsim.load_mjcf_str(made.xml)
+                self.model = motrixsim.load_mjcf_str(xml)
             except (RuntimeError, ValueError) as error:
                 raise NotSupported(
                     f"motrixsim refuses the model: {' '.join(str(error).split())[:200]}"
@@ -180,9 +182,12 @@ class _Run:
             (self.model.links[places[load.body]], self._each(load.force), self._each(load.torque))
             for load in self.loads
         ]
+        centre = self._each(
+            np.zeros(3)
+        )  # unless told where, a force acts at the joint that the link hangs by
         for _ in range(count):  # a force is for one step
             for link, force, torque in pulls:
-                link.add_external_force(self.data, force, local=False)
+                link.add_external_force(self.data, force, centre, local=False)
                 link.add_external_torque(self.data, torque, local=False)
             self.model.step(self.data)
 
@@ -196,6 +201,12 @@ class _Run:
         keep.velocities[row], keep.spins[row] = moving[:, :3], moving[:, 3:]
         if self.task.contacts and sample:
             keep.contacts[row] = int(np.sum(self.model.get_contact_query(self.data).num_contacts))
+
+
+def _tied_to_a_body(xml: str) -> str:
+    """Welds to the world, which turn a body upright, as welds to a body that stands still."""
+    tied = re.sub(r'(<weld body1="[^"]*")(?= anchor)', rf'\1 body2="{GROUND}"', xml)
+    return xml if tied == xml else tied.replace("<worldbody>", f'<worldbody><body name="{GROUND}"/>', 1)
 
 
 def _arms(xml: str, names: list[str]) -> Array:

@@ -83,6 +83,7 @@ class _Writer:
         self.wires: dict[str, int] = {}
         self.world_sites: list[str] = []
         self.sites: dict[str, list[str]] = {name: [] for name in nodes}
+        self._refuse_what_moves()
         materials = {
             b.material.friction for b in scene.bodies if isinstance(b, RigidBody) and b.shape is not None
         }
@@ -95,6 +96,21 @@ class _Writer:
             raise NotSupported(
                 "our adapter cannot ask mujoco for a compound among surfaces of different friction"
             )
+
+    def _refuse_what_moves(self) -> None:
+        """Kinematic bodies stand still here but for their surfaces: nothing may hang on one."""
+        scene = self.scene
+        held = {end for one in (*scene.constraints, *scene.forces) for end in getattr(one, "between", ())}
+        held |= {end for one in scene.constraints if isinstance(one, Wire) for end, _ in one.through}
+        for body in scene.bodies:
+            if not isinstance(body, RigidBody) or body.motion != "kinematic":
+                continue
+            moves = any(body.velocity) or any(body.angular_velocity)
+            if moves and (body.name in held or body.shape is None):
+                raise NotSupported(
+                    f"our adapter cannot ask mujoco for the kinematic {body.name!r}, only for planes that move in themselves "
+                    "and that nothing is tied to"
+                )
 
     def write(self, option: str) -> Model:
         for constraint in self.scene.constraints:
@@ -244,7 +260,13 @@ class _Writer:
             raise NotSupported(
                 f"our adapter cannot ask mujoco for the kinematic {body.name!r}, only for planes that move in themselves"
             )
-        return along + moved, about
+        along = along + moved
+        if along.any() and about.any():
+            raise NotSupported(
+                f"our adapter cannot ask mujoco for the kinematic {body.name!r}, which turns about a place that moves, or takes along "
+                "in a direction that turns"
+            )
+        return along, about
 
     def _site(self, end: str | None, point: Array, name: str) -> str:
         """A named point of a body, or of the world, given where it is at the start."""

@@ -67,7 +67,6 @@ serve(async (task) => {
 
   const bodies = task.bodies.map(bodyOf);
 
-  const RIGID_DRIVE = 1e6; // N s/m or N m s: damping of a motor, which it solves implicitly
   const fixed = () => world.createRigidBody(R.RigidBodyDesc.fixed());
   for (const given of task.constraints) {
     const ends = given.ends.map((end) => (typeof end === "number" ? bodies[end] : fixed()));
@@ -86,7 +85,7 @@ serve(async (task) => {
     }
     if (given.motor) {
       joint.configureMotorModel(R.MotorModel.ForceBased);
-      joint.configureMotorVelocity(given.motor.speed, RIGID_DRIVE);
+      joint.configureMotorVelocity(given.motor.speed, given.motor.damping);
       if (given.motor.most !== null) joint.setMotorMaxForce(given.motor.most);
     }
   }

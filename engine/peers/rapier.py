@@ -24,7 +24,7 @@ from spook_tracker.engine.observe import ContactForce
 from spook_tracker.engine.peers import node
 from spook_tracker.engine.peers.described import described as common
 from spook_tracker.engine.peers.described import numbered
-from spook_tracker.engine.peers.frames import drive, ends_of
+from spook_tracker.engine.peers.frames import drive, drive_damping, ends_of
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
 from spook_tracker.engine.recorded_joints import turned
 from spook_tracker.engine.recording import Recording
@@ -156,7 +156,13 @@ def _joint(task: Task, joint: Any, places: dict[str, int]) -> dict[str, Any]:
         "points": [first.point, second.point],
         "turns": [list(first.turn), list(second.turn)],
         "axis": None if askew else list(axes[0]),
-        "motor": None if driven is None else {"speed": driven[0], "most": driven[1]},
+        "motor": None
+        if driven is None
+        else {
+            "speed": driven[0],
+            "most": driven[1],
+            "damping": drive_damping(task.scene, joint, task.time_step),
+        },
     }
 
 

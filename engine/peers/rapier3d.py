@@ -22,7 +22,7 @@ from spook_tracker.engine.forces import CentralGravity, Load, Spring
 from spook_tracker.engine.joints import Ball, Hinge, Joint, Lock, Prismatic
 from spook_tracker.engine.meshes import HeightField, TriangleMesh
 from spook_tracker.engine.observe import ContactCount, ContactForce, Penetration
-from spook_tracker.engine.peers.frames import drive, ends_of, xyzw
+from spook_tracker.engine.peers.frames import drive, drive_damping, ends_of, xyzw
 from spook_tracker.engine.peers.pushes import Pushes
 from spook_tracker.engine.peers.stepped import Kept, stepped
 from spook_tracker.engine.peers.surfaces import solid
@@ -34,7 +34,6 @@ from spook_tracker.engine.shapes import Box, Capsule, Compound, ConvexHull, Cyli
 
 POINT_INERTIA = 1e-6  # kg m²: every moving body wants one; a particle that turns is not seen to
 WITHOUT_BOUND = 1e18  # m/s; its square is a number of single precision, too
-RIGID_DRIVE = 1e6  # N s/m or N m s: damping of a motor, which it solves implicitly
 FREE = {Hinge: rapier.JointAxis.ANG_X, Prismatic: rapier.JointAxis.LIN_X}
 ABSENT = frozenset(  # of it and of its package for JavaScript
     {
@@ -174,7 +173,8 @@ class _Run:
             (second.point, xyzw(second.turn))
         )
         if (driven := drive(joint, "rapier3d")) is not None:
-            made = _driven(made, FREE[type(joint)], *driven)
+            damping = drive_damping(self.scene, joint, self.task.time_step)
+            made = _driven(made, FREE[type(joint)], damping, *driven)
         ends = [self.ground if end == WORLD else places[end] for end in joint.between]
         self.world.impulse_joints.insert(*ends, made.contacts_enabled(False).build())
 
@@ -261,8 +261,8 @@ def _rubbing(manifold: Any) -> Array:
     return np.asarray(-along * one - across * np.cross(toward, one))
 
 
-def _driven(made: Any, axis: Any, speed: float, most: float | None) -> Any:
-    made = made.motor_velocity(axis, speed, RIGID_DRIVE).motor_model(axis, rapier.MotorModel.FORCE_BASED)
+def _driven(made: Any, axis: Any, damping: float, speed: float, most: float | None) -> Any:
+    made = made.motor_velocity(axis, speed, damping).motor_model(axis, rapier.MotorModel.FORCE_BASED)
     return made if most is None else made.motor_max_force(axis, most)
 
 

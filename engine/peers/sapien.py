@@ -21,7 +21,7 @@ from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.forces import CentralGravity, Load, Spring
 from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic
 from spook_tracker.engine.observe import ContactCount, ContactForce, Penetration
-from spook_tracker.engine.peers.frames import along, drive, ends_of
+from spook_tracker.engine.peers.frames import along, drive, drive_damping, ends_of, turned_inertia
 from spook_tracker.engine.peers.pushes import Pushes
 from spook_tracker.engine.peers.stepped import Kept, quiet, stepped
 from spook_tracker.engine.peers.surfaces import one_friction, one_restitution, solid
@@ -37,8 +37,9 @@ with quiet(), warnings.catch_warnings():  # it looks for a display
 POINT_INERTIA = 1e-6  # kg m²: PhysX wants one of every body that turns
 FASTEST = 1e7  # rad/s, in place of 100
 SLOWEST_BOUNCE = 0.01  # m/s, in place of 2: slower impacts do not rebound
+SWUNG = 1e3  # kg m²: what turns and is heavier asks for more
 FREE = (-math.inf, math.inf)
-RIGID_DRIVE, UNBOUNDED = 1e6, 1e30  # N s/m or N m s; N or N m
+UNBOUNDED = 1e30  # N or N m
 SWING = (
     1e9,
     1e6,
@@ -181,22 +182,26 @@ class _Run:
         joint.set_limit_z(0.0, 0.0)
         joint.set_limit_twist(*(FREE if twists else (0.0, 0.0)))
         if not isinstance(constraint, Ball):
-            joint.set_drive_property_swing(*SWING)
+            firmer = max(1.0, turned_inertia(self.scene, constraint) / SWUNG)
+            joint.set_drive_property_swing(*(firmer * part for part in SWING))
         if (driven := drive(constraint, "sapien")) is not None:
-            self._drive(joint, slides, driven, 1.0 if ends == list(constraint.between) else -1.0)
+            damping = drive_damping(self.scene, constraint, self.task.time_step)
+            self._drive(joint, slides, damping, driven, 1.0 if ends == list(constraint.between) else -1.0)
         child.entity.add_component(joint)
 
-    def _drive(self, joint: Any, slides: bool, driven: tuple[float, float | None], sign: float) -> None:
+    def _drive(
+        self, joint: Any, slides: bool, damping: float, driven: tuple[float, float | None], sign: float
+    ) -> None:
         """The drive of its joint: a stiff damper, solved implicitly, that moves at a speed. Its bound is the impulse of a step,
         and a twist counts against its axis."""
         speed, most = driven
         bound = UNBOUNDED if most is None else most * self.task.time_step
         ahead, still = (sign * speed, 0.0, 0.0), (0.0, 0.0, 0.0)
         if slides:
-            joint.set_drive_property_x(0.0, RIGID_DRIVE, bound, "force")
+            joint.set_drive_property_x(0.0, damping, bound, "force")
             joint.set_drive_velocity_target(ahead, still)
         else:
-            joint.set_drive_property_twist(0.0, RIGID_DRIVE, bound, "force")
+            joint.set_drive_property_twist(0.0, damping, bound, "force")
             joint.set_drive_velocity_target(still, (-sign * speed, 0.0, 0.0))
 
     def _rod(self, rod: Distance) -> None:

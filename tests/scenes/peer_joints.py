@@ -9,11 +9,14 @@ import numpy as np
 
 from spook_tracker.engine import (
     AngularVelocity,
+    ConstraintForce,
     Distance,
     Final,
     Hinge,
     JointCoordinate,
     Load,
+    Lock,
+    Motor,
     Orientation,
     Position,
     Prismatic,
@@ -21,6 +24,7 @@ from spook_tracker.engine import (
     RigidBody,
     Scene,
 )
+from spook_tracker.engine import simulate as ours
 from spook_tracker.engine.recorded_joints import turned
 from tests.scenes.peer import GRAVITY
 
@@ -82,3 +86,93 @@ def slid_turned(simulate: Any) -> tuple[Any, Any]:
     seen = {"x": Final(quantity=JointCoordinate("s")), "q": Final(quantity=Orientation("b"))}
     run = simulate(Scene(bodies=(body,), constraints=(slide,)), time_step=1 / 240, duration=1.0, observe=seen)
     return float(run["x"]), run["q"] - np.array(turn)
+
+
+def held_on_a_slide(simulate: Any, backwards: bool = False) -> Any:
+    """Force and torque on the second end of a slide after .1 s, and what they are: all across it holds, and the torque
+    about a point beside the centre that keeps the body from turning."""
+    axis, centre, gravity = (
+        np.array([0.0, math.sqrt(0.5), math.sqrt(0.5)]),
+        np.array([1.0, 0.0, 0.0]),
+        np.array(GRAVITY),
+    )
+    mass, pull, twist, seconds = 2.0, np.array([0.0, 4.0, 1.0]), np.array([1.0, 0.0, 2.0]), 0.1
+    body = RigidBody(
+        name="b", mass=mass, inertia=(0.3, 0.5, 0.6), position=tuple(centre), orientation=(0.8, 0.0, 0.6, 0.0)
+    )
+    ends = ("b", "world") if backwards else ("world", "b")
+    slide = Prismatic(name="j", between=ends, at=(0.0, 0.0, 0.0), axis=tuple(axis), compliance=0.0)
+    push = Load(name="push", body="b", force=tuple(pull), torque=tuple(twist))
+    scene = Scene(bodies=(body,), constraints=(slide,), forces=(push,), gravity=GRAVITY)
+    seen = {"f": Final(quantity=ConstraintForce("j"))}
+    found = simulate(scene, time_step=1e-3, duration=seconds, observe=seen)["f"]
+
+    along = float((pull + mass * gravity) @ axis)
+    force = along * axis - pull - mass * gravity
+    torque = np.cross(centre, force) - twist
+    if backwards:
+        slid = 0.5 * along / mass * seconds**2 * axis
+        force, torque = -force, -torque - np.cross(slid, force)
+    return found, np.concatenate([force, torque])
+
+
+def pushed_arm(simulate: Any, backwards: bool = False) -> tuple[float, float]:
+    """Speed [rad/s] after .1 s of an arm of a metre pushed across at its centre and turned besides, and what it is."""
+    arm = RigidBody(name="b", mass=2.0, inertia=(0.3, 0.5, 0.6), position=(1.0, 0.0, 0.0))
+    ends = ("b", "world") if backwards else ("world", "b")
+    hinge = Hinge(name="j", between=ends, at=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0), compliance=0.0)
+    push = Load(name="push", body="b", force=(0.0, 3.0, 0.0), torque=(0.0, 0.0, 0.5))
+    scene = Scene(bodies=(arm,), constraints=(hinge,), forces=(push,))
+    run = simulate(scene, time_step=1e-3, duration=0.1, observe={"w": Final(quantity=AngularVelocity("b"))})
+    return float(run["w"][2]), 0.1 * (3.0 + 0.5) / (0.6 + 2.0)
+
+
+def locked_askew(simulate: Any) -> tuple[float, float]:
+    """How far a heavy body, turned and locked to the world beside its centre, moves [m] and turns in half a second."""
+    turn = (0.8, 0.0, 0.6, 0.0)
+    body = RigidBody(name="b", mass=2.0, inertia=(0.3, 0.5, 0.6), position=(1.0, 0.0, 0.0), orientation=turn)
+    lock = Lock(name="j", between=("world", "b"), at=(0.3, 0.1, 0.0), compliance=0.0)
+    scene = Scene(bodies=(body,), constraints=(lock,), gravity=GRAVITY)
+    seen = {"x": Final(quantity=Position("b")), "q": Final(quantity=Orientation("b"))}
+    run = simulate(scene, time_step=1e-3, duration=0.5, observe=seen)
+    moved = float(np.linalg.norm(run["x"] - np.array(body.position)))
+    return moved, 1.0 - abs(float(run["q"] @ np.array(turn)))
+
+
+def _scaled_arm(scale: float, place: float) -> RigidBody:
+    inertia = tuple(x * scale**5 for x in (0.3, 0.4, 0.5))
+    return RigidBody(
+        name="b", mass=2.0 * scale**3, inertia=inertia, position=(place * scale, 0.0, 0.0), orientation=(0.8, 0.0, 0.6, 0.0)
+    )  # fmt: skip
+
+
+def fallen_arm(simulate: Any, scale: float) -> tuple[Any, Any]:
+    """Where an arm is on a slanted hinge after half a second of its scale, over its length, and where ours has it."""
+    hinge = Hinge(
+        name="j", between=("world", "b"), at=(0.0, 0.0, 0.0), axis=(0.0, math.sqrt(0.5), math.sqrt(0.5)), compliance=0.0
+    )  # fmt: skip
+    scene = Scene(bodies=(_scaled_arm(scale, 1.0),), constraints=(hinge,), gravity=GRAVITY)
+    second, seen = math.sqrt(scale), {"x": Final(quantity=Position("b"))}
+    theirs, mine = (
+        asked(scene, time_step=1e-3 * second, duration=0.5 * second, observe=seen)["x"] / scale
+        for asked in (simulate, ours)
+    )
+    return theirs, mine
+
+
+def driven_wheel(simulate: Any, scale: float) -> float:
+    """Speed of a wheel by a motor of bounded torque, over what that gives; then of one without bound, over what it asks for;
+    the one that is further from 1."""
+    second = math.sqrt(scale)
+    found = []
+    for speed, most, exact in ((9.0, 1.0, 0.5 / (0.3 * 0.96**2 + 0.5 * 0.28**2)), (4.0, None, 4.0)):
+        bound = None if most is None else most * scale**4
+        hinge = Hinge(
+            name="j", between=("world", "b"), at=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0),
+            motor=Motor(speed=speed / second, max_force=bound), compliance=0.0,
+        )  # fmt: skip
+        scene = Scene(bodies=(_scaled_arm(scale, 0.0),), constraints=(hinge,))
+        seen = {"w": Final(quantity=AngularVelocity("b"))}
+        run = simulate(scene, time_step=1e-3 * second, duration=0.5 * second, observe=seen)
+        found.append(float(run["w"][2]) * second / exact)
+    return max(found, key=lambda ratio: abs(ratio - 1.0))

@@ -34,8 +34,12 @@ from tests.engine.peers.test_conformance import (
     BOX,
     BOX_AS_IT_COMES,
     BULLET,
+    CANNON,
     DART,
+    DART_LOOSE,
     JOLT,
+    MERSON,
+    MOTRIX,
     MUJOCO,
     MUJOCO_AS_IT_COMES,
     MUJOCO_IMPLICIT,
@@ -43,6 +47,7 @@ from tests.engine.peers.test_conformance import (
     RAPIER_JS,
     RAPIER_JS_AS_IT_COMES,
     RAPIER_MANY,
+    SAP,
     TGS,
     Asked,
     engine,
@@ -221,3 +226,42 @@ def test_a_compound_spins_about_its_own_centre_of_mass(asked: Asked, owed: float
     assert found["x"] == pytest.approx(np.array([0.0, 0.0, 5.0 - G / 8.0]), abs=1.5 * owed)
     assert found["v"] == pytest.approx(np.array([0.0, 0.0, -0.5 * G]), abs=owed)
     assert found["w"] == pytest.approx(np.array([0.0, 2.0, 0.0]), abs=owed)
+
+
+@rows(
+    dict.fromkeys(
+        (
+            MUJOCO,
+            MUJOCO_AS_IT_COMES,
+            DART,
+            DART_LOOSE,
+            BULLET,
+            JOLT,
+            BOX,
+            RAPIER,
+            RAPIER_JS,
+            SAP,
+            CANNON,
+            MERSON,
+            MOTRIX,
+        ),
+        0.02,
+    )
+)
+def test_pairs_kept_apart_pass_through_each_other(asked: Asked, owed: float) -> None:
+    """Two balls fall, one of which must not touch the other, which lies on the ground; and one that must not touch that."""
+    ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
+    low, high, through = (
+        RigidBody(name=name, mass=1.0, shape=Sphere(0.5), position=(x, 0.0, z))
+        for name, x, z in (("low", 0.0, 0.5), ("high", 0.0, 1.2), ("through", 5.0, 0.5))
+    )
+    scene = Scene(
+        bodies=(ground, low, high, through),
+        gravity=(0.0, 0.0, -G),
+        no_contact=(("high", "low"), ("ground", "through")),
+    )
+    seen = {"z": Final(quantity=Position())}
+    found = engine(asked)(scene, time_step=STEP, duration=1.0, observe=seen)["z"][1:, 2]
+
+    assert found[:2] == pytest.approx([0.5, 0.5], abs=owed)
+    assert found[2] == pytest.approx(0.5 - 0.5 * G, abs=1.5 * G * STEP)

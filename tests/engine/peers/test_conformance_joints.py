@@ -8,13 +8,24 @@ import pytest
 from spook_tracker.engine import AngularVelocity, ConstraintForce, Distance, Final, Orientation, simulate
 from tests.engine.peers.test_conformance import (
     BOX,
+    BOX_AS_IT_COMES,
     BULLET,
+    BULLET_LOOSE,
     DART,
+    DART_LOOSE,
+    DRAKE_LOOSE,
     JOLT,
+    MERSON,
+    MOTRIX,
+    MOTRIX_LOOSE,
+    MOTRIX_MANY,
     MUJOCO,
+    MUJOCO_AS_IT_COMES,
     PGS,
     RAPIER,
     RAPIER_JS,
+    RAPIER_MANY,
+    SAP,
     TGS,
     Asked,
     engine,
@@ -62,3 +73,45 @@ def test_a_slide_leaves_a_body_as_it_is_turned_about_its_axis(asked: Asked, owed
     way, turned = peer_joints.slid_turned(engine(asked))
     assert way == pytest.approx(1.0, abs=owed)
     assert np.abs(turned).max() < owed
+
+
+@rows(dict.fromkeys((BOX_AS_IT_COMES, BOX), 0.02))
+@pytest.mark.parametrize("backwards", [False, True])
+def test_the_force_of_a_slide_is_in_world_axes(asked: Asked, owed: float, backwards: bool) -> None:
+    """A loaded body, turned, on a slanted slide beside its centre: what holds it, on the second end and about its point."""
+    found, exact = peer_joints.held_on_a_slide(engine(asked), backwards)
+    for part in (slice(0, 3), slice(3, 6)):
+        assert found[part] == pytest.approx(exact[part], abs=owed * float(np.linalg.norm(exact[part])))
+
+
+@rows(
+    dict.fromkeys(
+        (MUJOCO, MUJOCO_AS_IT_COMES, DART, BULLET, SAP, MERSON, JOLT, BOX, RAPIER, TGS, MOTRIX, MOTRIX_MANY),
+        5e-3,
+    )
+)
+@pytest.mark.parametrize("backwards", [False, True])
+def test_a_load_acts_at_the_centre_of_a_body_on_a_hinge(asked: Asked, owed: float, backwards: bool) -> None:
+    found, exact = peer_joints.pushed_arm(engine(asked), backwards)
+    assert found == pytest.approx(exact, rel=owed)
+
+
+@rows(
+    dict.fromkeys(
+        (MOTRIX_LOOSE, DART_LOOSE, BULLET_LOOSE, DRAKE_LOOSE, BOX, JOLT, RAPIER_MANY, TGS, PGS), 1e-3
+    )
+)
+def test_a_lock_holds_a_body_that_is_turned_against_the_world(asked: Asked, owed: float) -> None:
+    moved, turned = peer_joints.locked_askew(engine(asked))
+    assert moved < owed
+    assert turned < owed
+
+
+@rows(dict.fromkeys((MUJOCO, DART, BULLET, SAP, JOLT, BOX, RAPIER, RAPIER_JS, TGS, PGS, MERSON), 0.01))
+@pytest.mark.parametrize("scale", [0.01, 1.0, 100.0])
+def test_joints_hold_and_drive_at_every_scale(asked: Asked, owed: float, scale: float) -> None:
+    """Lengths, masses as their cube and times as their root: an arm that falls, and a wheel by a bounded motor."""
+    fallen, exact = peer_joints.fallen_arm(engine(asked), scale)
+    assert fallen == pytest.approx(exact, abs=owed)
+    if asked not in (SAP, MERSON):  # no motors
+        assert peer_joints.driven_wheel(engine(asked), scale) == pytest.approx(1.0, rel=owed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -45,3 +46,18 @@ def test_forces_of_joints_that_rows_hold_are_not_told() -> None:
     force = {"force": Final(quantity=ConstraintForce("joint"))}
     with pytest.raises(NotSupported, match="where contacts or loops act"):
         run("constraints")(peer_scenes.hung(Ball), time_step=STEP, steps=1, observe=force)
+
+
+def test_more_contacts_than_it_takes_in_a_step_are_not_supported() -> None:
+    ground, box = peer_scenes.box_on_ground(0.0).bodies
+    boxes = tuple(
+        replace(box, name=f"{k}", position=(2.0 * (k % 20), 2.0 * (k // 20), 0.5))  # type: ignore[arg-type]
+        for k in range(260)
+    )
+    scene = Scene(bodies=(ground, *boxes), gravity=peer_scenes.GRAVITY)
+    with pytest.raises(NotSupported, match="1000 contact points"):
+        run("joints")(scene, time_step=STEP, steps=2)
+    assert (
+        run("joints")(replace(scene, bodies=scene.bodies[:200]), time_step=STEP, steps=2).status
+        == "completed"
+    )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -19,6 +20,7 @@ from spook_tracker.engine import (
     Final,
     Hinge,
     Lock,
+    Material,
     MaximumAbsolute,
     Particle,
     Plane,
@@ -30,6 +32,7 @@ from spook_tracker.engine import (
     Wire,
 )
 from spook_tracker.engine.find import find
+from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.scalar_tests import falling_object, resting_stack, rolling_friction
 from spook_tracker.scalar_tests.inclined_plane.scene import scene as inclined
 from tests.scenes import peer as peer_scenes
@@ -285,3 +288,21 @@ def test_a_wire_over_two_points_of_the_world_is_atwood_s_machine() -> None:
         run = simulate(scene, "rk4", time_step=1e-3, duration=0.5, observe=seen)
         assert float(run["z"][2]) == pytest.approx(-1.0 - 0.125 * 0.5 * 9.81, abs=2e-4)
         assert float(run["pull"]) == pytest.approx(1.5 * 9.81, rel=1e-3)
+
+
+def test_nothing_hangs_on_a_kinematic_body_and_none_turns_about_a_place_that_moves() -> None:
+    """Of those MuJoCo has the surface alone, which stands."""
+    plane = RigidBody(
+        name="k", motion="kinematic", shape=Plane(), position=(0.0,) * 3, velocity=(1.0, 0.0, 0.0),
+        material=Material(friction=0.5),
+    )  # fmt: skip
+    body = RigidBody(name="b", mass=1.0, inertia=(1.0,) * 3, position=(1.0, 0.0, 0.0))
+    tie = Lock(name="tie", between=("k", "b"))
+    for scene in (
+        Scene(bodies=(plane, body), constraints=(tie,)),
+        Scene(bodies=(replace(plane, shape=None, material=Material()), body)),
+        Scene(bodies=(replace(plane, angular_velocity=(0.0, 0.0, 1.0)), body)),
+    ):
+        with pytest.raises(NotSupported, match="the kinematic 'k'"):
+            simulate(scene, "rk4", time_step=0.01, steps=1)
+    assert simulate(Scene(bodies=(plane, body)), "rk4", time_step=0.01, steps=1).status == "completed"
