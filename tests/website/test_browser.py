@@ -30,6 +30,19 @@ let i = 0;
 """
 
 
+def draw(driver: Any, chart: str) -> None:
+    """Scroll to a chart and wait until it is drawn: those above it may push it away as they come."""
+    driver.execute_async_script(
+        """const [chart, done] = arguments;
+        (function look() {
+          const box = document.querySelector(chart);
+          box.scrollIntoView({ behavior: 'instant' });
+          if ('drawn' in box.dataset) { done(); } else { setTimeout(look, 20); }
+        })();""",
+        chart,
+    )
+
+
 @pytest.fixture(scope="module")
 def nights() -> Any:
     return history(24, broken=20, hostile=True)
@@ -136,8 +149,8 @@ def test_choosing_versions_changes_the_address_and_the_address_restores_the_choi
 
 def test_a_link_restores_the_zoom_of_a_chart(driver: Any, site: Path) -> None:
     visit(driver, site, "tests/pendulum.html")
-    driver.execute_async_script(DRAWN)
     name = "f-deviation-against-time"
+    draw(driver, f"#{name}")
     driver.execute_async_script(
         f"const done = arguments[0]; Plotly.relayout(document.querySelector('#{name} .plot'),"
         " {'xaxis.range': [1, 2], 'yaxis.range': [0, 0.3]}).then(() => done());"
@@ -146,7 +159,7 @@ def test_a_link_restores_the_zoom_of_a_chart(driver: Any, site: Path) -> None:
 
     driver.get("about:blank")
     arrive(driver, address)
-    driver.execute_async_script(DRAWN)
+    draw(driver, f"#{name}")
 
     assert f"z.{name}=1" in address
     ranges = driver.execute_script(
@@ -158,7 +171,7 @@ def test_a_link_restores_the_zoom_of_a_chart(driver: Any, site: Path) -> None:
 def test_a_value_that_stands_still_is_drawn_on_to_tonight(driver: Any, site: Path) -> None:
     """Its file ends where it last changed; the axis ends tonight, with the days of the nights."""
     visit(driver, site, "tests/friction.html")
-    driver.execute_async_script(DRAWN)
+    draw(driver, "#broken figure.chart")
     kept, drawn, days, table = driver.execute_script("""
         const box = document.querySelector('#broken figure.chart'), data = chartData.get(box.dataset.key);
         const plot = box.querySelector('.plot');
@@ -196,9 +209,12 @@ def test_stages_left_out_are_folded_after_those_kept_and_open_by_keyboard(
         assert reason.rect["x"] + reason.rect["width"] <= width and reason.rect["width"] >= 150
 
 
+LADDER = '[id^="l-length-seconds"]'
+
+
 def test_a_ladder_stands_beside_the_night_that_the_reader_chooses(driver: Any, site: Path) -> None:
     visit(driver, site, "tests/pendulum.html")
-    driver.execute_async_script(DRAWN)
+    draw(driver, LADDER)
     shown = """return [...new Set([...document.querySelector('[id^="l-length-seconds"] .plot').data]
         .filter((t) => t.meta.night && t.visible !== false).map((t) => t.name.split(', ').pop()))]"""
     assert driver.execute_script(shown) == ["the night before"]
@@ -210,7 +226,7 @@ def test_a_ladder_stands_beside_the_night_that_the_reader_chooses(driver: Any, s
     address = driver.current_url
     driver.get("about:blank")
     arrive(driver, address)
-    driver.execute_async_script(DRAWN)
+    draw(driver, LADDER)
     assert "night=week" in address
     assert driver.execute_script(shown) == ["a week before"]
 
@@ -270,7 +286,7 @@ def test_a_chart_whose_file_is_gone_says_so(driver: Any, site: Path, tmp_path: P
 
 def test_the_reader_chooses_light_or_dark_and_keeps_it(driver: Any, site: Path) -> None:
     visit(driver, site, "tests/pendulum.html")
-    driver.execute_async_script(DRAWN)
+    draw(driver, "figure.chart")
     driver.execute_script("document.getElementById('theme').click()")
     arrive(driver, (site / "index.html").as_uri())
 
@@ -315,7 +331,7 @@ def test_without_scripts_tables_remain_and_the_page_says_where_the_pictures_are(
 
 def test_a_printed_page_hides_what_cannot_be_printed(driver: Any, site: Path) -> None:
     visit(driver, site, "tests/pendulum.html")
-    driver.execute_async_script(DRAWN)
+    draw(driver, "figure.chart")
     driver.execute_cdp_cmd("Emulation.setEmulatedMedia", {"media": "print"})
     try:
         shown = driver.execute_script(
