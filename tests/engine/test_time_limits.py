@@ -329,7 +329,7 @@ def falls_and_fails() -> Made:
     torque = (sys.float_info.max - inertia) / (TIME_STEP * (FAILS - 0.5))  # N m
     spin = Load(name="spin", body="spun", torque=(0.0, 0.0, torque))
     scene = Scene(bodies=(ground(), *balls, spun), forces=(spin,), gravity=DOWN)
-    return scene, Method(solver="iterative", iterations=6000, residual_tolerance=0.0)
+    return scene, Method(solver="iterative", iterations=3000, residual_tolerance=0.0)
 
 
 @pytest.fixture(scope="module")

@@ -66,7 +66,9 @@ def simulate(
     if fault == "hog":
         bytearray(int(os.environ.get("TOY_HOG", 64 << 30)))
     while fault == "hang":  # in Python, where no time limit of an engine reaches
-        pass
+        time.sleep(
+            0.01
+        )  # as one that turns round and round (tests/toys/toy_stuck.py), at no cost of the processor
     count = steps if steps is not None else round((duration or 0.0) / time_step)
     body, (_, _, g) = scene.bodies[0], scene.gravity
     z, w = body.position[2], body.velocity[2]

@@ -67,7 +67,7 @@ def complaints(driver):
 
 
 def replay(driver, site, state="", afresh=True):
-    """The replay of a page, opened afresh; or as it is, at its start, where it is open and nobody minds what was done to it."""
+    """The replay of a page, opened afresh; or as it is, at its start, where it is open and what was done to it does not matter."""
     there = "return !!document.getElementById('replay')?.player"
     if (
         not afresh
