@@ -36,7 +36,7 @@ from tests.histories.documents import definition, run, sample
 from tests.places import TOYS
 
 COMMANDS = ("nightly", "publish", "copy", "run", "import", "upgrade", "months")
-ROUNDS = int(os.environ.get("SPOOK_CRASH_ROUNDS", "3"))
+ROUNDS = int(os.environ.get("SPOOK_CRASH_ROUNDS", "2"))
 SHORT = len(COMMANDS) > ROUNDS
 TRIES = 40  # for one kill, of a command that keeps ending before it
 LONG = ("nightly", "run")  # commands that start others: played to their end in the long form only
