@@ -103,6 +103,10 @@ class Model:
             if node.tie is not None:
                 self.joints[name] = self._join(node)
         left = closing(scene, self.nodes)
+        if left and not options["discrete"]:
+            raise NotSupported(
+                f"drake ({task.configuration.name}) does not support what closes loops, as {left[0].name!r} does"
+            )
         if left:
             self._close(left)
         for force in scene.forces:

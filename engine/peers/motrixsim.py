@@ -10,13 +10,14 @@ import contextlib
 import functools
 import re
 import time
+from dataclasses import replace
 from importlib.metadata import version
 from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
 
-from spook_tracker.engine.bodies import Particle
+from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
 from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.forces import Load
 from spook_tracker.engine.joints import Ball, Distance, Hinge, Lock, Prismatic, Universal
@@ -24,9 +25,10 @@ from spook_tracker.engine.observe import ContactCount
 from spook_tracker.engine.peers.mujoco_model import model
 from spook_tracker.engine.peers.stepped import Kept, overheard, quiet, stepped
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task, Worlds
-from spook_tracker.engine.recorded_joints import cross, turned
+from spook_tracker.engine.recorded_joints import cross, joint_point, turned
 from spook_tracker.engine.recording import Recording
 from spook_tracker.engine.result import Array
+from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Sphere
 
 with quiet():  # it says whether it is profiled
@@ -113,7 +115,7 @@ class _Run:
     def __init__(self, task: Task, batch: tuple[int, ...] = ()) -> None:
         self.task, options = task, task.configuration.options
         made = model(
-            task.scene,
+            task.scene if options["joints"] else _tied_to_the_world(task.scene),
             joint_coordinates=options["joints"],
             option=f'timestep="{task.time_step!r}"',
             row=f'solref="{2.0 * task.time_step!r} 1"' if options["stiff"] else "",
@@ -201,6 +203,19 @@ class _Run:
         keep.velocities[row], keep.spins[row] = moving[:, :3], moving[:, 3:]
         if self.task.contacts and sample:
             keep.contacts[row] = int(np.sum(self.model.get_contact_query(self.data).num_contacts))
+
+
+def _tied_to_the_world(scene: Scene) -> Scene:
+    """Welds to a body that stands turned are held as if it stood upright: they are welds to the world here."""
+    still = {b.name for b in scene.bodies if isinstance(b, RigidBody) and b.motion != "dynamic"}
+    rows, apart = [], list(scene.no_contact)
+    for row in scene.constraints:
+        if isinstance(row, Lock) and not still.isdisjoint(row.between):
+            ends = (WORLD, row.between[1]) if row.between[0] in still else (row.between[0], WORLD)
+            apart.append(row.between)
+            row = replace(row, between=ends, at=tuple(joint_point(scene, row)))
+        rows.append(row)
+    return replace(scene, constraints=tuple(rows), no_contact=tuple(apart))
 
 
 def _tied_to_a_body(xml: str) -> str:

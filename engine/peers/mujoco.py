@@ -16,14 +16,13 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD
 from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.forces import CentralGravity, Load, Spring
 from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, Universal
 from spook_tracker.engine.observe import ConstraintForce, ContactCount, ContactForce, Penetration
 from spook_tracker.engine.peers.mujoco_file import READS, run_model
-from spook_tracker.engine.peers.mujoco_model import HALF_HINGE, Model, model
+from spook_tracker.engine.peers.mujoco_model import HALF_HINGE, Model, held_first, model
 from spook_tracker.engine.peers.stepped import Kept, stepped
 from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
 from spook_tracker.engine.recorded_joints import cross, joint_point, product, turned
@@ -278,8 +277,8 @@ class _Run:
     def _of_equality(self, constraint: Distance | Joint, rows: list[Array]) -> Any:
         if isinstance(constraint, Distance):
             return -float(rows[0][0]) if len(rows[0]) else 0.0
-        held = constraint.between[0] if constraint.between[0] != WORLD else constraint.between[1]
         # MuJoCo's rows push its first body, which is `held`; a force is read as that on the second.
+        held = held_first(self.task.scene, constraint)[0]
         sign = 1.0 if held == constraint.between[1] else -1.0
         arms = [np.zeros(3)]
         if isinstance(constraint, Hinge):

@@ -372,9 +372,7 @@ class _Writer:
 
     def _ends(self, joint: Joint) -> tuple[str, str, str]:
         """The attributes of an equality's two bodies, and the one whose frame its anchor is in."""
-        one, two = joint.between
-        if one == WORLD or (fixed(self.nodes[one].body) and two != WORLD):
-            one, two = two, one
+        one, two = held_first(self.scene, joint)
         second = "" if two == WORLD else f" body2={quoteattr(two)}"
         return f"body1={quoteattr(one)}{second}", one, two
 
@@ -408,6 +406,14 @@ class _Writer:
                 f"{_friction(mu, one.material, two.material, pair=True)} {self.row}/>"
             )
         return text
+
+
+def held_first(scene: Scene, joint: Joint) -> tuple[str, str]:
+    """Both ends of a joint as an equality has them: the one that stands, or the world, comes last."""
+    one, two = joint.between
+    if one == WORLD or (two != WORLD and fixed(scene.body(one))):
+        return two, one
+    return one, two
 
 
 def _is_compound(body: Particle | RigidBody) -> bool:

@@ -127,12 +127,14 @@ def pushed_arm(simulate: Any, backwards: bool = False) -> tuple[float, float]:
     return float(run["w"][2]), 0.1 * (3.0 + 0.5) / (0.6 + 2.0)
 
 
-def locked_askew(simulate: Any) -> tuple[float, float]:
-    """How far a heavy body, turned and locked to the world beside its centre, moves [m] and turns in half a second."""
+def locked_askew(simulate: Any, still: bool = False) -> tuple[float, float]:
+    """How far a heavy body, turned and locked to the world beside its centre, moves [m] and turns in half a second; or to a
+    body that stands `still`, turned otherwise."""
     turn = (0.8, 0.0, 0.6, 0.0)
     body = RigidBody(name="b", mass=2.0, inertia=(0.3, 0.5, 0.6), position=(1.0, 0.0, 0.0), orientation=turn)
-    lock = Lock(name="j", between=("world", "b"), at=(0.3, 0.1, 0.0), compliance=0.0)
-    scene = Scene(bodies=(body,), constraints=(lock,), gravity=GRAVITY)
+    post = RigidBody(name="post", motion="static", position=(0.5, 0.2, 0.1), orientation=(0.6, 0.0, 0.0, 0.8))
+    lock = Lock(name="j", between=("post" if still else "world", "b"), at=(0.3, 0.1, 0.0), compliance=0.0)
+    scene = Scene(bodies=(post, body), constraints=(lock,), gravity=GRAVITY)
     seen = {"x": Final(quantity=Position("b")), "q": Final(quantity=Orientation("b"))}
     run = simulate(scene, time_step=1e-3, duration=0.5, observe=seen)
     moved = float(np.linalg.norm(run["x"] - np.array(body.position)))

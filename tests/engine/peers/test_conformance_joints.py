@@ -101,8 +101,9 @@ def test_a_load_acts_at_the_centre_of_a_body_on_a_hinge(asked: Asked, owed: floa
         (MOTRIX_LOOSE, DART_LOOSE, BULLET_LOOSE, DRAKE_LOOSE, BOX, JOLT, RAPIER_MANY, TGS, PGS), 1e-3
     )
 )
-def test_a_lock_holds_a_body_that_is_turned_against_the_world(asked: Asked, owed: float) -> None:
-    moved, turned = peer_joints.locked_askew(engine(asked))
+@pytest.mark.parametrize("still", [False, True])
+def test_a_lock_holds_a_body_that_is_turned_against_the_other(asked: Asked, owed: float, still: bool) -> None:
+    moved, turned = peer_joints.locked_askew(engine(asked), still)
     assert moved < owed
     assert turned < owed
 

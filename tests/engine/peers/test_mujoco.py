@@ -105,15 +105,17 @@ def test_the_tension_of_a_rod_at_rest_is_the_weight() -> None:
         assert float(result["pull"]) == pytest.approx(19.62, rel=1e-6)
 
 
+@pytest.mark.parametrize("holder", ["world", "post"])
 @pytest.mark.parametrize("backwards", [False, True])
 @pytest.mark.parametrize("kind", [Ball, Hinge])
-def test_the_force_of_a_joint_is_on_its_second_end(kind: Any, backwards: bool) -> None:
+def test_the_force_of_a_joint_is_on_its_second_end(kind: Any, backwards: bool, holder: str) -> None:
     """A body held beside its joint: the joint carries the weight, and a hinge its moment, too."""
+    post = RigidBody(name="post", motion="static", position=(0.0, 0.0, 0.5))
     body = RigidBody(name="arm", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, -1.0))
-    ends = ("arm", "world") if backwards else ("world", "arm")
+    ends = ("arm", holder) if backwards else (holder, "arm")
     options = {"axis": (0.0, 1.0, 0.0)} if kind is Hinge else {}
     joint = kind(name="joint", between=ends, at=(0.0, 0.0, 0.0), compliance=0.0, **options)
-    scene = Scene(bodies=(body,), constraints=(joint,), gravity=GRAVITY)
+    scene = Scene(bodies=(post, body), constraints=(joint,), gravity=GRAVITY)
     observe = {"force": Final(quantity=ConstraintForce("joint"))}
     weight = np.array([0.0, 0.0, -19.62 if backwards else 19.62])
 
