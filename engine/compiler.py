@@ -37,7 +37,7 @@ def compile(
     scene or an observable of something unknown.
     """
     if not isinstance(scene, Scene):
-        raise SceneError(f"compile needs a Scene, not {scene!r}")
+        raise SceneError(f"a Scene is needed, as in Scene(bodies=(…,)), not {type(scene).__name__}")
     if not isinstance(method, Method):
         raise MethodError(f"method must be a Method, not {method!r}")
     if isinstance(time_step, bool) or not isinstance(time_step, int | float):

@@ -35,6 +35,10 @@ class Snapshot:
     settings: Mapping[tuple[str, str], tuple[Any, ...]]
     failure: Result | None
 
+    def __repr__(self) -> str:
+        scene = self.of[0]
+        return f"<Snapshot of a run of {len(scene.bodies)} {'body' if len(scene.bodies) == 1 else 'bodies'}; Run.restore goes there>"
+
     def to_bytes(self) -> bytes:
         """All of it, with the hash of its bytes and the build it is for."""
         kind = next(name for name, made in _KINDS.items() if isinstance(self.native, made))

@@ -69,6 +69,11 @@ class Engine(Stepped):
 
 ENGINE = Engine(checkout=__file__)
 '''
+NO_BUILD = """
+# How any commit is built, for pull requests, `tracker bisect` and `tracker backfill`; in Python there is nothing to build:
+# [build]
+# command = "true"
+"""
 LIMITS = """
 # What the engine owes you, by series, whatever the printed limit is:
 # [limits]
@@ -199,7 +204,7 @@ def _settings(name: str, build: str, known: bool) -> str:
     if build:
         lines += ["", "[build]  # of any commit, for pull requests, `tracker bisect` and `tracker backfill`"]
         lines += [f"command = {json.dumps(build, ensure_ascii=False)}"]
-    return "\n".join(lines) + "\n" + LIMITS
+    return "\n".join(lines) + "\n" + ("" if build or known else NO_BUILD) + LIMITS
 
 
 def _workflow(build: str, extras: str, at: Home) -> str:

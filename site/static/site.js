@@ -289,7 +289,7 @@ function missing(box, reason) {
 
 // What is another every night stands in scripts, so that a page stands still as long as its values do.
 async function tonight() {
-  const measured = document.getElementById("measured"), times = document.getElementById("run-times");
+  const measured = document.getElementById("measured-when"), times = document.getElementById("run-times");
   if (measured) {
     measured.textContent = MEASURED;
     measured.hidden = false;

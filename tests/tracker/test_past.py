@@ -208,7 +208,10 @@ def test_a_folder_that_says_nothing_of_builds_is_no_place_to_search(
     shown = CliRunner().invoke(main, ["bisect", "pendulum", "--good", "a", "--bad", "b"])
 
     assert shown.exit_code == 2
-    assert "says how a commit is built; say it in tracker.toml: [build] with a command" in shown.stderr
+    assert (
+        "says how a commit is built; say it in tracker.toml: [build] with a command, such as make"
+        in shown.stderr
+    )
     assert "name commits to measure" in CliRunner().invoke(main, ["backfill"]).stderr
 
 

@@ -20,7 +20,7 @@ import plotly.graph_objects as go
 import plotly.offline
 import pytest
 
-from spook_tracker.tracker.document.json_form import NAN
+from spook_tracker.tracker.document.json_form import NAN, Number
 from spook_tracker.tracker.resources import resource
 from spook_tracker.tracker.website.folder import MARKER, FolderError, replacing
 from spook_tracker.tracker.website.publish import publish
@@ -382,6 +382,40 @@ def test_a_night_of_one_test_does_not_pass_for_the_others(tmp_path: Path) -> Non
 
     assert "1 test ran on spook 0.1.1. 6 were not run tonight." in text
     assert text.count("of 2025-10-01, not run tonight") == 6
+
+
+def test_what_the_engine_does_not_support_takes_no_line_of_the_first_page(tmp_path: Path) -> None:
+    whole = document(0)
+    lacking = {one.key for one in whole.series if one.test == "beam"}
+    samples = tuple(
+        msgspec.structs.replace(
+            one, value=Number(float("nan")), outcome="not_supported", passed=False, timing=None, counters={}
+        )
+        if one.series in lacking
+        else one
+        for one in whole.samples
+    )
+    publish(DocumentHistory([msgspec.structs.replace(whole, samples=samples)]), tmp_path / "public")
+    page = (tmp_path / "public" / "index.html").read_text()
+    tables, _, beside = page.partition("1 test needs what <bdi>spook</bdi> does not support")
+
+    assert "6 tests ran on spook 0.1.0; 1 needs what it does not support." in page
+    assert 'tests/beam.html"' not in tables and 'tests/door.html"' in tables
+    assert 'tests/beam.html"' in beside
+
+
+def test_no_element_of_a_page_has_the_name_of_another(tmp_path: Path) -> None:
+    """A script fills elements by name: one heading was overwritten with the hour of the night."""
+    run = document(0)
+    cards = tuple(msgspec.structs.replace(card, seven=False, measured=True) for card in run.tests)
+    physical = tuple(msgspec.structs.replace(one, limit_kind="physical") for one in run.series)
+    run = msgspec.structs.replace(run, tests=cards, series=physical)
+    publish(DocumentHistory([run]), tmp_path / "public")
+
+    for page in (tmp_path / "public").rglob("*.html"):
+        named = re.findall(r'\sid="([^"]+)"', page.read_text())
+        assert len(named) == len(set(named)), page
+    assert "Against measured data" in (tmp_path / "public" / "index.html").read_text()
 
 
 def test_a_value_that_is_no_number_is_never_green(tmp_path: Path) -> None:

@@ -443,6 +443,7 @@ def explain(test: str, cost: bool, as_json: bool, engine: str, catalogue: str) -
     """Say which stages of the engine the test's scene needs, which are left out, and why."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.report_catalogue import stage_table
+    from spook_tracker.tracker.measure.cards import explained
     from spook_tracker.tracker.measure.run import Questions, select
     from spook_tracker.tracker.measure.step_cost import leaving_out, step_cost
 
@@ -450,6 +451,7 @@ def explain(test: str, cost: bool, as_json: bool, engine: str, catalogue: str) -
         catalogue=catalogue, engine=engine, limits=present().limits_of(engine), folder=present().modules
     )
     tests = select(source.tests(), [test])
+    explained(tests[test], source.module())  # refused before anything is measured
     costs = out = None
     if cost:
         simulate = source.simulate()
@@ -457,7 +459,6 @@ def explain(test: str, cost: bool, as_json: bool, engine: str, catalogue: str) -
         costs = step_cost(tests[test], simulate)
     if as_json:
         from spook_tracker.tracker.cli.report_json import explain_json
-        from spook_tracker.tracker.measure.cards import explained
 
         click.echo(explain_json(test, explained(tests[test], source.module()), costs, out))
     else:

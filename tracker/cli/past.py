@@ -138,7 +138,8 @@ def _commits(
     team = team_repository(present().folder, present().build)
     if team is None:
         raise CommitError(
-            f"nothing in {Path.cwd()} or above says how a commit is built; say it in tracker.toml: [build] with a command"
+            f"nothing in {Path.cwd()} or above says how a commit is built; say it in tracker.toml: [build] with a command, "
+            "such as make; where there is nothing to build, 'true'"
         )
 
     def measure(commit: str, *options: str) -> RunDocument:

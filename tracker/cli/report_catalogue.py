@@ -121,7 +121,7 @@ def _metric(measurement: Measurement, metric: Metric, room: int) -> Iterator[str
 
 def _because(kind: LimitKind, source: str) -> str:
     """Whose a limit or a set point is, and where it comes from."""
-    whose = "physical" if kind == "physical" else "the method's own"
+    whose = "physical" if kind == "physical" else "method-specific"
     return f" ({whose}: {source})" if source else f" ({whose})"
 
 

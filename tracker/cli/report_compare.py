@@ -90,6 +90,13 @@ def where(change: Change) -> str:
     return f"{change.series} on {change.machine}" if change.machine else change.series
 
 
+def blamed(change: Change) -> str:
+    """The commit, or the range of them, that a red change came with; empty where no history knows it."""
+    if change.blame or not change.first_bad:
+        return change.blame
+    return f"first bad commit {change.first_bad}, last good {change.last_good or 'unknown'}"
+
+
 def red_line(change: Change) -> str:
     """All a reader needs to act: test, metric, both values, limit, first bad commit, page to open."""
     asked = change.series.removeprefix(f"{change.test}/{change.configuration}/{change.metric}").strip("/")
@@ -100,8 +107,7 @@ def red_line(change: Change) -> str:
         _limit(change.limit),
         change.sentence,
     ]
-    if change.first_bad:
-        parts.append(f"first bad commit {change.first_bad}, last good {change.last_good or 'unknown'}")
+    parts.append(blamed(change))
     if change.machine:
         parts.append(f"on {change.machine}")
     parts.append(f"see {page_of(change.test)}")
@@ -236,7 +242,7 @@ def compare_markdown(document: CompareDocument) -> str:
             where(change),
             *both(change),
             _limit(change.limit),
-            change.sentence + (f"; first bad commit {change.first_bad}" if change.first_bad else ""),
+            "; ".join(filter(None, (change.sentence, blamed(change)))),
         )
         lines.append("| " + " | ".join(escape(cell) for cell in cells) + " |")
     if len(shown) > MOST_ROWS:

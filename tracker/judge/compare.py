@@ -89,7 +89,7 @@ def compare(
         timed = run_times(before.samples, after.samples, history.usual.keys())
         changes += [_in_history(change, history) for change in timed]
     changes = beside_run_times(list(map(calm, changes)), before.samples, after.samples)
-    changes = [_blamed(accept(change, accepted, after.night), history.first_bad) for change in changes]
+    changes = [_blamed(accept(change, accepted, after.night), history) for change in changes]
     changes.sort(key=lambda change: (WORD_RANK[change.word], change.role != "gate", change.series))
     verdict = overall(changes)
     return CompareDocument(
@@ -396,11 +396,12 @@ def accept(change: Change, accepted: Sequence[Accepted], night: date) -> Change:
     return msgspec.structs.replace(change, word=word, red=False, stands="accepted", accepted=str(level))
 
 
-def _blamed(change: Change, first_bad: Mapping[str, tuple[str, str]]) -> Change:
-    if not change.red or change.series not in first_bad:
+def _blamed(change: Change, history: Known) -> Change:
+    if not change.red or change.series not in history.first_bad:
         return change
-    good, bad = first_bad[change.series]
-    return msgspec.structs.replace(change, last_good=good, first_bad=bad)
+    good, bad = history.first_bad[change.series]
+    words = history.blame.get(change.series, "")
+    return msgspec.structs.replace(change, last_good=good, first_bad=bad, blame=words)
 
 
 def _notes(before: ComparedRun, after: ComparedRun, changes: Sequence[Change]) -> list[str]:

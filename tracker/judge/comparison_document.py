@@ -51,6 +51,7 @@ class Change(Struct, frozen=True, kw_only=True):
     ulps: int | None = None
     first_bad: Text = ""  # hash or version of the first bad commit, if history knows it
     last_good: Text = ""
+    blame: Text = ""  # both in words: whether commits that were not measured lie between, and how sure it is
     accepted: Text = ""  # by which person and why, if accepted.toml takes this level
     rounding: Number | None = None  # where it was measured: a difference up to that is none
     machine: Text = ""  # where the versions were compared on several

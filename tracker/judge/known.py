@@ -7,7 +7,7 @@ from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from spook_tracker.tracker.document.run_document import Point, Runs
-from spook_tracker.tracker.judge.judged import Judged, commit_of
+from spook_tracker.tracker.judge.judged import Judged, blame_of, commit_of
 from spook_tracker.tracker.judge.level import FEW_NIGHTS_FLOOR
 from spook_tracker.tracker.judge.repeats import Nights
 from spook_tracker.tracker.judge.series_history import Told, on_one_clock
@@ -22,6 +22,7 @@ class Known:
     values: Mapping[str, tuple[float, float]] = field(default_factory=dict)  # of made series of run time
     suspected: tuple[str, ...] = ()  # times whose slow night is not confirmed yet
     first_bad: Mapping[str, tuple[str, str]] = field(default_factory=dict)  # last good, first bad commit
+    blame: Mapping[str, str] = field(default_factory=dict)  # the same in words
 
 
 def known(told: Mapping[str, Told], before: Sequence[str], after: Sequence[str]) -> Known:
@@ -66,6 +67,7 @@ def known_of(told: Mapping[str, Told], before: Mapping[str, Judged], after: Mapp
     usual: dict[str, Usual] = {}
     values: dict[str, tuple[float, float]] = {}
     first_bad: dict[str, tuple[str, str]] = {}
+    blamed: dict[str, str] = {}
     suspected = []
     for key, series in told.items():
         old, new = before.get(key), after.get(key)
@@ -77,6 +79,7 @@ def known_of(told: Mapping[str, Told], before: Mapping[str, Judged], after: Mapp
         ):
             good = new.before_worse
             first_bad[key] = (commit_of(good.run) if good else "", commit_of(new.worse_at.run))
+            blamed[key] = blame_of(new)
         if series.definition.kind != "time" or old is None or old.usual is None:
             continue
         young = old.usual[1] >= FEW_NIGHTS_FLOOR
@@ -85,7 +88,7 @@ def known_of(told: Mapping[str, Told], before: Mapping[str, Judged], after: Mapp
             values[key] = (_time(old), _time(new))
             if new.state == "suspected":
                 suspected.append(key)
-    return Known(usual=usual, values=values, suspected=tuple(suspected), first_bad=first_bad)
+    return Known(usual=usual, values=values, suspected=tuple(suspected), first_bad=first_bad, blame=blamed)
 
 
 def _lies_after(series: Told, night: Point, before: Judged | None) -> bool:

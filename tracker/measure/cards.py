@@ -57,7 +57,11 @@ def stages(test: ScalarTest, engine: Engine, saved: Mapping[str, float]) -> tupl
 
 
 def explained(test: ScalarTest, engine: Engine) -> Sequence[Stage]:
-    """The engine's choices for the test's example scene, stage by stage."""
+    """The engine's choices for the test's example scene, stage by stage. Raises TrackerError if it tells none."""
+    if not hasattr(engine, "explain"):
+        raise TrackerError(
+            f"{engine.build_info.name} does not say which stages a scene needs; ours does: --engine spook"
+        )
     example = test.example()
     return engine.explain(
         example.scene, time_step=example.time_step, method=example.method, observe=example.observe

@@ -109,7 +109,7 @@ def _store(session: Session, run: RunDocument, there: Present) -> bool:
             "machine_id": machine["id"],
             "test_cards_id": cards["id"],
             "series_list_id": list_id,
-            "gates": len(gate_samples),
+            "gates": sum(sample.outcome != "not_supported" for sample in gate_samples),
             "gates_passed": sum(sample.passed for sample in gate_samples),
             "content": rows.content_of(run, definitions),
         },

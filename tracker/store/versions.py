@@ -41,7 +41,7 @@ class RunInfo:
     ci_address: str
     key: int  # what the large tables carry
     started_at: datetime
-    gates: int  # gate samples in this run
+    gates: int  # gate samples in this run, but for what the engine does not support
     gates_passed: int
     asked: document.Asked | None = None  # None: not known
     content: str = ""  # hash of what was measured; empty: not known
@@ -49,7 +49,7 @@ class RunInfo:
 
     @property
     def green(self) -> bool:
-        """Every gate was measured inside its limit; a run without gates is not green."""
+        """Every gate that the engine supports was measured inside its limit; a run without gates is not green."""
         return 0 < self.gates == self.gates_passed
 
     @property
@@ -170,5 +170,8 @@ def _unknown(runs: Sequence[RunInfo], name: str) -> UnknownName:
         tuple(difflib.get_close_matches(name, unique, n=3, cutoff=0.5))
         or tuple(text for text in unique if re.search(re.escape(name), text))[:3]
     )
-    hint = f"did you mean {', '.join(near)}?" if near else f"the newest is {unique[0]}"
-    return UnknownName(f"no run of a version, commit or id {name[:80]!r}; {hint}", near or tuple(unique[:1]))
+    ours = about(runs)
+    newest = _by_word([run for run in runs if run.engine.name == ours], "latest")
+    latest = newest.engine.version if newest else unique[0]
+    hint = f"did you mean {', '.join(near)}?" if near else f"the newest is {latest}"
+    return UnknownName(f"no run of a version, commit or id {name[:80]!r}; {hint}", near or (latest,))

@@ -54,7 +54,8 @@ def health(book: Book) -> tuple[Class, Count]:
 
 def index(book: Book, causes: Sequence[Cause]) -> Page:
     """Is the engine healthy tonight?"""
-    gates = [(test, trend) for test in book.tests for trend in test.gates()]
+    lacking = [test for test in book.tests if _lacks(test.trends)]
+    gates = [(test, trend) for test in book.tests for trend in test.gates() if not _lacks([trend])]
     found = counted(book)
     seven = [row(t, test.card.title, address(test), book.nights) for test, t in gates if test.card.seven]
     measured = [
@@ -65,7 +66,9 @@ def index(book: Book, causes: Sequence[Cause]) -> Page:
     others = [
         _nearest(test, book)
         for test in book.tests
-        if not ((test.card.seven or test.card.measured) and test.gates()) and _judged(test)
+        if not ((test.card.seven or test.card.measured) and test.gates())
+        and _judged(test)
+        and not _lacks(_judged(test))
     ]
     others.sort(key=lambda one: CLASS_RANK[one.state] if one.state in RED else len(CLASS_RANK))
     steps = {t.definition.time_step for test, t in gates if test.card.seven}
@@ -80,6 +83,7 @@ def index(book: Book, causes: Sequence[Cause]) -> Page:
         "seven": seven,
         "measured": measured,
         "others": others,
+        "lacking": [(test.card.title, address(test)) for test in lacking],
         "common_step": _step_words(step),
         "heat": heat(book, folded=True),
         "signs": [(name, said, meaning) for name, (_, said, meaning) in CLASSES.items()],
@@ -121,6 +125,11 @@ def lead(book: Book, causes: Sequence[Cause]) -> Lead:
         "most_tests": MOST_TESTS,
         "blamed": _blamed(new, old, recovered(book), _worse_than_expected(book)),
     }
+
+
+def _lacks(trends: Sequence[Trend]) -> bool:
+    """Whether the engine supports none of what was asked."""
+    return bool(trends) and all(trend.outcomes and trend.outcomes[-1] == "not_supported" for trend in trends)
 
 
 def _judged(test: TestHistory) -> list[Trend]:
@@ -210,9 +219,13 @@ def summary(book: Book) -> str:
         verb = "is" if len(seven) == 1 else "are"
         how_many = every if kept == len(seven) else f"{kept} of {len(seven)} limits"
         parts.append(f"{how_many} from the thesis {verb} kept.")
-    put = {test.name for test in book.tests for t in test.trends if t.nights[-1] == book.tonight.index}
+    asked = [(test, t) for test in book.tests for t in test.trends if t.nights[-1] == book.tonight.index]
+    put = {test.name for test, _ in asked}
+    ran = {test.name for test, t in asked if not _lacks([t])}
     engine = f"{clean(book.tonight.engine.name)} {version(book.tonight.engine)}"
-    parts.append(f"{len(put)} {'test' if len(put) == 1 else 'tests'} ran on {engine}.")
+    lacking = len(put) - len(ran)
+    beside = f"; {lacking} {'needs' if lacking == 1 else 'need'} what it does not support" if lacking else ""
+    parts.append(f"{len(ran)} {'test' if len(ran) == 1 else 'tests'} ran on {engine}{beside}.")
     missed = [test for test in book.tests if test.gates() and test.name not in put]
     if missed:
         parts.append(f"{len(missed)} {'was' if len(missed) == 1 else 'were'} not run tonight.")

@@ -264,7 +264,7 @@ def test_trend_shows_the_series_and_names_the_bad_night(two_versions):
 def test_list_show_and_explain_tell_what_is_asked_and_what_it_needs():
     assert "Where is the ball?" in tracker("list").output
     shown = tracker("show", "fall").output
-    assert "≤ 0.1 m (the method's own: ½ g t h)" in shown
+    assert "≤ 0.1 m (method-specific: ½ g t h)" in shown
     stages = tracker("explain", "fall").output
     assert stages.startswith("fall: apply_gravity\n")
     assert re.search(r"left out +collision +no body has a shape", stages)

@@ -118,6 +118,21 @@ def test_a_link_to_itself_and_a_pipe_are_no_databases() -> None:
     assert time.monotonic() - begun < 60.0  # none waits for the other end of a pipe
 
 
+@pytest.mark.parametrize("options", [(), ("--cost",), ("--json",)])
+def test_an_engine_without_stages_is_not_asked_which_it_needs(options: tuple[str, ...]) -> None:
+    told = tracker(
+        "explain",
+        "falling_object",
+        "--engine",
+        "tests.toys.stepping_engine",
+        "--catalogue",
+        "standard",
+        *options,
+    )
+
+    refused(told, "does not say which stages a scene needs; ours does: --engine spook")
+
+
 def test_the_old_name_of_postgresql_is_told_its_new_one() -> None:
     refused(tracker("db", "check", "--db", "postgres://user@host/name"), "begins with postgresql://")
 

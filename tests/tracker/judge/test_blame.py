@@ -12,7 +12,7 @@ from spook_tracker.tracker.document.run_document import SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted, unused
 from spook_tracker.tracker.judge.compare import ComparedRun, compare, known
 from spook_tracker.tracker.judge.comparison_document import Side
-from spook_tracker.tracker.judge.judged import blame
+from spook_tracker.tracker.judge.judged import blame, blame_of
 from spook_tracker.tracker.judge.lane import histories, line_of
 from spook_tracker.tracker.judge.series_history import judge_all, judge_history
 from spook_tracker.tracker.judge.standing import Count, count
@@ -30,6 +30,14 @@ def test_each_regression_of_a_red_series_is_blamed_on_its_own_commit() -> None:
     assert [judged.news for judged in nights] == [False, False, True, False, True, False]
     assert [j.first_bad.run.id for j in nights[2:] if j.first_bad] == ["run-2"] * 4
     assert known(told, ("run-3",), ("run-4",)).first_bad["t/c/m"] == (f"{3:040d}"[:12], f"{4:040d}"[:12])
+
+
+def test_a_comparison_blames_a_range_where_commits_lie_between() -> None:
+    told = judge_all({"t/c/m": SeriesHistory(SERIES, tuple(history(0.03, 0.03, 0.06)))})
+    blamed = known(told, ("run-1",), ("run-2",)).blame["t/c/m"]
+
+    assert blamed == blame_of(told["t/c/m"].nights[2])
+    assert "any commit between may be the first" in blamed
 
 
 def test_a_range_of_commits_is_blamed_where_not_every_commit_was_measured() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 
 import pytest
@@ -141,6 +142,16 @@ def test_the_last_green_run_has_gates_and_all_of_them_passed(session, nowhere):
     record(session, run(engine=commit(C, B), series=(), samples=()))
 
     assert History(session, nowhere).resolve("last-green").engine.git_hash == A
+
+
+def test_what_an_engine_does_not_support_keeps_no_run_from_being_green(session, nowhere):
+    lacking = sample("other", math.nan, passed=False, outcome="not_supported")
+    whole = (definition(), definition("other"))
+    record(session, run(engine=commit(A)))
+    record(session, run(engine=commit(B, A), series=whole, samples=(sample(), lacking)))
+    record(session, run(engine=commit(C, B), series=whole[1:], samples=(lacking,)))
+
+    assert History(session, nowhere).resolve("last-green").engine.git_hash == B
 
 
 def test_a_series_over_versions(session, nowhere):

@@ -127,6 +127,14 @@ def test_an_engine_that_is_only_shown_never_takes_our_place() -> None:
     )
 
 
+def test_the_newest_version_that_a_refusal_names_is_the_latest():
+    """Runs of local changes stand behind those of commits, however old they are."""
+    dirty, clean = runs_of(commit(A, dirty=True), commit(B))
+
+    with pytest.raises(UnknownName, match=r"'v9'; the newest is 1\.0\.dev2"):
+        found([clean, dirty], "v9")
+
+
 def test_a_dirty_build_is_the_latest_until_something_else_has_run():
     runs = runs_of(commit(A), commit(A, dirty=True))
     assert found(runs, "latest").engine.dirty
