@@ -5,10 +5,15 @@ The search is a script with the text of every section, so that it also works fro
 
 from __future__ import annotations
 
+import ast
+import dataclasses
 import html
 import inspect
+import io
 import json
 import re
+import textwrap
+import tokenize
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -109,6 +114,39 @@ def library() -> Iterator[str]:
             thing = getattr(module, name)
             told = inspect.getdoc(thing) if inspect.isclass(thing) or inspect.isroutine(thing) else None
             yield f"### {name}\n\n```text\n{_signature(name, thing)}{told or 'A value of the type ' + type(thing).__name__}\n```\n"
+            if rows := list(fields(thing)):
+                yield "| field | holds |\n|---|---|"
+                yield from (f"| `{field}` | {holds} |" for field, holds in rows)
+                yield ""
+
+
+def fields(thing: Any) -> Iterator[tuple[str, str]]:
+    """The fields of a dataclass, its bases' first, with what the comment behind each says: unit, axes, meaning."""
+    if not (inspect.isclass(thing) and dataclasses.is_dataclass(thing)):
+        return
+    told: dict[str, str] = {}
+    for kind in reversed(inspect.getmro(thing)):
+        if dataclasses.is_dataclass(kind):
+            told |= _commented(textwrap.dedent(inspect.getsource(kind)))
+    for field in dataclasses.fields(thing):
+        if field.init and told.get(field.name):
+            yield field.name, told[field.name]
+
+
+def _commented(source: str) -> dict[str, str]:
+    """What the comments behind the fields of a class say."""
+    lines = io.StringIO(source).readline
+    comments = {
+        token.start[0]: token.string.lstrip("# ")
+        for token in tokenize.generate_tokens(lines)
+        if token.type == tokenize.COMMENT
+    }
+    told = {}
+    for line in ast.parse(source).body[0].body:
+        if isinstance(line, ast.AnnAssign):
+            words = [comments[at] for at in range(line.lineno, line.end_lineno + 1) if at in comments]
+            told[line.target.id] = " ".join(words).replace("|", "\\|")
+    return told
 
 
 def _signature(name: str, thing: Any) -> str:

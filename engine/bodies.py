@@ -19,7 +19,7 @@ WORLD = "world"  # the name that stands for the fixed world at one end of a cons
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Particle:
-    """A point mass: three unknowns, no inertia, no rotation, no contacts."""
+    """A point mass: `mass` [kg], `position` [m] and `velocity` [m/s] in world axes; no rotation, no contacts."""
 
     name: str
     position: Vector  # m
@@ -38,7 +38,7 @@ class Particle:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class PairFriction:
-    """How two bodies rub on each other, whatever their materials say of friction."""
+    """How two bodies rub on each other, whatever their materials say: Coulomb's µ, rolling and torsional friction [m]."""
 
     between: tuple[str, str]
     friction: float = 0.0  # Coulomb's mu, 1
@@ -64,7 +64,9 @@ class PairFriction:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Material:
-    """How a surface behaves in contact.
+    """How a surface behaves in contact: `friction` is Coulomb's µ, `restitution` e the speed after an impact over that before
+    (0 plastic, 1 elastic), `compliance` [m/N] and `damping` [s] those of the contact, `slip_compliance` [m/(N s)],
+    `rolling_friction` and `torsional_friction` levers [m]. By default a surface is smooth, plastic and rigid.
 
     Two surfaces combine: friction by the geometric mean, both restitutions, rolling and torsional friction by the larger,
     compliance by the sum. Viscous friction, a force c times the slip, is a slip_compliance of 1/c under a friction that
@@ -145,6 +147,8 @@ class Material:
 class RigidBody:
     """A body with orientation. Mass and inertia of a dynamic body must be positive.
 
+    `position` [m] is that of its centre of mass, `orientation` the unit quaternion (w, x, y, z) from its axes to the world's;
+    `velocity` [m/s] and `angular_velocity` [rad/s] are in world axes, `mass` in kg. `motion` is dynamic, static or kinematic.
     `inertia` holds the moments [kg m²] about the body axes, or is a symmetric 3×3 tensor along them, whose principal
     moments and axes are then found (Jacobi's rotations, to rounding): `inertia` and `inertia_axes` keep them. None takes
     that of the shape, of uniform density. A static body never moves; a kinematic one moves with its given velocities whatever

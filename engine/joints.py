@@ -11,6 +11,7 @@ meant, and redundant joints that then lock are refused by name. docs/explanation
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -141,9 +142,10 @@ class JointSpring:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Joint:
-    """What all joints share. `between` names two bodies, or WORLD and a body; the joint frame is fixed to the
-    first and coincides with the second at the start. `at` is a world point at the start (None: the second
-    body's centre). Forces are read as those on the second body at the joint, in world axes.
+    """What all joints share: `between` names two bodies, or WORLD and a body; the joint frame is fixed to the
+    first and coincides with the second at the start. `at` [m] is a world point at the start (None: the second
+    body's centre). Forces are read as those on the second body at the joint, in world axes. `compliance` [m/N, then
+    rad/(N m)] and `damping` [s; None: two time steps] are one number, or one for each row.
 
     A joint whose own rows carry more than `strength` or `torque_strength` in a step holds nothing from the next one on:
     the last force it shows is the load it broke at. Its bodies do not touch each other after that either.
@@ -199,7 +201,8 @@ class Ball(Joint):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class AxialJoint(Joint):
-    """A joint with a free coordinate about or along `axis` (world direction at the start).
+    """A joint with a free coordinate about or along `axis` (world direction at the start), zero at the start, with a `motor`,
+    a `limit` and a `spring`.
 
     `friction` [N or N m] holds the coordinate at rest as far as it reaches, and brakes it where it moves, beside whatever
     drives it. `load_friction` adds its product with the force [N] that the joint's own rows hold: µ of a slide, µ times
@@ -336,6 +339,12 @@ class Planar(GuidedJoint):
     kind: ClassVar[str] = "planar"
     holds: ClassVar[tuple[int, int]] = (0, 1)
     turning: ClassVar[str] = "swing"
+
+
+for _joint in (Lock, Ball, Hinge, Prismatic, Universal, PointOnLine, Cylindrical, Planar):
+    # `help` shows a class without its bases: what joints share is told with each
+    _told = [inspect.cleandoc(kind.__doc__ or "") for kind in _joint.__mro__[:-1]]
+    _joint.__doc__ = "\n\n".join(text for text in _told if text)
 
 
 def frictions(joint: object) -> tuple[tuple[float, float], tuple[float, float]]:

@@ -43,7 +43,7 @@ class Shape(ABC):
 
 @dataclass(frozen=True, slots=True)
 class Sphere(Shape):
-    """A ball about the body's origin."""
+    """A ball of `radius` [m] about the body's origin."""
 
     kind: ClassVar[str] = "sphere"
     drawn_as: ClassVar[str] = "sphere"
@@ -69,7 +69,7 @@ class Sphere(Shape):
 
 @dataclass(frozen=True, slots=True)
 class Box(Shape):
-    """A cuboid about the body's origin, edges along the body axes."""
+    """A cuboid about the body's origin; `size` [m] holds its full edges along the body axes x, y and z."""
 
     kind: ClassVar[str] = "box"
     drawn_as: ClassVar[str] = "box"
@@ -97,7 +97,7 @@ class Box(Shape):
 
 @dataclass(frozen=True, slots=True)
 class Capsule(Shape):
-    """A cylinder along the body's z axis with half-spheres at both ends."""
+    """A cylinder of `length` [m] along the body's z axis with half-spheres of `radius` [m] at both ends, not counted in it."""
 
     kind: ClassVar[str] = "capsule"
     drawn_as: ClassVar[str] = "capsule"
@@ -132,7 +132,7 @@ class Capsule(Shape):
 
 @dataclass(frozen=True, slots=True)
 class Cylinder(Shape):
-    """A cylinder along the body's z axis; a coin is a short one."""
+    """A cylinder of `radius` and `length` [m] along the body's z axis, the origin in its middle; a coin is a short one."""
 
     kind: ClassVar[str] = "cylinder"
     drawn_as: ClassVar[str] = "facets"

@@ -31,6 +31,7 @@ from tests.histories.documents import run
 
 ELSEWHERE = {  # what asks for another engine, a server, or minutes, and the test that does the same
     "tracker init NAME": "tests/tracker/test_init.py",
+    "tracker run falling_object": "tests/tracker/test_init.py",
     "tracker ci change --history history --comment comment.md": "tests/team/test_workflow.py",
     "tracker run pendulum n_pendulum resting_stack --engine spook,mujoco --sweep": "tests/engine/peers/test_mujoco.py",
     "tracker backfill --engine mujoco --newest 3": "tests/tracker/measure/test_releases.py",
@@ -41,7 +42,6 @@ ELSEWHERE = {  # what asks for another engine, a server, or minutes, and the tes
     "tracker releases mujoco": "tests/tracker/measure/test_releases.py",
     "tracker run --executor dask://scheduler:8786": "tests/tracker/measure/test_executors.py",
     "tracker db copy sqlite:///tracker.db postgresql://host/tracker": "tests/tracker/store/test_transfer.py",
-    "tracker run throw falling_object": "tests/team/test_own_engine.py",
     "tracker bisect pendulum": "tests/tracker/test_past.py",
     "tracker bisect throw": "tests/tracker/measure/test_builds.py",
     "tracker backfill v1.0..HEAD": "tests/tracker/measure/test_builds.py",

@@ -63,6 +63,27 @@ def test_the_tutorial_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.Monk
     assert (tmp_path / "public" / "index.html").is_file()
 
 
+def test_the_scenes_from_the_classroom_follow_their_closed_forms(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The page asserts each; with a wrong formula none of them passes."""
+    monkeypatch.chdir(tmp_path)
+    told = blocks("tutorial/scenes.md", "python")
+    names: dict[str, Any] = {}
+    wrong = {0: ("(3 * g / length)", "(2 * g / length)"), 1: ("2 * mu * g", "mu * g"), 2: ("-1 / 3, 2 / 3", "0.0, 0.0"),
+             3: ("0.5 / 9", "0.5 / 3"), 4: ("run.restore(here)", ""), 5: ("** (2 *", "** (1 *")}  # fmt: skip
+
+    for place, block in enumerate(told):
+        if place in wrong:
+            assert wrong[place][0] in block
+            with pytest.raises(AssertionError):
+                exec(block.replace(*wrong[place]), dict(names))
+        exec(block, names)
+
+    assert len(told) == 7
+    assert (tmp_path / "bounce.html").is_file()
+
+
 def test_the_queries_run_on_both_databases(session: Any) -> None:
     record(session, run())
     queries = blocks("how-to/sql.md", "sql")
@@ -238,6 +259,8 @@ def test_the_page_of_the_library_is_complete() -> None:
     page = "\n".join(generated().library())
 
     assert [name for name in (*engine.__all__, *tracker.__all__) if f"### {name}\n" not in page] == []
+    for thing, field in (("Hinge", "| `at` | m |"), ("Box", "| `size` | full edge lengths, m |")):
+        assert field in page.partition(f"### {thing}\n")[2].partition("### ")[0]
 
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])

@@ -146,7 +146,7 @@ def test_one_engine_alone_is_told_how_others_are_asked(tmp_path: Path) -> None:
 
     text = (tmp_path / "public" / "engines.html").read_text(encoding="utf-8")
 
-    assert "tracker nightly --engine spook,mujoco" in text
+    assert "tracker run --engine mujoco" in text
     assert "<table" not in text
 
 

@@ -136,4 +136,6 @@ def concluded(text: str, state: Class) -> list[tuple[str, str]]:
         return [("It failed tonight", failed), ("If it passes", passed)]
     if state == "pass":
         return [("It passed tonight", passed), ("If it fails", failed)]
+    if state == "watch":  # what is worse asks first what it may mean
+        return [("If it fails", failed), ("If it passes", passed)]
     return [("If it passes", passed), ("If it fails", failed)]
