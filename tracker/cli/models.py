@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import takewhile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +13,6 @@ from spook_tracker.tracker.cli.options import example
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.measure.model_packages import Looked
-    from spook_tracker.tracker.measure.model_standing import Cause, Checkpoint, Standing
 
 WORDS = {"model": "·", "runs": "✓", "part": "-", "refused": "✗", "fails": "✗"}
 
@@ -41,6 +39,7 @@ def models_command(
 ) -> None:
     """List the MJCF, URDF and SDF files of installed packages, and say which are models and which load."""
     from spook_tracker.tracker.cli.console import say
+    from spook_tracker.tracker.cli.report_models import markdown_of, standing_lines
     from spook_tracker.tracker.measure.model_packages import files_of, loaded, looked_at, stood
 
     paths = [path for package in packages for path in files_of(package)]
@@ -58,7 +57,7 @@ def models_command(
             )
             for path, one in stood(paths, engines, workers)
         )
-        for line in markdown_of(engines, dict(told)) if markdown else _lines(told):
+        for line in markdown_of(engines, dict(told)) if markdown else standing_lines(told):
             say(line)
         return
     engine = engines[0] if engines else None
@@ -96,88 +95,6 @@ def _swing(looked: Looked) -> str:
         return ""
     sign = "=" if looked.agrees else "≠" if found.resolved else "?"
     return f"{sign} {found.apart:7.1e} (steps {found.own:.0e}, {found.reference:.0e}) "
-
-
-def _lines(told: Iterable[tuple[str, Standing | str]]) -> Iterator[str]:
-    """Of each model a line for each time, with the groups of engines and how far they are apart."""
-    for name, found in told:
-        if isinstance(found, str):
-            yield f"{name}: {found}"
-            continue
-        yield f"{name}, {found.size:.3g} m: engines within their own step errors stand together"
-        for point in found.checkpoints:
-            first = point.groups[0]
-            groups = " | ".join(_group(point, group, first) for group in point.groups)
-            yield f"  {point.time:5.2f} s  {groups}"
-        if found.cause:
-            yield f"  {_because(found.cause)}"
-        yield from (f"  {engine}: {why}" for engine, why in found.refused.items())
-
-
-def markdown_of(engines: Sequence[str], told: Mapping[str, Standing | str]) -> Iterator[str]:
-    """A row for each model: up to when each engine stands with the first, and how far from it it ends; then why."""
-    first, *others = engines
-    found = {name: one for name, one in sorted(told.items()) if not isinstance(one, str)}
-    yield f"| model | size, m | ends | {' | '.join(others)} |"
-    yield f"|---|---|---|{'---|' * len(others)}"
-    for name, one in found.items():
-        end = f"{one.checkpoints[-1].time:g} s" if one.checkpoints else ""
-        cells = " | ".join(_cell(one, first, other) for other in others)
-        yield f"| `{name}` | {one.size:.3g} | {end} | {cells} |"
-    yield from (
-        "",
-        f"Why {first} and another engine part, where both can be asked without parts of the model:",
-        "",
-    )
-    yield from (f"- `{name}`: {_because(one.cause)}." for name, one in found.items() if one.cause)
-    yield from ("", "What takes no part, or breaks off:", "")
-    alike: dict[str, list[str]] = {}  # names by what is said of them
-    for name, answer in sorted(told.items()):
-        refused = {"": answer} if isinstance(answer, str) else answer.refused
-        for engine, why in refused.items():
-            sentence = f"{engine}: {why}" if engine else why
-            alike.setdefault(sentence.replace(Path(name).name, "the file"), []).append(f"`{name}`")
-    yield from (f"- {why}: {', '.join(names)}." for why, names in sorted(alike.items()))
-
-
-def _cell(found: Standing, first: str, other: str) -> str:
-    """Up to which time they stand together, and how far they are apart at the end; ? where their errors are too large to tell."""
-    shared = [one for one in found.checkpoints if first in one.error and other in one.error]
-    if not shared:
-        return "-"
-    alike = list(takewhile(lambda one: one.together(first, other) and not one.blurred(first, other), shared))
-    if len(alike) == len(found.checkpoints):
-        return "="
-    end = shared[-1]
-    if end.blurred(first, other) and end.together(first, other):
-        then = "?"
-    else:
-        then = f"{end.apart(first, other):.1g} m"
-    return f"= to {alike[-1].time:g} s, then {then}" if alike else then
-
-
-def _because(cause: Cause) -> str:
-    """Why two engines part, in a sentence."""
-    said = f"{' and '.join(cause.engines)} part at {cause.time:g} s, by {cause.apart:.2g} m"
-    if not cause.parts:
-        return f"{said}, whatever part of the model is left out"
-    said += f", over {' and '.join(cause.parts)}: without, {cause.left:.1g} m"
-    if cause.softness:
-        said += f"; mujoco itself moves {cause.softness:.1g} m where these give way eight times faster"
-    return said
-
-
-def _group(point: Checkpoint, group: tuple[str, ...], first: tuple[str, ...]) -> str:
-    """mujoco = spook; and of another group how far [m] it is from the first, and that in its step errors."""
-    names = " = ".join(f"{engine} ±{point.error[engine]:.1e}" for engine in group)
-    if group == first:
-        return names
-    far, errors = min((point.apart(a, b), point.error[a] + point.error[b]) for a in group for b in first)
-    return (
-        f"{names}, {far:.2g} m away, {far / errors:.2g} of both errors"
-        if errors
-        else f"{names}, {far:.2g} m away"
-    )
 
 
 def _common(paths: Sequence[Path]) -> Path:

@@ -1,4 +1,4 @@
-"""One model in several engines: how far they are apart at growing times, and which of them stand together.
+"""One model in several engines: how far they are apart at growing times, which of them stand together, and how it ends in each.
 
 Each engine runs the file as its users do, at the file's own time step and at half of it. Three times what that changes, at
 this time or the one before, counts as the engine's own error: twice, as it is of a first order, and half as much for what is
@@ -11,7 +11,7 @@ again without contacts, without limits, and so on, up to the first time at which
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 
 import numpy as np
@@ -20,7 +20,7 @@ from spook_tracker.engine.errors import EngineError
 from spook_tracker.engine.find import find
 from spook_tracker.engine.model_file import PARTS, ModelFile, ModelRun
 from spook_tracker.engine.result import Result
-from spook_tracker.scalar_tests.model_file.facts import CHECKPOINTS, apart
+from spook_tracker.scalar_tests.model_file.facts import CHECKPOINTS, LONGEST_REST, apart
 
 ERROR = 3.0  # times what halving the step changes
 SPLIT = ("mujoco", "spook")  # engines that can leave parts of a model out
@@ -29,6 +29,8 @@ SOFT = {"contacts", "limits", "ties"}  # parts that give way in MuJoCo
 STIFFER = 8.0  # times faster they do so, to see what that changes
 LEAST = 1e-9  # of the size: errors below it are rounding
 LIMIT = 60.0  # s, of one run
+FALLS = 0.25  # of the size: what ends lower by more has fallen
+ALIKE = 0.01  # of the size: no further apart two rest alike
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,6 +78,19 @@ class Cause:
 
 
 @dataclass(frozen=True, slots=True)
+class Ending:
+    """How a model ends in one engine, without controls: at rest, or after ten seconds."""
+
+    settled: float  # s, since when it rests; NaN where it moves
+    sunk: float  # m, by which the watched body that sinks most is lower than at the start
+
+    @property
+    def rests(self) -> bool:
+        """Whether it has come to rest."""
+        return bool(np.isfinite(self.settled))
+
+
+@dataclass(frozen=True, slots=True)
 class Standing:
     """All engines on one model; `refused` says of an engine why it takes no part, or where it broke off."""
 
@@ -83,6 +98,22 @@ class Standing:
     checkpoints: tuple[Checkpoint, ...]
     refused: Mapping[str, str]
     cause: Cause | None = None
+    ends: Mapping[str, Ending] = field(default_factory=dict)
+    at_rest: Mapping[tuple[str, str], float] = field(
+        default_factory=dict
+    )  # m, between engines in which it rests
+
+    def falls(self, engine: str) -> bool:
+        """Whether it ends lower than it begins."""
+        return self.ends[engine].sunk > FALLS * self.size
+
+    def rest_apart(self, one: str, other: str) -> float:
+        """How far [m] it rests in one engine from where it does in the other."""
+        return self.at_rest.get((one, other), self.at_rest.get((other, one), np.inf))
+
+    def rests_alike(self, one: str, other: str) -> bool:
+        """Whether it rests in both, and no further apart than a hundredth of the size."""
+        return self.rest_apart(one, other) <= ALIKE * self.size
 
 
 def standing(model: ModelFile, engines: Sequence[str], duration: float = CHECKPOINTS[-1]) -> Standing:
@@ -94,7 +125,8 @@ def standing(model: ModelFile, engines: Sequence[str], duration: float = CHECKPO
         try:
             # some engines die of some files
             whole, half = (
-                _ran(model, engine, model.time_step / parts, times, elsewhere=True) for parts in (1, 2)
+                _ran(model, engine, model.time_step / parts, times, elsewhere=True, rests=parts == 1)
+                for parts in (1, 2)
             )
         except EngineError as error:
             refused[engine] = str(error)
@@ -108,7 +140,30 @@ def standing(model: ModelFile, engines: Sequence[str], duration: float = CHECKPO
     both = (one for one in found if all(engine in one.error for engine in SPLIT))
     if parted := next((one for one in both if not one.together(*SPLIT)), None):
         cause = _cause(model, tuple(t for t in times if t <= parted.time), parted.apart(*SPLIT), size)
-    return Standing(size, found, refused, cause)
+    ended = {engine: whole for engine, (whole, _) in runs.items() if not whole.failure}
+    ends = {engine: _ending(model, whole) for engine, whole in ended.items()}
+    resting = [engine for engine, end in ends.items() if end.rests]
+    at_rest = {pair: _rest_apart(ended[pair[0]], ended[pair[1]], size) for pair in combinations(resting, 2)}
+    return Standing(size, found, refused, cause, ends, at_rest)
+
+
+def _ending(model: ModelFile, run: Result) -> Ending:
+    gravity = np.asarray(model.gravity)
+    down = gravity / max(float(np.linalg.norm(gravity)), 1e-300)
+    final = np.array([run.final_state[body.label][:3] for body in model.watched])
+    return Ending(float(run["settled"]), float(np.max((final - run["position"][0]) @ down)))
+
+
+def _rest_apart(one: Result, other: Result, size: float) -> float:
+    """As far as `apart`, where they end."""
+
+    def last(run: Result) -> Result:
+        states = np.array(list(run.final_state.values()))
+        return replace(
+            run, observables={"position": states[None, :, :3], "orientation": states[None, :, 3:7]}
+        )
+
+    return float(apart(last(one), last(other), size)[0])
 
 
 def _ran(
@@ -119,11 +174,19 @@ def _ran(
     without: tuple[str, ...] = (),
     stiffer: float = 1.0,
     elsewhere: bool = False,
+    rests: bool = False,
 ) -> Result:
+    """From the start, which is the first sample; on until all `rests`."""
     run = ModelRun(
-        model=model, samples=times, without=frozenset(without), stiffer=stiffer, elsewhere=elsewhere
+        model=model,
+        samples=(0.0, *times),
+        until_settled=rests,
+        without=frozenset(without),
+        stiffer=stiffer,
+        elsewhere=elsewhere,
     )
-    done: Result = find(engine).simulate(run, time_step=step, duration=times[-1], time_limit=LIMIT)
+    lasts = max(times[-1], LONGEST_REST) if rests else times[-1]
+    done: Result = find(engine).simulate(run, time_step=step, duration=lasts, time_limit=LIMIT)
     return done
 
 
@@ -162,7 +225,7 @@ def _cause(model: ModelFile, times: tuple[float, ...], apart_now: float, size: f
     if SOFT.intersection(parts):
         step = model.time_step / STIFFER
         own, stiff = (_ran(model, SPLIT[0], step, times, stiffer=stiffer) for stiffer in (1.0, STIFFER))
-        moved = _at(len(times) - 1, own, stiff, size)
+        moved = _at(len(times), own, stiff, size)
         softness = moved if np.isfinite(moved) else 0.0  # it broke off
     return Cause(SPLIT, times[-1], apart_now, parts, left, softness)
 
@@ -173,7 +236,7 @@ def _checkpoints(
     """Those that some engine has reached."""
     found: list[Checkpoint] = []
     before: dict[str, float] = {}  # at the time before
-    for place, time in enumerate(times):
+    for place, time in enumerate(times, start=1):
         reached = [engine for engine, (whole, _) in runs.items() if len(whole.partial["position"]) > place]
         if not reached:
             break

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -13,7 +14,7 @@ from click.testing import CliRunner
 from spook_tracker.engine.model_reading import read
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.tracker.cli.main import main
-from spook_tracker.tracker.cli.models import markdown_of
+from spook_tracker.tracker.cli.report_models import markdown_of
 from spook_tracker.tracker.measure import model_agreement, model_packages, model_standing
 from spook_tracker.tracker.measure.model_agreement import agreement
 from spook_tracker.tracker.measure.model_files import ModelFileError
@@ -117,6 +118,17 @@ def test_of_several_engines_it_is_told_which_stand_together(told: dict[str, Stan
     assert "no_such" in swing.refused
 
 
+def test_of_several_engines_it_is_told_how_a_model_ends_in_each(told: dict[str, Standing | str]) -> None:
+    swing, soft = told["swing.xml"], told["soft.xml"]
+    assert isinstance(swing, Standing) and isinstance(soft, Standing)
+    for engine in ("mujoco", "spook"):
+        assert not swing.ends[engine].rests and soft.ends[engine].rests
+        assert soft.falls(engine) and soft.ends[engine].sunk == pytest.approx(0.3, abs=2e-3)
+    assert not swing.rests_alike("mujoco", "spook")
+    assert soft.rests_alike("mujoco", "spook") and soft.rest_apart("spook", "mujoco") > 5e-4
+    assert not replace(soft, size=0.05).rests_alike("mujoco", "spook")
+
+
 @pytest.mark.parametrize(
     ("name", "part", "gives_way"),
     [("soft", "contacts", True), ("outside", "limits", True), ("rubs", "dry friction", False)],
@@ -143,11 +155,11 @@ def test_engines_that_cannot_be_asked_without_a_part_are_told_to_part_all_the_sa
     monkeypatch.chdir(tmp_path)
     ran = model_standing._ran
 
-    def broken(model, engine, step, times, without=(), stiffer=1.0, elsewhere=False):
+    def broken(model, engine, step, times, without=(), stiffer=1.0, elsewhere=False, rests=False):
         assert Path(model.path).is_absolute()  # DART takes no other
         if without and breaks == "refuses":
             raise NotSupported("not without")
-        return ran(model, engine, step, (1e9,) if without else times, without, stiffer)
+        return ran(model, engine, step, (1e9,) if without else times, without, stiffer, rests=rests)
 
     monkeypatch.setattr(model_standing, "_ran", broken)
     monkeypatch.setattr(model_standing, "LIMIT", 0.2)
@@ -162,11 +174,23 @@ def test_a_table_says_up_to_when_engines_stand_with_the_first_and_why_not_longer
 ) -> None:
     lines = list(markdown_of(("mujoco", "spook", "no_such"), told))
 
-    rows = {line.split("|")[1].strip(" `"): line for line in lines if line.startswith("| `")}
+    half = lines.index("How each ends:")
+    rows, ends = (
+        {line.split("|")[1].strip(" `"): line for line in part if line.startswith("| `")}
+        for part in (lines[:half], lines[half:])
+    )
     assert set(rows) == {f"{name}.xml" for name in FILES if name != "broken"}
     assert [cell.strip() for cell in rows["swing.xml"].split("|")[3:6]] == ["5 s", "=", "-"]
     assert re.search(r"\| = to 0.5 s, then 0.00[0-9]+ m \| - \|$", rows["soft.xml"])
+    assert ends["swing.xml"] == "| `swing.xml` | moves | moves | - |"
+    assert re.search(
+        r"\| falls, rests from \d.\d s \| falls, rests from \d.\d s = \| - \|$", ends["soft.xml"]
+    )
     said = "\n".join(lines)
+    assert re.search(
+        r"- spook takes 4 of .* Of 2 that rest in mujoco 2 rest alike and 0 elsewhere, 0 move; of 2 that move 1 move",
+        said,
+    )
     assert "- `soft.xml`: mujoco and spook part at" in said and "eight times faster" in said
     assert re.search(
         "- no_such: there is no engine .*: `outside.xml`, `rubs.xml`, `soft.xml`, `swing.xml`.", said
