@@ -226,9 +226,7 @@ class _Reader:
         named if it is nowhere."""
         written = Path(name.removeprefix("file://").replace("\\", "/"))
         candidates = [written] if written.is_absolute() else [place / written for place in places]
-        if not written.is_absolute() and all(
-            not candidate.resolve().is_relative_to(self.folder) for candidate in candidates
-        ):
+        if not any(_resolved(candidate).is_relative_to(self.folder) for candidate in candidates):
             self.inside(candidates[0], _where(said or name, file, *self.parsed_files))
         inside = [c for c in candidates if c.resolve().is_relative_to(self.folder)]
         there = next((candidate for candidate in inside if candidate.is_file()), (inside or candidates)[0])

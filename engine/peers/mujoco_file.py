@@ -91,8 +91,8 @@ def refusal(run: ModelRun, error: object) -> str:
             line = place_of(texts, mesh[1]) or place_of(texts, re.sub(r"^\d+_", "", mesh[1]))
         elif element := re.search(r"name '([^']+)'", said):
             line = place_in(texts, "body", element[1])
-    helps = "; MuJoCo reads meshes as .stl, .obj and .msh: convert it" if "no decoder" in said else ""
-    return f"{path.name}{f', {line}' if line else ''}: {said}{helps}"
+    helps = " (MuJoCo reads meshes as .stl, .obj and .msh: convert it)" if "no decoder" in said else ""
+    return f"{path.name}{f', {line}' if line else ''}: {said.replace('; ', ', ')}{helps}"
 
 
 def _line(error: object) -> str:

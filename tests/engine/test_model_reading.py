@@ -152,7 +152,7 @@ BOMB = '<!DOCTYPE m [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><mujoco><worldbody
         ("<mujoco><worldbody>" + '<replicate count="10000"><body/></replicate>' * 60 + "</worldbody></mujoco>", "elements with all copies"),
         ('<robot xmlns:x="http://www.ros.org/wiki/xacro"><x:include filename="arm.xacro"/></robot>', "robot.xml is a xacro"),
         (CART.replace("wheel.stl", "../../secret.stl"), "lies outside"),
-        (CART.replace("wheel.stl", "/etc/passwd"), "lies outside"),
+        (CART.replace("wheel.stl", "/etc/passwd"), r"line 2, names /etc/passwd, which lies outside"),
         ('<mujoco><worldbody><include file="../secret.xml"/></worldbody></mujoco>', "lies outside"),
         ("<robot/>", "no links"),
         ('<robot><link name="a"/><joint name="j"><parent link="a"/><child link="b"/></joint></robot>', "ties link 'b'"),

@@ -465,10 +465,11 @@ def _print_run(document: RunDocument, everything: bool) -> None:
 
 def _answered(document: RunDocument) -> bool:
     """Whether the engine supports anything that was asked; if not, that is said: nothing is no green."""
-    if any(sample.outcome != "not_supported" for sample in document.samples):
-        return True
-    complain(f"nothing was measured: {document.engine.name} supports none of the values asked for")
-    return False
+    from spook_tracker.tracker.cli.report_table import nothing_measured
+
+    if why := nothing_measured(document):
+        complain(why)
+    return not why
 
 
 def _red(document: RunDocument) -> bool:

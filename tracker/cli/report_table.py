@@ -307,3 +307,14 @@ def verdict(run: RunDocument) -> str:
     words += f", {found.left} set points left" if found.left else ""
     words += f", {found.lost} values missing" if found.lost else ""
     return click.style(words, fg="red", bold=True)
+
+
+def nothing_measured(document: RunDocument) -> str:
+    """That an engine supports nothing of what was asked, and why, where there is one reason; empty if it does."""
+    if any(sample.outcome != "not_supported" for sample in document.samples):
+        return ""
+    why = {f": {sample.failure}" for sample in document.samples}
+    return (
+        f"nothing was measured: {document.engine.name} supports none of the values asked for"
+        f"{why.pop() if len(why) == 1 else ''}"
+    )

@@ -224,7 +224,7 @@ def test_an_engine_that_supports_nothing_is_no_green(command: tuple[str, ...]) -
     done = gate(command, engine=lacks, catalogue=QUESTIONS)
 
     assert done.exit_code == 2
-    assert "toy supports none of the values asked for" in done.stderr
+    assert "toy supports none of the values asked for: it does not support this" in done.stderr
 
 
 def test_names_that_match_no_test_are_no_green() -> None:
