@@ -215,13 +215,17 @@ def _serve(pipe: Connection, lifeline: Connection, parent: int, place: Place) ->
     except (EOFError, OSError):
         return  # there was no work
     _bound_memory(memory)
+    own = os.getpid()
     while True:
         try:
             piece = pipe.recv()
         except (EOFError, OSError):
             return
         pipe.send(("begun", None))
-        pipe.send(_answer(perform, piece, place))
+        found = _answer(perform, piece, place)
+        if os.getpid() != own:
+            os._exit(1)  # a copy that an engine has forked and let come back: it would answer once more
+        pipe.send(found)
 
 
 def _answer(

@@ -29,6 +29,8 @@ def work(piece: str) -> str | None:
         return str(len(bytearray(64 << 30)))
     if piece.startswith("raise"):
         raise ValueError(piece)
+    if piece.startswith("fork"):
+        os.fork()
     if piece.startswith("print"):
         os.write(1, b"LOUD\n")
     return None if piece.startswith("none") else piece.upper()
@@ -76,6 +78,14 @@ def test_who_hangs_dies_or_is_greedy_costs_its_own_piece():
     assert found["hang"] == crew.Lost("timed_out", "no answer within 1 s, so its process was ended")
     assert found["die"] == crew.Lost("crashed", "the engine's process died while answering")
     assert found["hog"] == crew.Lost("crashed", "the piece of work ran out of memory")
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system cannot fork")
+def test_a_copy_that_a_piece_forks_answers_nothing():
+    pieces = ["fork a", "b", "fork c", *(f"piece {n}" for n in range(5))]
+    found = list(crew.answers(work, pieces, 1, crew.Limits()))
+
+    assert found == [(piece, piece.upper()) for piece in pieces]
 
 
 def test_what_a_piece_prints_is_a_complaint(capfd: pytest.CaptureFixture[str]) -> None:
