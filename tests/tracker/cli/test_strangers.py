@@ -232,8 +232,8 @@ def test_a_comparison_blames_no_commit_that_both_versions_have(tmp_path: Path) -
     told = imported(tmp_path, data({"f": values}))
     version = {n: f"{n:04d}" + "a" * 6 for n in (10, 40, 50)}
 
-    assert "first bad commit 0020" in told("compare", version[10], version[50])[1]
-    assert "first bad commit" not in told("compare", version[40], version[50])[1]
+    assert "bad since 0020" in told("compare", version[10], version[50])[1]
+    assert "bad since" not in told("compare", version[40], version[50])[1]
 
 
 def test_two_nights_of_a_young_history_are_compared_by_the_noise_that_is_known_today(tmp_path: Path) -> None:
@@ -387,7 +387,7 @@ def test_versions_are_compared_machine_by_machine(machines: Strangers) -> None:
     junit = machines("compare", f"{15:04d}", "latest", "--format", "junit")[1]
 
     assert (code, "✗ 1 worse" in said, "compared on 3 machines: m2" in said) == (1, True, True)
-    assert "first bad commit 0020" in said
+    assert "bad since 0020" in said
     assert [place[:2] for place in re.findall(r"heap run_time .* on (m\d)", said)] == ["m0"]
     assert (document["before"]["version"][:4], document["exit_code"]) == ("0028", 0)
     assert [change["machine"][:2] for change in document["changes"]] == ["m2", "m1", "m0"]
