@@ -151,7 +151,7 @@ def test_an_engine_that_reads_no_such_file_says_so(tmp_path: Path) -> None:
     file.write_text('<sdf version="1.9"><model name="m"><link name="ball"/></model></sdf>')
     ran = CliRunner().invoke(main, ["run", "--model", str(file), "--no-record", "--workers", "0", "--all"])
 
-    assert "spook reads no SDF" in ran.output
+    assert "spook reads MJCF and URDF, no SDF" in ran.output
     assert ran.exit_code == 2  # neither green nor red: nothing was measured
 
 
