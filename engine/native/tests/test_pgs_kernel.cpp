@@ -17,7 +17,7 @@ constexpr int bodies = 8, fixed_body = bodies;
 
 /// What an iteration leaves out: friction; what else a contact may have; inertia that differs with the axis.
 struct Kind {
-    bool smooth, plain, round;
+    bool smooth, plain, isotropic;
 };
 
 struct Four {
@@ -34,7 +34,7 @@ struct Four {
         const PackedExtras* rest[4];
         for (int i = 0; i < 4; ++i) to[i] = &contacts[i], slip[i] = &slips[i], rest[i] = &rests[i];
         with({to, kind.smooth ? nullptr : slip, kind.plain ? nullptr : rest, masses.data(),
-              kind.round ? nullptr : inertia.data(), fixed_body, change});
+              kind.isotropic ? nullptr : inertia.data(), fixed_body, change});
     }
     /// The same but for the sign of zeros.
     bool equals(const Four& other) const {
@@ -71,10 +71,11 @@ Four random_four(std::mt19937& random, Kind kind) {
     for (int b = 0; b < bodies; ++b) {
         PgsBody& body = f.masses[b];
         for (double& v : body.velocity) v = one_in(6) ? 0.0 : number(random);
-        body.inverse_mass = positive(random), body.round = positive(random);
+        body.inverse_mass = positive(random), body.inverse_inertia = positive(random);
         f.inertia[b] = {positive(random), 0.1 * number(random), 0.1 * number(random),
                         positive(random), 0.1 * number(random), positive(random)};
-        if (kind.round) f.inertia[b] = {body.round, 0.0, 0.0, body.round, 0.0, body.round};
+        if (kind.isotropic)
+            f.inertia[b] = {body.inverse_inertia, 0.0, 0.0, body.inverse_inertia, 0.0, body.inverse_inertia};
     }
     for (int i = 0; i < 4; ++i) {
         PackedContact& c = f.contacts[i];
@@ -88,7 +89,7 @@ Four random_four(std::mt19937& random, Kind kind) {
         rest.across = cross(c.normal, slip.tangent);
         c.first_arm = vec(), c.second_arm = vec();
         c.right = one_in(3) ? 0.0 : number(random);
-        c.own = positive(random), c.own_inverse = 1.0 / c.own;
+        c.diagonal = positive(random), c.inverse_diagonal = 1.0 / c.diagonal;
         slip.friction = kind.smooth || one_in(3) ? 0.0 : positive(random);
         c.impulse[0] = one_in(2) ? 0.0 : positive(random);
         for (int k = 1; k < 3; ++k) c.impulse[k] = kind.smooth || one_in(2) ? 0.0 : 0.3 * number(random);

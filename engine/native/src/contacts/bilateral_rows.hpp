@@ -15,9 +15,8 @@ namespace spook {
 ///
 ///     M dv − Gᵀ dz = …,    G dv + (Sig + relief) dz = lack,
 ///
-/// so that rigid joints are exact and the pattern stays the joints' own: a tree is eliminated without fill. The relief, 1e-10
-/// of a row's own G M⁻¹ Gᵀ, is for redundant rows: it stands in the factor alone, and refinement takes it out. Rows are scaled
-/// to √J as the laws of contacts are.
+/// so that a tree is eliminated without fill. The relief is for redundant rows: it stands in the factor alone, and refinement
+/// takes it out. Rows are scaled to √J as the laws of contacts are.
 class BilateralRows {
 public:
     static bool is_bilateral(const RowBlock& block, int row) noexcept {

@@ -41,9 +41,9 @@ struct ContactBodies {
     /// A depth that is rounding: it may come back as a speed, which gives a billionth of a body's height at most, m.
     double slack(const Contact& contact) const noexcept;
     bool is_deep(const Contact& contact) const noexcept { return contact.point.gap <= -slack(contact); }
-    /// A gap no larger than the rounding of the places it was found at is none. Answered with a speed it would come back
-    /// as another of its kind, step after step: what rests would never be found at rest.
+    /// Without the rounding of the places it was found at, which would come back as a speed step after step.
     double gap(const Contact& contact) const noexcept;
+    /// A point is open from a gap of tolerances' `closed` on, times the radius of the larger body.
     bool is_closed(const Contact& contact, double gap) const noexcept {
         return gap <= closed * size(contact);
     }
@@ -63,8 +63,7 @@ struct ContactSurfaces {
     const SurfaceMaterial& operator[](int body) const noexcept { return of[body]; }
     PairMaterial pair(const Contact& contact) const noexcept {
         if (pairs.empty()) return combined(of[contact.first], of[contact.second]);
-        return pair_among_given(
-            contact);  // apart, so that of the common way only what is asked for is computed
+        return pair_among_given(contact);  // apart: of the common way little is computed
     }
     PairMaterial pair_among_given(const Contact& contact) const noexcept;
     /// Whether a surface of the contact moves along itself.

@@ -46,9 +46,8 @@ inline Vec6 sum(const Vec6& a, const Vec6& b, double s = 1.0) noexcept {
     return c;
 }
 
-/// Whether a rim's spin about its own axis alone closes an open point between its lowest and its opposite within a step, with
-/// or without this step's forces. Such a point is not of the surface that comes there: the rim turns through it, and its row
-/// would hold the rim to a radian a step. The bodies stand at `first` and `second`.
+/// Whether a rim's spin about its own axis alone closes an open point between its lowest and its opposite within a step: the rim
+/// turns through it, and its row would hold the rim to a radian a step. The bodies stand at `first` and `second`.
 bool is_turned_through(const Detection& detection, const Contact& contact, const Pose& first,
                        const Pose& second, const std::vector<Vec6>& velocity, const std::vector<Vec6>& dv_ext,
                        double h) noexcept;

@@ -22,9 +22,8 @@ public:
     double floor = 1e-12;
     int refinements = 1;
 
-    /// Fills velocity, multipliers and points of `system`; the report sums rounds, pivots and iterations and takes the
-    /// largest residual.
-    /// Where `answered` says of all rows of an island that they are an answer already, it is left as it is.
+    /// Fills velocity, multipliers and points of `system`; the report sums counts and takes the largest residual. An island whose
+    /// rows are all `answered` is left as it is.
     FrictionReport run(MixedSystem& system, std::vector<FrictionPoint>& points, const Solve& solve,
                        const std::vector<char>* answered = nullptr);
 

@@ -10,9 +10,8 @@ namespace spook {
 
 SPOOK_NAMED_ENUM(SolverKind, direct, iterative)
 
-/// What bodies that touch but do not approach each other do while an impact passes. simultaneous: they take part in
-/// it. successive: only points that are approached take part, again and again until none is: an impact runs through a
-/// row of touching balls, and the last one leaves. Of open ones the next to close comes next, with those closed by then.
+/// Bodies that touch but do not approach each other take part in an impact (simultaneous) or only points that are approached do,
+/// again and again until none is, so that it runs through a row of touching balls, and the last one leaves (successive).
 SPOOK_NAMED_ENUM(ImpactOrder, simultaneous, successive)
 
 struct ContactOptions {

@@ -25,11 +25,9 @@ StepContact& ContactPoints::add(const ContactModel& model, const Contact& contac
     return point;
 }
 
-/// Where friction differs with the direction its bound is an ellipse about the direction's shadow on the surface. In
-/// rows stretched by mu over the smaller mu, and impulses shrunk by it, it is the smaller one's disc, and every solver
-/// sees that. The slip's work is the same in both, so what is opposite to the slip on the disc dissipates most on the
-/// ellipse, and energy is only lost. A direction that stands askew on the surface counts less, by the square of its
-/// shadow; no residual is told too small, rows being stretched, never shrunk.
+/// Where friction differs with the direction its bound is an ellipse about the direction's projection onto the surface. In rows
+/// stretched by mu over the smaller mu it is the smaller one's disc, which every solver sees; the slip's work is the same, so
+/// energy is only lost. A direction askew on the surface counts less, by the square of its projection.
 void ContactPoints::orient(const ContactModel& model, StepContact& point, const Pose& first,
                            const Pose& second) {
     const Contact& contact = point.contact;

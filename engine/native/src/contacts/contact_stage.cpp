@@ -28,11 +28,12 @@ void note_initial_penetrations(const ContactModel& model, const ContactPoints& p
 }  // namespace
 
 ContactStage::ContactStage(Detection detection, const std::vector<SurfaceMaterial>& materials,
-                           std::vector<int> unknown, const ContactOptions& options,
+                           std::vector<int> solver_index, const ContactOptions& options,
                            std::vector<IndexPair> joints, std::vector<char> yielding,
                            std::vector<PairFriction> pair_frictions)
-    : model_(std::make_shared<ContactModel>(ContactBodies{detection, std::move(unknown), std::move(joints)},
-                                            ContactSurfaces{materials, std::move(pair_frictions)}, options)),
+    : model_(
+          std::make_shared<ContactModel>(ContactBodies{detection, std::move(solver_index), std::move(joints)},
+                                         ContactSurfaces{materials, std::move(pair_frictions)}, options)),
       motion_(model_),
       search_(std::move(detection)),
       projector_(model_, std::move(yielding)) {}
@@ -188,8 +189,7 @@ ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vecto
             rules.warm_started = warm_start_by_pgs(system, known, round) || rules.warm_started;
         order_points();
     }
-    mark_rows(system.mass.size(),
-              system.rows);  // the last round may have brought rows to bodies that had none
+    mark_rows(system.mass.size(), system.rows);  // the last round may have brought some
     quality_ =
         resting_.deliver(system, joints, judged(), points_, energy_, state_.cache.points, state_.counters);
     if (finite) correct_events(system);

@@ -8,32 +8,28 @@
 //                    −(4/h) Ups g + Ups C v   for a closed gap (the SPOOK row; without Ups C v if it is hit: a
 //                                             plastic impact, with friction), and
 //                    −g/h                     for an open one: it may close, no more;
-//                  then pairs that touch only because of these impulses, or of what joints alone make of forces, are
-//                  looked for, and all is solved again
-//                  (the iterative solver looks between its iterations, and gives them rows in the same solve). If one of
-//                  these is to rebound, 2 comes again, with the plastic impacts that set it in motion, then 3;
+//                  then pairs that touch only because of these impulses, or of what joints make of forces, are looked for,
+//                  and all is solved again (by PGS between its iterations). If one of these is to rebound, 2 comes again,
+//                  with the plastic impacts that set it in motion, then 3;
 //   4. projection  where the step ends, a displacement that removes overlaps and leaves no trace in v.
 //
-// What does not touch is not touched: a pair of open shapes gets rows only if a cast of both along their motion
-// finds that they meet (`collision/shape_cast.hpp`). Bodies that contacts carry (`contacts/supported_bodies.cpp`) are cast
-// with v, which their supports agree with; flying ones with v + h M⁻¹ f, whether or not they touch.
+// A point is closed up to a gap of `closed` times the larger body's radius (ContactBodies::is_closed()). A pair of open shapes
+// gets rows only if a cast of both along their motion finds that they meet (`collision/shape_cast.hpp`): supported bodies
+// (`contacts/supported_bodies.cpp`) are cast with v, flying ones with v + h M⁻¹ f.
 //
-// An impact of balls that no other contact disturbs is an event at its own time t within the step, with the normal and the
-// arms of the meeting: impulses act there, with a part of the step's forces before and the rest after, and both bodies
-// move by t v₋ + (h − t) v₊. Which part: contacts/supported_bodies.cpp.
+// An impact of balls that no other contact disturbs is an event at its own time t within the step: impulses act there, with a
+// part of the step's forces (contacts/supported_bodies.cpp) before and the rest after, and both bodies move by t v₋ + (h − t) v₊.
 // Other impacts act at the start of the step: the gap may close, no more; with restitution a step early, psi then
 // reduced to psi', psi'² = psi² − (1 − psi²) 2 a g/V², a the approaching acceleration and V the approaching
 // speed, so that the fall still ahead is not won twice.
 //
-// Why 4: the SPOOK row answers a depth with a speed, and a contact cannot take that speed back, so bodies that
-// start overlapped would be launched at .21 |g|/h (damping 4.5 h). Only the depth by which a compliant contact was
-// pressed in while it was one, the way its bodies went along the normal, enters r: what it gives back it has been
-// given. The rest is removed by positions, through the same solver with joints held: far more rigidly than their
-// compliance, which at tiny steps yields more than a body does, and more rigidly than the contacts, so that joints
-// win where both cannot be. An overlap the scene began with goes at the rate 4 Ups per step; one that comes from
-// curved paths, features that swung in or iterations that stopped early goes at once, in the step that makes it: there
-// the contacts have taken the energy that lifting the bodies back costs. What such a displacement of finite size
-// does to joints, momenta and energy is put right in `rigid/project_positions.cpp`.
+// Why 4: the SPOOK row answers a depth with a speed that a contact cannot take back: bodies that start overlapped would be
+// launched at .21 |g|/h (damping 4.5 h). Only the depth by which a compliant contact was pressed in while it was one enters
+// r. The rest is removed by positions, through the same solver with joints held: more rigidly than their compliance, which at
+// tiny steps yields more than a body does, and than the contacts, so that joints win where both cannot be. An overlap the
+// scene began with goes at the rate 4 Ups per step; one from curved paths, features that swung in or iterations that stopped
+// early goes at once: there the contacts have taken the energy that lifting the bodies back costs. What a displacement of
+// finite size does to joints, momenta and energy is put right in `rigid/project_positions.cpp`.
 //
 // Why a settled step cannot raise the energy (E kinetic and potential, constant force f, k = h M⁻¹ f): from
 // v₊ = v + k + M⁻¹ Gᵀ z and q₊ = q + h v₊ follows E₊ − E = z·G v₊ − ½ |v₊ − v|²_M. Of rigid contacts z·G v₊ = z·r
@@ -61,12 +57,12 @@ namespace spook {
 /// All state from one step to the next is in plain members: copy the stage to save it.
 class ContactStage {
 public:
-    /// One material and one `unknown` per body of the scene; unknown[b] is the body's index in MixedSystem, or −1
-    /// if it does not move by itself (static, kinematic). `joints` are the pairs of bodies that rows of joints tie;
-    /// `yielding` tells of each block of those rows whether it gives way while overlaps are parted, as springs do.
-    ContactStage(Detection detection, const std::vector<SurfaceMaterial>& materials, std::vector<int> unknown,
-                 const ContactOptions& options, std::vector<IndexPair> joints = {},
-                 std::vector<char> yielding = {}, std::vector<PairFriction> pair_frictions = {});
+    /// One material and one solver index per body of the scene; `joints` are the pairs of bodies that rows of joints tie;
+    /// `yielding`: per block of those rows, whether it gives way while overlaps are parted, as springs do.
+    ContactStage(Detection detection, const std::vector<SurfaceMaterial>& materials,
+                 std::vector<int> solver_index, const ContactOptions& options,
+                 std::vector<IndexPair> joints = {}, std::vector<char> yielding = {},
+                 std::vector<PairFriction> pair_frictions = {});
 
     /// Whether any contact can ever be; if not, the stage can be left out.
     bool possible() const noexcept { return search_.detection.possible(); }
@@ -79,9 +75,8 @@ public:
     bool detect(const std::vector<Pose>& poses, const std::vector<Vec6>& velocity,
                 const std::vector<Vec6>& free_velocity);
 
-    /// After detect() found none: whether bodies meet with the velocities that joints alone would give them, one per
-    /// body of the scene. Then it is a step with contacts. Whether some stop among the joints is `hit`, and whether one
-    /// `rebounds`.
+    /// After detect() found none: whether bodies meet with the velocities that joints alone would give them, one per body of
+    /// the scene: it is a step with contacts then. Whether some stop is hit, and whether one rebounds.
     bool meets(const std::vector<Vec6>& next, bool stop_hit, bool rebounds);
 
     /// Whether a contact with restitution is approached faster than rounding, or a stop among the rows of joints in
@@ -91,22 +86,18 @@ public:
     /// The part of the step's forces that acts on `body` before the impact, or before the last one that hit it.
     double toi_fraction(int body) const noexcept { return motion_.toi_fraction[body]; }
 
-    /// The impact. `system` holds mass, momentum M v₋ (v₋ with the lead of forces) and the rows of joints as for
-    /// solve(), of which those take part that are connected to a point. Bilateral ones keep G v₊ + Sig lambda = 0,
-    /// limits that touch do not close, those that are hit rebound, others, and motors, let go: right sides are not used.
-    /// Fills system.velocity with v after the impact, and adds its impulses to `impulses`, a row block of a joint each. It
-    /// never raises the kinetic energy (with moving kinematic bodies: that of the rest).
+    /// The impact. `system` holds mass, momentum M v₋ (with the forces before events) and the rows of joints as for solve(), of
+    /// which those take part that are connected to a point. Bilateral ones keep G v₊ + Sig lambda = 0, limits that touch do
+    /// not close, those that are hit rebound, others, and motors, let go. Fills system.velocity, and adds its impulses to
+    /// `impulses`, a row block of a joint each. It never raises the kinetic energy (with kinematic bodies: that of the rest).
     void impact(MixedSystem& system, std::vector<Vec6>& impulses);
 
     struct SolveEnd {
         bool finite = true;
-        /// The solve leads past the end of some joint's stop whose row is that of its other end, and stops unfinished: it is
-        /// to be solved again with rows for both.
-        bool ends_passed = false;
+        bool ends_passed = false;  // of a stop whose row is that of its other end: both get rows
     };
-    /// The resting stage. `system` holds mass, momentum M v + h f (less the lead) and rows of joints, `velocity` is
-    /// v after the impact. Appends rows of contacts behind those of joints; fills velocity and multipliers. It ends
-    /// unfinished, too, where an impact is needed first.
+    /// The resting stage. `system` holds mass, momentum M v + h f (less the forces before events) and rows of joints, `velocity`
+    /// is v after the impact. Appends rows of contacts; fills velocity and multipliers. Unfinished where an impact comes first.
     SolveEnd solve(MixedSystem& system, const std::vector<Vec6>& velocity);
 
     /// Velocity to add to v₊ when positions advance, per moving body; empty when there is none. It leads an event's
@@ -118,9 +109,8 @@ public:
     const PositionProjection* project_positions(const MixedSystem& system, std::size_t joints,
                                                 const std::vector<Pose>& poses, bool again);
 
-    /// Books the momentum [N s] that an island of a projection lost when it paid for its displacement as an impulse at
-    /// the first pushing contact with what does not move by itself: there forces keep adding up to the momentum, not
-    /// moments to the angular one. An island that only joints tie to such a thing has nothing to book it at.
+    /// Books the momentum [N s] that an island of a projection lost when it paid for its displacement as an impulse at the first
+    /// pushing contact with what does not move by itself, so that forces add up to the momentum, if not moments to the angular one.
     void apply_balancing_impulse(const Islands& islands, int island, Vec3 momentum) noexcept;
 
     /// Whether a moving body (by its index in MixedSystem) had rows in the last solve; others fly freely.
@@ -182,8 +172,7 @@ private:
     JudgedStep judged() const noexcept { return {motion_, points_, state_.initial_penetration}; }
     // solve_by_pgs.cpp: the same by PGS over compact contacts
     struct PgsSolveEnd : SolveEnd {
-        bool unfinished =
-            false;  // few joints and contacts are better solved by rows, or the iterations run away
+        bool unfinished = false;  // few rows are better solved directly, or the iterations run away
     };
     PgsSolveEnd solve_by_pgs(MixedSystem& system);
     bool warm_start_by_pgs(MixedSystem& system, std::size_t known, int round);
@@ -210,7 +199,7 @@ private:
     std::vector<Vec6> next_;     // velocities between iterations, per body of the scene
     std::vector<char> changed_;  // bodies with another than at the look before: the rest was judged then
     IslandFinder connected_;
-    std::vector<char> has_rows_;  // moving bodies with rows, by unknown
+    std::vector<char> has_rows_;  // moving bodies with rows, by solver index
     SolveQuality quality_;
 };
 

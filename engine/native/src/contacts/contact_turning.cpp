@@ -1,9 +1,8 @@
 // Pairs that touch and turn: features that swing in within the step.
 //
-// A manifold tells where two bodies touch at the start of a step. While they turn on it, an edge or a corner that was
-// far away may come down elsewhere; no row of that manifold knows of it. So the velocities a solve found are tried:
-// both bodies are moved to the end of the step, and what lies deep there gets a row for the step itself. Its gap is the
-// one that to first order closes to the depth found, so the row holds the feature out and nothing before it.
+// While two bodies turn on a manifold, an edge or a corner may come down that no row of it knows of. So both are moved to the
+// end of the step with the velocities a solve found, and what lies deep there gets a row for the step itself, with the gap
+// that to first order closes to the depth found.
 #include <algorithm>
 #include <cmath>
 

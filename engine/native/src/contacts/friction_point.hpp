@@ -10,9 +10,8 @@
 
 namespace spook {
 
-/// cone: |beta| <= mu nu, isotropic but for what ContactStage::orient() stretches. box: each |beta_i| <= mu nu of the
-/// step before, tangents along world axes.
-/// scaled_box: the box with the normal force of this step.
+/// cone: |beta| <= mu nu, an ellipse where friction differs with the direction (ContactPoints). box: each |beta_i| <= mu nu of
+/// the step before, tangents along world axes; scaled_box: of this step.
 SPOOK_NAMED_ENUM(FrictionModel, cone, box, scaled_box)
 
 /// Rows of one contact's block that its normal, row 0, bounds: 1 and 2 the tangents; where turning meets friction, too,
@@ -21,11 +20,9 @@ struct FrictionPoint {
     int block = 0;               // in MixedSystem::rows
     double coefficient = 0.0;    // mu
     double slip_softness = 0.0;  // gamma / h, of both tangent rows
-    double normal =
-        -1.0;  // nu of the step before, N s; negative: unknown; then, but for the box, of this one
+    double normal = -1.0;   // nu of the step before, N s; negative: unknown; then, but for the box, of this
     int row = 1, size = 2;  // which rows: two obey a disc (or box), one an interval
-    bool anisotropic =
-        false;  // the two rows differ in scale: their own part is solved exactly, not by projection
+    bool anisotropic = false;  // the two rows differ in scale: solved exactly, not by projection
 };
 
 /// Whether the point is rolling or torsional friction.
@@ -35,17 +32,15 @@ struct FrictionReport {
     int rounds = 0;  // solves of the whole system
     int pivots = 0;  // rows that changed state
     int pgs_iterations = 0;
-    double residual =
-        0.0;  // that the solve ended on: of the friction law, relative (direct), or a change, m/s (iterations)
+    double residual = 0.0;  // of the friction law, relative (direct), or a change, m/s (iterations)
     bool converged = true;
     bool finite = true;
 };
 
-/// The row that is furthest from its law, and by how much: each multiplier against where a step of projection would
-/// put it, as a velocity [m/s]. This is *the* residual: what a result reports, and what an "unsettled" run is judged by,
-/// for every solver (`PgsSolver::worst` measures it over its own contacts). PGS ends on the largest change of an
-/// iteration instead, the same map seen row by row while it is being followed. For the box `FrictionPoint::normal` is the bound's. Residuals up to `enough` are not
-/// told apart: where all are, that is the answer, and looking is cheaper.
+/// The row that is furthest from its law, and by how much: each multiplier against where a step of projection would put it, as
+/// a velocity [m/s]. This is *the* residual that a result reports and an "unsettled" run is judged by, for every solver
+/// (`PgsSolver::worst` measures it over its own contacts; PGS ends on the largest change of an iteration instead). For the box
+/// `FrictionPoint::normal` is the bound's. Residuals up to `enough` are not told apart.
 struct RowsResidual {
     double residual = 0.0;
     int row = 0;  // index into MixedSystem::rows
@@ -58,9 +53,8 @@ double own_inertia(const MassFactors& mass, const RowBlock& block, int i);
 RowsResidual rows_residual(const MixedSystem& system, const std::vector<FrictionPoint>& points,
                            FrictionModel model, double enough = 0.0);
 
-/// Whether velocities and multipliers in `system` are the answer already, as those of the step before are at rest:
-/// looking costs one pass over the rows, and no factor. Rows must hold to 1e-14 of the speed that forces give in a
-/// step, and impulses balance to 1e-13 of the largest; a velocity that is kept does not gather rounding.
+/// Whether velocities and multipliers in `system` are the answer already, as those of the step before are at rest: rows hold to
+/// 1e-14 of the speed that forces give in a step, and impulses balance to 1e-13 of the largest. Costs no factor.
 bool still_right(const MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model);
 
 /// Slip velocity of row i, with what slip compliance gives way: D v + (gamma/h) beta.

@@ -1,13 +1,12 @@
 // Bodies that are sunk into what holds them, and come to the side of its next part.
 //
-// A body that lies a micron deep in the first of two tiles, as compliance and overlaps make it, would be stopped by the side
-// of the second. Cast as it would stand if it were lifted out of the first, it goes over the second. What does not lie
-// beneath the surface it is lifted to is no such part: it is met where it stands, however deep the body is sunk elsewhere,
-// or overlaps would breed others.
+// A body that lies a micron deep in the first of two tiles would be stopped by the side of the second. Cast as it would stand if
+// it were lifted out of the first, it goes over the second. What does not lie beneath the surface it is lifted to is no such
+// part: it is met where it stands, or overlaps would breed others.
 //
-// What falls onto the first tile is cast through it as well, and would come to the side of the second from below: what is met
-// first occludes what a body would meet only behind it. And where edges lie on each other, as a body's and a tile's do when
-// a step begins there, both faces are as near: the one it moves past is no obstacle.
+// What falls onto the first tile is cast through it, and would come to the side of the second from below: what is met first
+// occludes what a body would meet behind it. Where edges lie on each other both faces are as near: the one a body moves past
+// is no obstacle.
 #include "contacts/internal_edges.hpp"
 
 #include <algorithm>

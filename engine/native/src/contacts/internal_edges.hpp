@@ -55,7 +55,7 @@ public:
     /// To be told of the points before what follows is asked.
     void index(const SearchedStep& step);
 
-    /// The overlap at which a pair counts as met, m.
+    /// The overlap at which a pair counts as met, m: the tolerance of every time_of_impact().
     static double slop(const SearchedStep& step, const OpenPair& open) noexcept;
     /// Whether `body`, that would meet another at `time` [s], does not once it is lifted out of what holds it. `facing` is
     /// the normal they touch with already, if they do. Between iterations it sinks as far as it will, and is asked about again;

@@ -18,7 +18,7 @@ template <class R> SPOOK_ALWAYS Three<R> cross(const Three<R>& a, const Three<R>
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 
-/// Coulomb's disc for one step of projection: what lies outside is scaled back to it.
+/// Coulomb's cone, cut at a normal impulse: the disc |beta| <= bound. One step of projection scales back what lies outside.
 struct Disc {
     template <class R>
     SPOOK_ALWAYS R operator()(const R& step, const R& b1, const R& b2, const R& s1, const R& s2,
@@ -45,16 +45,16 @@ template <class R, class Mask, class Body>
 SPOOK_ALWAYS void push_body(Body body, const R& sign, const Three<R>& arm, const Three<R>& impulse,
                             const Mask& pushes) {
     Three<R> v, w;
-    R inverse_mass, round;
-    body.read(v, w, inverse_mass, round);
-    const Three<R> turn = body.turned(cross(arm, impulse), round);
+    R inverse_mass, inverse_inertia;
+    body.read(v, w, inverse_mass, inverse_inertia);
+    const Three<R> turn = body.turned(cross(arm, impulse), inverse_inertia);
     v.x = pushes ? v.x + sign * (inverse_mass * impulse.x) : v.x;
     v.y = pushes ? v.y + sign * (inverse_mass * impulse.y) : v.y;
     v.z = pushes ? v.z + sign * (inverse_mass * impulse.z) : v.z;
     w.x = pushes ? w.x + sign * turn.x : w.x;
     w.y = pushes ? w.y + sign * turn.y : w.y;
     w.z = pushes ? w.z + sign * turn.z : w.z;
-    body.write(v, w, inverse_mass, round);
+    body.write(v, w, inverse_mass, inverse_inertia);
 }
 
 /// Solves a contact's rows for the velocities of its bodies: the normal first, then friction by `law`, whose bound is mu
@@ -62,21 +62,22 @@ SPOOK_ALWAYS void push_body(Body body, const R& sign, const Three<R>& arm, const
 /// reads and writes the contact, one of a kind or several side by side; each part when it is needed.
 template <class R, class From, class Law> SPOOK_ALWAYS R solve_contact(From from, const Law& law, bool box) {
     Three<R> first_arm, second_arm, normal, tangent, v, w;
-    R right, own, own_inverse, impulse[3], friction, softness, before, inverse_mass, round;
+    R right, diagonal, inverse_diagonal, impulse[3], friction, softness, before, inverse_mass,
+        inverse_inertia;
     from.arms(first_arm, second_arm, right);
-    from.first().read(v, w, inverse_mass, round);
+    from.first().read(v, w, inverse_mass, inverse_inertia);
     const Three<R> a = velocity_at(v, w, first_arm);
-    from.second().read(v, w, inverse_mass, round);
+    from.second().read(v, w, inverse_mass, inverse_inertia);
     const Three<R> b = velocity_at(v, w, second_arm), u{a.x - b.x, a.y - b.y, a.z - b.z};
-    from.normal(normal, own);
-    from.impulse(impulse, own_inverse);
+    from.normal(normal, diagonal);
+    from.impulse(impulse, inverse_diagonal);
     from.tangent(tangent, friction);  // nothing where it has none
     from.normal_extras(softness, before);
     const R zero{}, old = impulse[0];
-    const R asked = old - (dot(normal, u) + softness * old - right) * own_inverse;
+    const R asked = old - (dot(normal, u) + softness * old - right) * inverse_diagonal;
     const R nu = asked <= 0.0 ? zero : asked;  // what is not a number stays
     const R dn = nu - old;
-    R change = magnitude(dn) * own, d1 = zero, d2 = zero;
+    R change = magnitude(dn) * diagonal, d1 = zero, d2 = zero;
     impulse[0] = nu;
     const R bound = friction * (box ? before : nu);
     const auto rubs = (bound > 0.0) | (impulse[1] != 0.0) | (impulse[2] != 0.0);
@@ -96,7 +97,7 @@ template <class R, class From, class Law> SPOOK_ALWAYS R solve_contact(From from
         impulse[1] = rubs ? impulse[1] + d1 : impulse[1];
         impulse[2] = rubs ? impulse[2] + d2 : impulse[2];
     }
-    from.write(impulse, own_inverse);
+    from.write(impulse, inverse_diagonal);
     const auto pushes = (dn != 0.0) | (d1 != 0.0) | (d2 != 0.0);
     if (!any(pushes)) return change;
     const Three<R> all{dn * normal.x + d1 * tangent.x + d2 * across.x,
@@ -115,25 +116,26 @@ struct Single {
     const PackedFriction& slip;
     const PackedExtras* extras;  // null: none
     PgsBody* bodies;
-    const PgsInertia* inertia;  // null: all are round
+    const PgsInertia* inertia;  // null: all are isotropic
     int fixed_body;
 
     struct Body {
-        PgsBody& own;
+        PgsBody& state;
         const PgsInertia* inertia;
         bool moves;
         SPOOK_ALWAYS void read(Three<double>& v, Three<double>& w, double& inverse_mass,
-                               double& round) const {
-            v = {own.velocity[0], own.velocity[1], own.velocity[2]};
-            w = {own.velocity[3], own.velocity[4], own.velocity[5]};
-            inverse_mass = own.inverse_mass, round = own.round;
+                               double& inverse_inertia) const {
+            v = {state.velocity[0], state.velocity[1], state.velocity[2]};
+            w = {state.velocity[3], state.velocity[4], state.velocity[5]};
+            inverse_mass = state.inverse_mass, inverse_inertia = state.inverse_inertia;
         }
-        SPOOK_ALWAYS Three<double> turned(const Three<double>& m, double round) const {
-            return inertia != nullptr ? three(inertia->turn({m.x, m.y, m.z}))
-                                      : Three<double>{round * m.x, round * m.y, round * m.z};
+        SPOOK_ALWAYS Three<double> turned(const Three<double>& m, double inverse_inertia) const {
+            return inertia != nullptr
+                       ? three(inertia->turn({m.x, m.y, m.z}))
+                       : Three<double>{inverse_inertia * m.x, inverse_inertia * m.y, inverse_inertia * m.z};
         }
         SPOOK_ALWAYS void write(const Three<double>& v, const Three<double>& w, double, double) const {
-            if (moves) own.velocity = {v.x, v.y, v.z, w.x, w.y, w.z};
+            if (moves) state.velocity = {v.x, v.y, v.z, w.x, w.y, w.z};
         }
     };
     SPOOK_ALWAYS Body body(int at) const {
@@ -145,10 +147,12 @@ struct Single {
     SPOOK_ALWAYS void arms(Three<double>& first, Three<double>& second, double& right) const {
         first = three(c.first_arm), second = three(c.second_arm), right = c.right;
     }
-    SPOOK_ALWAYS void normal(Three<double>& n, double& own) const { n = three(c.normal), own = c.own; }
-    SPOOK_ALWAYS void impulse(double* z, double& own_inverse) const {
+    SPOOK_ALWAYS void normal(Three<double>& n, double& diagonal) const {
+        n = three(c.normal), diagonal = c.diagonal;
+    }
+    SPOOK_ALWAYS void impulse(double* z, double& inverse_diagonal) const {
         for (int k = 0; k < 3; ++k) z[k] = c.impulse[k];
-        own_inverse = c.own_inverse;
+        inverse_diagonal = c.inverse_diagonal;
     }
     SPOOK_ALWAYS void tangent(Three<double>& t, double& friction) const {
         t = three(slip.tangent), friction = slip.friction;

@@ -27,11 +27,11 @@ Vec3 add_turn(const Vec6& v, Vec3 arm) noexcept { return linear(v) + cross(angul
 
 /// Friction whose two directions differ in scale, solved exactly.
 struct AnisotropicDisc {
-    const double* own;
+    const double* tangents;
     double operator()(double step, double b1, double b2, double s1, double s2, double bound, double& d1,
                       double& d2) const {
         double z1 = b1 - step * s1, z2 = b2 - step * s2;
-        least_on_disc(own, b1, b2, s1, s2, bound, z1, z2);
+        least_on_disc(tangents, b1, b2, s1, s2, bound, z1, z2);
         d1 = z1 - b1, d2 = z2 - b2;
         return length(d1, d2) / step;
     }
@@ -39,12 +39,12 @@ struct AnisotropicDisc {
 
 /// Each direction by itself.
 struct Square {
-    const double* own;
+    const double* tangents;
     double operator()(double, double b1, double b2, double s1, double s2, double bound, double& d1,
                       double& d2) const {
-        d1 = std::clamp(b1 - s1 / own[0], -bound, bound) - b1;
-        d2 = std::clamp(b2 - (s2 + own[1] * d1) / own[2], -bound, bound) - b2;
-        return larger(std::abs(d1) * own[0], std::abs(d2) * own[2]);
+        d1 = std::clamp(b1 - s1 / tangents[0], -bound, bound) - b1;
+        d2 = std::clamp(b2 - (s2 + tangents[1] * d1) / tangents[2], -bound, bound) - b2;
+        return larger(std::abs(d1) * tangents[0], std::abs(d2) * tangents[2]);
     }
 };
 
@@ -53,17 +53,17 @@ struct Square {
 void PgsContacts::begin(MixedSystem& system, FrictionModel model) {
     bodies_ = static_cast<int>(system.mass.size());
     inertia_.resize(bodies_ + 1);
-    round_ = true;
+    isotropic_ = true;
     for (int b = 0; b < bodies_; ++b) {
         inertia_[b] = inverse_inertia(system.mass[b]);
-        round_ = round_ && inertia_[b].is_round();
+        isotropic_ = isotropic_ && inertia_[b].is_isotropic();
     }
     inertia_[bodies_] = {};
     if (!system.rows.empty()) joints_.prepare(system, {}, model);
     joints_.bodies().resize(bodies_ + 1);
     for (int b = 0; b < bodies_; ++b) {
         body(b).inverse_mass = 1.0 / system.mass[b][0];
-        body(b).round = inertia_[b].xx;
+        body(b).inverse_inertia = inertia_[b].xx;
     }
     relaxation_ = 1.0;
     take_momenta(system, model);
@@ -73,19 +73,19 @@ void PgsContacts::begin_beside(const PgsContacts& other, MixedSystem& system, Fr
                                double relaxation) {
     relaxation_ = relaxation;
     bodies_ = other.bodies_;
-    round_ = other.round_;
-    if (!round_) inertia_ = other.inertia_;
+    isotropic_ = other.isotropic_;
+    if (!isotropic_) inertia_ = other.inertia_;
     if (!system.rows.empty()) joints_.prepare(system, {}, model);
     joints_.bodies().resize(bodies_ + 1);
     for (int b = 0; b < bodies_; ++b) {
         body(b).inverse_mass = other.body(b).inverse_mass;
-        body(b).round = other.body(b).round;
+        body(b).inverse_inertia = other.body(b).inverse_inertia;
     }
     take_momenta(system, model);
 }
 
 Vec3 PgsContacts::turned(int b, Vec3 moment) const noexcept {
-    return round_ ? body(b).round * moment : inertia_[b].turn(moment);
+    return isotropic_ ? body(b).inverse_inertia * moment : inertia_[b].turn(moment);
 }
 
 void PgsContacts::take_momenta(MixedSystem& system, FrictionModel model) {
@@ -112,9 +112,10 @@ void PgsContacts::put(const PgsContact& given, int place) {
     c.second_arm = given.second_arm;
     c.right = given.right[0];
     const Vec3 first = cross(c.first_arm, c.normal), second = cross(c.second_arm, c.normal);
-    c.own = body(c.first).inverse_mass + body(c.second).inverse_mass +
-            (dot(first, turned(c.first, first)) + dot(second, turned(c.second, second))) + given.softness;
-    c.own_inverse = c.own > 0.0 ? relaxation_ / c.own : 0.0;
+    c.diagonal = body(c.first).inverse_mass + body(c.second).inverse_mass +
+                 (dot(first, turned(c.first, first)) + dot(second, turned(c.second, second))) +
+                 given.softness;
+    c.inverse_diagonal = c.diagonal > 0.0 ? relaxation_ / c.diagonal : 0.0;
     Vec3 impulse = (c.impulse[0] = given.impulse[0]) * c.normal;
     if (given.friction > 0.0) {
         c.impulse[1] = given.impulse[1], c.impulse[2] = given.impulse[2];
@@ -151,12 +152,12 @@ void PgsContacts::add_slip(const PgsContact& given, int place) {
                  along = given.anisotropic ? dot(given.tangent, given.tangent) : 1.0,
                  across = given.anisotropic ? dot(given.across, given.across) : 1.0;
     Box box;
-    box.own[0] = inverse_mass * along + part(1, 1) + given.slip_softness;
-    box.own[1] = part(1, 2);
-    box.own[2] = inverse_mass * across + part(2, 2) + given.slip_softness;
+    box.tangents[0] = inverse_mass * along + part(1, 1) + given.slip_softness;
+    box.tangents[1] = part(1, 2);
+    box.tangents[2] = inverse_mass * across + part(2, 2) + given.slip_softness;
     box.anisotropic = given.anisotropic;
-    const double largest =
-        0.5 * (box.own[0] + box.own[2]) + length(0.5 * (box.own[0] - box.own[2]), box.own[1]);
+    const double largest = 0.5 * (box.tangents[0] + box.tangents[2]) +
+                           length(0.5 * (box.tangents[0] - box.tangents[2]), box.tangents[1]);
     slip.step = largest > 0.0 ? 1.0 / largest : 0.0;
 
     const bool boxed = model_ != FrictionModel::cone || given.anisotropic || !boxes_.empty();
@@ -193,18 +194,18 @@ double PgsContacts::update(std::size_t place) noexcept {
         return single::solve_contact<double>(
             single::Single{contacts_[place], slips_.empty() ? no_slip_ : slips_[place],
                            extras_.empty() ? nullptr : &extras_[place], joints_.bodies().data(),
-                           round_ ? nullptr : inertia_.data(), bodies_},
+                           isotropic_ ? nullptr : inertia_.data(), bodies_},
             law, box);
     };
     if (boxes_.empty()) return by(single::Disc{}, false);
     const Box& box = boxes_[place];
-    if (model_ != FrictionModel::cone) return by(Square{box.own}, model_ == FrictionModel::box);
-    return box.anisotropic ? by(AnisotropicDisc{box.own}, false) : by(single::Disc{}, false);
+    if (model_ != FrictionModel::cone) return by(Square{box.tangents}, model_ == FrictionModel::box);
+    return box.anisotropic ? by(AnisotropicDisc{box.tangents}, false) : by(single::Disc{}, false);
 }
 
 void PgsContacts::relax_no_more() {
     if (std::exchange(relaxation_, 1.0) == 1.0) return;
-    for (PackedContact& c : contacts_) c.own_inverse = c.own > 0.0 ? 1.0 / c.own : 0.0;
+    for (PackedContact& c : contacts_) c.inverse_diagonal = c.diagonal > 0.0 ? 1.0 / c.diagonal : 0.0;
 }
 
 double PgsContacts::residual(std::size_t k) const noexcept {
@@ -212,7 +213,7 @@ double PgsContacts::residual(std::size_t k) const noexcept {
     const PackedExtras& extras = extras_.empty() ? no_extras_ : extras_[k];
     const Vec3 u = add_turn(velocity(c.first), c.first_arm) - add_turn(velocity(c.second), c.second_arm);
     const double w = dot(c.normal, u) + extras.softness * c.impulse[0] - c.right;
-    const double residual = w > 0.0 ? std::min(w, c.own * c.impulse[0]) : -w;
+    const double residual = w > 0.0 ? std::min(w, c.diagonal * c.impulse[0]) : -w;
     const PackedFriction& slip = slips_.empty() ? no_slip_ : slips_[k];
     if (!(slip.friction > 0.0)) return residual;
     const Vec3 across = extras_.empty() ? cross(c.normal, slip.tangent) : extras.across;

@@ -55,7 +55,7 @@ public:
             if (!extras_.empty()) extras[k] = &extras_[place_of(k)];
         }
         solve_four()({four, slips_.empty() ? nullptr : slips, extras_.empty() ? nullptr : extras,
-                      joints_.bodies().data(), round_ ? nullptr : inertia_.data(), bodies_, change});
+                      joints_.bodies().data(), isotropic_ ? nullptr : inertia_.data(), bodies_, change});
     }
     double update_joint(std::size_t block) noexcept { return joints_.update_joint(block); }
     /// Asks for what later contacts will read: in large heaps it comes from far away.
@@ -64,7 +64,7 @@ public:
         if (!slips_.empty()) prefetch(slips_[later]);
         for (const int at : {first, second}) {
             prefetch(body(at));
-            if (!round_) prefetch(inertia_[at]);
+            if (!isotropic_) prefetch(inertia_[at]);
         }
     }
     void relax_no_more();
@@ -82,8 +82,8 @@ public:
     }
 
 private:
-    struct Box {                    // what only boxes and anisotropic friction read
-        double own[3] = {0, 0, 0};  // (t, t), (t, u), (u, u), with gamma/h
+    struct Box {                         // what only boxes and anisotropic friction read
+        double tangents[3] = {0, 0, 0};  // (t, t), (t, u), (u, u), with gamma/h
         bool anisotropic = false;
     };
     void take_momenta(MixedSystem& system, FrictionModel model);
@@ -98,7 +98,7 @@ private:
     PgsRows joints_;
     int bodies_ = 0;
     LargeArray<PgsInertia> inertia_;
-    bool round_ = true;  // all bodies are
+    bool isotropic_ = true;  // all inertias are
     double relaxation_ = 1.0;
     LargeArray<PackedContact> contacts_;
     // Of each, from where some contact has it on: in large heaps memory is what iterating costs.

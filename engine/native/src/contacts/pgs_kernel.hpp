@@ -13,8 +13,8 @@ struct alignas(64) PackedContact {
     Vec3 second_arm;
     double right;  // of the normal
     Vec3 normal;
-    double own;  // of the normal, with Sig
-    double impulse[3], own_inverse;
+    double diagonal;  // of C M⁻¹ Cᵀ + Sig
+    double impulse[3], inverse_diagonal;
 };
 static_assert(sizeof(PackedContact) == 128);
 
@@ -38,16 +38,16 @@ static_assert(sizeof(PackedExtras) == 64);
 /// A body, in one line.
 struct alignas(64) PgsBody {
     Vec6 velocity{};
-    double inverse_mass = 0.0;  // 1/kg
-    double round = 0.0;         // inverse inertia of one that turns alike about every axis, 1/(kg m²)
+    double inverse_mass = 0.0;     // 1/kg
+    double inverse_inertia = 0.0;  // where the inertia is isotropic, 1/(kg m²)
 };
 static_assert(sizeof(PgsBody) == 64);
 
-/// The inverse of a body's inertia about world axes, 1/(kg m²), symmetric; read only where some body is not round.
+/// The inverse of a body's inertia about world axes, 1/(kg m²), symmetric; read only where some inertia is not isotropic.
 struct alignas(64) PgsInertia {
     double xx = 0.0, xy = 0.0, xz = 0.0, yy = 0.0, yz = 0.0, zz = 0.0;
 
-    bool is_round() const noexcept { return xy == 0.0 && xz == 0.0 && yz == 0.0 && xx == yy && xx == zz; }
+    bool is_isotropic() const noexcept { return xy == 0.0 && xz == 0.0 && yz == 0.0 && xx == yy && xx == zz; }
     Vec3 turn(Vec3 moment) const noexcept {
         return {xx * moment.x + xy * moment.y + xz * moment.z, xy * moment.x + yy * moment.y + yz * moment.z,
                 xz * moment.x + yz * moment.y + zz * moment.z};
@@ -55,9 +55,8 @@ struct alignas(64) PgsInertia {
 };
 static_assert(sizeof(PgsInertia) == 64);
 
-/// Solves four contacts with isotropic friction on the disc, none of which shares a moving body with another, and
-/// writes the largest change of a row of each, m/s. `slips` and `extras` are null where no contact of the iteration has any, and
-/// `inertia` where all bodies are round.
+/// Solves four contacts with isotropic friction on the disc (pgs_contact.inl), none of which shares a moving body with another;
+/// `change`: of a row of each, the largest, m/s. `slips` and `extras` are null where none has any, `inertia` where all are isotropic.
 struct PgsGroup {
     PackedContact* const* contacts;
     const PackedFriction* const* slips;

@@ -38,20 +38,21 @@ FOURS void gather(const double* const from[4], int at, Four& a, Four& b, Four& c
     transpose(a, b, c, d);
 }
 
-template <bool round_only> struct FourBodies {
+template <bool isotropic_only> struct FourBodies {
     const int* at;
     PgsBody* bodies;
     const PgsInertia* inertia;
     int fixed_body;
 
-    FOURS void read(Three<Four>& v, Three<Four>& w, Four& inverse_mass, Four& round) const {
+    FOURS void read(Three<Four>& v, Three<Four>& w, Four& inverse_mass, Four& inverse_inertia) const {
         const double* from[4];
         for (int i = 0; i < 4; ++i) from[i] = bodies[at[i]].velocity.data();
         gather(from, 0, v.x, v.y, v.z, w.x);
-        gather(from, 4, w.y, w.z, inverse_mass, round);
+        gather(from, 4, w.y, w.z, inverse_mass, inverse_inertia);
     }
-    FOURS Three<Four> turned(const Three<Four>& moment, const Four& round) const {
-        if (round_only) return {round * moment.x, round * moment.y, round * moment.z};
+    FOURS Three<Four> turned(const Three<Four>& moment, const Four& inverse_inertia) const {
+        if (isotropic_only)
+            return {inverse_inertia * moment.x, inverse_inertia * moment.y, inverse_inertia * moment.z};
         const double* from[4];
         for (int k = 0; k < 4; ++k) from[k] = &inertia[at[k]].xx;
         Four xx, xy, xz, yy, yz, zz, one, two;
@@ -61,8 +62,8 @@ template <bool round_only> struct FourBodies {
                 xz * moment.x + yz * moment.y + zz * moment.z};
     }
     FOURS void write(const Three<Four>& v, const Three<Four>& w, const Four& inverse_mass,
-                     const Four& round) const {
-        Four a = v.x, b = v.y, c = v.z, d = w.x, e = w.y, f = w.z, g = inverse_mass, h = round;
+                     const Four& inverse_inertia) const {
+        Four a = v.x, b = v.y, c = v.z, d = w.x, e = w.y, f = w.z, g = inverse_mass, h = inverse_inertia;
         transpose(a, b, c, d);
         transpose(e, f, g, h);
         const Four front[4] = {a, b, c, d}, back[4] = {e, f, g, h};
@@ -75,7 +76,7 @@ template <bool round_only> struct FourBodies {
     }
 };
 
-template <bool with_slip, bool with_extras, bool round_only> struct FourContacts {
+template <bool with_slip, bool with_extras, bool isotropic_only> struct FourContacts {
     static constexpr bool rough = with_slip;
     double* const* at;
     const double* const* slip;
@@ -85,15 +86,17 @@ template <bool with_slip, bool with_extras, bool round_only> struct FourContacts
     const PgsInertia* inertia;
     int fixed_body;
 
-    FOURS FourBodies<round_only> first() const { return {firsts, bodies, inertia, fixed_body}; }
-    FOURS FourBodies<round_only> second() const { return {seconds, bodies, inertia, fixed_body}; }
+    FOURS FourBodies<isotropic_only> first() const { return {firsts, bodies, inertia, fixed_body}; }
+    FOURS FourBodies<isotropic_only> second() const { return {seconds, bodies, inertia, fixed_body}; }
     FOURS void arms(Three<Four>& first, Three<Four>& second, Four& right) const {
         Four names;
         gather(at, 0, names, first.x, first.y, first.z);
         gather(at, 4, second.x, second.y, second.z, right);
     }
-    FOURS void normal(Three<Four>& n, Four& own) const { gather(at, 8, n.x, n.y, n.z, own); }
-    FOURS void impulse(Four* z, Four& own_inverse) const { gather(at, 12, z[0], z[1], z[2], own_inverse); }
+    FOURS void normal(Three<Four>& n, Four& diagonal) const { gather(at, 8, n.x, n.y, n.z, diagonal); }
+    FOURS void impulse(Four* z, Four& inverse_diagonal) const {
+        gather(at, 12, z[0], z[1], z[2], inverse_diagonal);
+    }
     FOURS void tangent(Three<Four>& t, Four& friction) const {
         t.x = t.y = t.z = friction = Four{};
         if (with_slip) gather(slip, 0, t.x, t.y, t.z, friction);
@@ -123,8 +126,8 @@ template <bool with_slip, bool with_extras, bool round_only> struct FourContacts
         gather(extras, 0, a, b, c, right1);
         gather(extras, 4, right2, a, softness, b);
     }
-    FOURS void write(const Four* z, const Four& own_inverse) const {
-        Four a = z[0], b = z[1], c = z[2], d = own_inverse;
+    FOURS void write(const Four* z, const Four& inverse_diagonal) const {
+        Four a = z[0], b = z[1], c = z[2], d = inverse_diagonal;
         transpose(a, b, c, d);
         const Four all[4] = {a, b, c, d};
         for (int i = 0; i < 4; ++i) *reinterpret_cast<FourInMemory*>(at[i] + 12) = all[i];
@@ -152,9 +155,9 @@ void avx2_solve_four(const PgsGroup& group) {
     }
     FourInMemory& change = *reinterpret_cast<FourInMemory*>(group.change);
     const auto solve = [&]<bool with_slip, bool with_extras>() __attribute__((always_inline)) {
-        const auto over = [&]<bool round_only>() __attribute__((always_inline)) {
+        const auto over = [&]<bool isotropic_only>() __attribute__((always_inline)) {
             change = solve_contact<Four>(
-                FourContacts<with_slip, with_extras, round_only>{
+                FourContacts<with_slip, with_extras, isotropic_only>{
                     at, slip, extras, first, second, group.bodies, group.inertia, group.fixed_body},
                 Disc{}, false);
         };

@@ -22,7 +22,7 @@ inline double larger(double a, double b) noexcept { return a >= b || std::isnan(
 struct PgsRow {
     Vec6 first, second;            // G
     Vec6 first_push, second_push;  // M⁻¹ Gᵀ
-    double own = 0.0;              // (G M⁻¹ Gᵀ + Sig)ᵢᵢ
+    double diagonal = 0.0;         // (G M⁻¹ Gᵀ + Sig)ᵢᵢ
     double softness = 0.0, right = 0.0, lower = 0.0, upper = 0.0, multiplier = 0.0;
 };
 
@@ -133,13 +133,13 @@ private:
             row.lower = given.lower[i];
             row.upper = given.upper[i];
             row.multiplier = given.multiplier[i];
-            row.own = schur(row, row) + row.softness;
+            row.diagonal = schur(row, row) + row.softness;
             block.further = static_cast<int>(further_.size());
             for (const FurtherBody& other : given.further) {
                 PgsFurtherBody& far =
                     further_.emplace_back(PgsFurtherBody{other.body, other.jacobian, other.jacobian});
                 solve_six(mass_factor_[other.body], far.push);
-                row.own += dot(far.row, far.push);
+                row.diagonal += dot(far.row, far.push);
             }
             block.further_end = static_cast<int>(further_.size());
             bilateral = bilateral && row.lower == -unbounded && row.upper == unbounded;
@@ -150,7 +150,8 @@ private:
                 if (points[k].size != 2) continue;
                 const PgsRow &one = rows_[block.row + points[k].row], &two = (&one)[1];
                 block.step[k - block.point] =
-                    1.0 / (0.5 * (one.own + two.own) + length(0.5 * (one.own - two.own), schur(one, two)));
+                    1.0 / (0.5 * (one.diagonal + two.diagonal) +
+                           length(0.5 * (one.diagonal - two.diagonal), schur(one, two)));
             }
         } else if (bilateral) {
             block.kind = PgsBlock::Kind::bilateral;
@@ -158,8 +159,8 @@ private:
             for (int i = 0; i < 6; ++i) whole[7 * i] = 1.0;
             for (int i = 0; i < block.size; ++i)
                 for (int j = 0; j < block.size; ++j)
-                    whole[6 * i + j] =
-                        i == j ? rows_[block.row + i].own : schur(rows_[block.row + i], rows_[block.row + j]);
+                    whole[6 * i + j] = i == j ? rows_[block.row + i].diagonal
+                                              : schur(rows_[block.row + i], rows_[block.row + j]);
             // A body tied twice to the world makes no singular block; a rigid joint without inertia would.
             for (int i = 0; i < block.size; ++i) whole[7 * i] *= 1.0 + 1e-12;
             block.factor = static_cast<int>(factors_.size());
@@ -190,13 +191,13 @@ private:
     }
 
     double update_row(const PgsBlock& block, PgsRow& row) noexcept {
-        if (!(row.own > 0.0)) return std::isnan(row.own) ? row.own : 0.0;
+        if (!(row.diagonal > 0.0)) return std::isnan(row.diagonal) ? row.diagonal : 0.0;
         const double old = row.multiplier;
-        row.multiplier = std::clamp(old - residual(block, row) / row.own, row.lower, row.upper);
+        row.multiplier = std::clamp(old - residual(block, row) / row.diagonal, row.lower, row.upper);
         const double change = row.multiplier - old;
         if (change == 0.0) return 0.0;
         push(block, row, change);
-        return std::abs(change) * row.own;
+        return std::abs(change) * row.diagonal;
     }
 
     double update_joint(const PgsBlock& block) noexcept {
@@ -236,8 +237,8 @@ private:
         double d2 = b2 - step * residual(block, two);
         const double reach = length(d1, d2);
         if (point.anisotropic) {
-            const double own[3] = {one.own, schur(one, two), two.own};
-            least_on_disc(own, b1, b2, residual(block, one), residual(block, two), bound, d1, d2);
+            const double tangents[3] = {one.diagonal, schur(one, two), two.diagonal};
+            least_on_disc(tangents, b1, b2, residual(block, one), residual(block, two), bound, d1, d2);
         } else if (reach > bound) {
             d1 *= bound / reach, d2 *= bound / reach;
         }

@@ -11,17 +11,15 @@
 
 namespace spook {
 
-/// Islands are updated until they have settled, each for itself. Contacts may be added between iterations, so that a pair
-/// that meets only because of this step's impulses has its rows in the same solve; islands then grow together.
-/// Rows are updated in the order they were given, or in an equivalent order with the same bits: four at once, where they share
-/// no body. Equal input gives equal bits. Memory is kept.
+/// Islands are updated until they have settled, each for itself. Contacts may be added between iterations: what meets only
+/// because of this step's impulses has its rows in the same solve. Rows are updated in the order they were given, or in one
+/// with the same bits: four at once, where they share no body. The kernel, with the friction cone's bound: pgs_contact.inl.
 class PgsSolver {
 public:
     /// Takes mass, momentum and the rows of joints; no contacts yet. Masses are blocks: m·1 and the inertia.
     void start(MixedSystem& system, FrictionModel model);
-    /// The same, with the masses that `other` was started with; each change of a normal impulse is `relaxation` times what
-    /// its own row asks for, between 0 and 2: what is spread over many rows gets there sooner with a little more than 1. The
-    /// last two iterations are plain, so that what was pushed too far comes back.
+    /// The same, with the masses that `other` was started with, over-relaxed: each change of a normal impulse is `relaxation`
+    /// times what its own row asks for (0 … 2), but for the last two iterations.
     void start_beside(const PgsSolver& other, MixedSystem& system, FrictionModel model, double relaxation);
     /// Announces a contact that add() will bring, in the same order; after arrange() those announced have their places, one
     /// behind the other as they are updated: memory at random is what large heaps cost.
@@ -31,12 +29,11 @@ public:
     int add(const PgsContact& contact);
     std::size_t count() const noexcept { return static_cast<std::size_t>(added_); }
 
-    /// Iterates until no row changes by more than `tolerance` [m/s] in an iteration, or an island was updated `iterations`
-    /// times: it has reached its limit then. `more` is called after the 2nd, 4th, 8th … iteration, and with true when all is done: it may
-    /// add contacts and says whether it did; those that come after the last iteration get `iterations` more, three times at
-    /// most. May be called again, to go on: then `more` is only asked in the end, and what has reached its limit is updated only where
-    /// a body is new to its contacts, was found by worst(), or was just changed by more than `focus` [m/s]: in a large
-    /// heap something somewhere always asks.
+    /// Iterates until no row changes by more than `tolerance` [m/s] in an iteration, or an island has reached its limit of
+    /// `iterations`. `more` is called after the 2nd, 4th, 8th … iteration, and with true when all is done: it may add contacts and
+    /// says whether it did; those after the last iteration get `iterations` more, three times at most. Called again, it goes on:
+    /// `more` is only asked in the end, and what has reached its limit is updated only where a body is new to its contacts, was
+    /// found by worst(), or was just changed by more than `focus` [m/s].
     FrictionReport run(int iterations, double tolerance, double focus, const std::function<bool(bool)>& more);
 
     /// What has been done since start(), in iterations over everything there is now; looking for the worst is work, too.
@@ -57,9 +54,8 @@ public:
     }
     /// Multipliers of joints, and all velocities.
     void write(MixedSystem& system) const { contacts_.write(system, schedule_.joints > 0); }
-    /// The contact furthest from its law, as rows_residual() measures it; `row` is the contact's index. Those
-    /// further off than `focus` [m/s] are where the next run goes on; where they are few, only those that are as far off
-    /// as nearly what is `allowed`.
+    /// The contact furthest from its law, as rows_residual() measures it; `row` is the contact's index. The next run goes on at
+    /// those further off than `focus` [m/s], or, where these are few, than nearly what is `allowed`.
     RowsResidual worst(double focus, double allowed);
     RowsResidual worst(double focus) { return worst(focus, focus); }
 

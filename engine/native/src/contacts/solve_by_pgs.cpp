@@ -114,8 +114,7 @@ ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
     state_.counters.unsettled += !report.converged;
 
     if (!report.converged && quality_.body < 0) blame_sunk(quality_, judged());
-    mark_rows(system.mass.size(),
-              system.rows);  // by joints; of contacts those that push, or did in an impact
+    mark_rows(system.mass.size(), system.rows);  // by joints; of contacts those that push
     for (std::size_t b = 0; b < model_->bodies.count(); ++b)
         if (model_->bodies.moves(b) && motion_.event_time[b] >= 0.0)
             has_rows_[model_->bodies.solver_index[b]] = 1;

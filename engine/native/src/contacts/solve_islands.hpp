@@ -10,10 +10,9 @@ namespace spook {
 
 struct IslandRules {
     FrictionModel friction = FrictionModel::cone;
-    double enough = 0.0;  // m/s: what iterations may leave before few rows are solved directly
-    std::size_t few_enough =
-        0;  // row blocks of an island: so many are solved directly though iterations are asked for
-    bool warm_started = false;  // iterations have set the start
+    double enough = 0.0;         // m/s: what iterations may leave before few rows are solved directly
+    std::size_t few_enough = 0;  // row blocks of an island that are solved directly under iterations
+    bool warm_started = false;   // iterations have set the start
 };
 
 /// Fills velocity, multipliers and points of `system`, and counts what that took. Rows that `answered` names are left as they

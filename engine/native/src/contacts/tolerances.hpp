@@ -29,11 +29,10 @@ inline constexpr double loosest_hold = 3e-4, tightest_hold = 1e-10;
 inline constexpr double hardest_hold = 0.1, brief = 0.3;  // beside joints, after a step so short
 inline constexpr double behind = 10.0, slow = 0.1;  // of the blur, and of itself: what holding back leaves
 inline constexpr double far = 1e-3;  // a residual, of the speeds, from which the path may crawl
-inline constexpr int backoff = 3,
-                     long_patience = 12;  // iterations without half the residual, or much less blur
-inline constexpr int max_jumps = 3;       // without half the least they met
-inline constexpr double back = 10.0;      // blurs: so far away the path is sought again,
-inline constexpr double nearer = 0.1;     //   and kept so much nearer to
+inline constexpr int backoff = 3, long_patience = 12;  // iterations without half the residual, or less blur
+inline constexpr int max_jumps = 3;                    // without half the least they met
+inline constexpr double back = 10.0;                   // blurs: so far away the path is sought again,
+inline constexpr double nearer = 0.1;                  //   and kept so much nearer to
 }  // namespace tolerances::cone_newton
 
 // contact_bodies.cpp
@@ -56,11 +55,11 @@ namespace tolerances::impact_solver {
 inline constexpr int simultaneous_rounds = 20;  // of impacts that follow from impacts in one step
 inline constexpr double gain = 1e-14;           // rise of kinetic energy that is rounding, relative
 inline constexpr double impact_compliance =
-    1e-3;                               // of a point's own inverse inertia: what it gives in a shared impact
-inline constexpr int determined = 3;    // points of a pair whose normal impulses its motion fixes
-inline constexpr int most_again = 8;    // solves until the give is gone: each leaves about that of it
-inline constexpr double left = 1e-16;   // of the fastest row: a give that is rounding
-inline constexpr double broken = 1e-6;  // of the fastest row: what a row may be short of
+    1e-3;                                  // of a point's own inverse inertia: its give in a shared impact
+inline constexpr int determined = 3;       // points of a pair whose normal impulses its motion fixes
+inline constexpr int most_again = 8;       // solves until the give is gone: each leaves about that of it
+inline constexpr double left = 1e-16;      // of the fastest row: a give that is rounding
+inline constexpr double broken = 1e-6;     // of the fastest row: what a row may be short of
 inline constexpr double tolerated = 1e-9;  // of the fastest row: a give that need not be told
 }  // namespace tolerances::impact_solver
 
@@ -104,14 +103,12 @@ inline constexpr double exact = 1e-12;    // the same: an answer that another ro
 inline constexpr double falling = 0.1;    // of the residual before: worth another round
 inline constexpr double loosest = 1e-6;   // the same, after 25 rounds
 inline constexpr double direction_hysteresis =
-    0.01;  // of a stuck point at the disc's edge to leave the direction it was turned to
+    0.01;                                      // of a stuck point to leave the direction it was turned to
 inline constexpr std::size_t few_blocks = 24;  // pivoting shares their loads evenly at little cost
 inline constexpr int plain_rounds = 3;         // most systems settle within these
 inline constexpr double poor = 1e-4;           // a residual, of the speeds: beyond it another way is tried
 inline constexpr double fair = 1e-9;           // one that is an answer
-inline constexpr double near = 1e-6,
-                        redundant_near =
-                            3e-5;  // residuals, of the speeds: answers; the second where points are redundant
+inline constexpr double near = 1e-6, redundant_near = 3e-5;  // residuals, of the speeds: answers
 // Newton's method beside joints, which takes a factor of all bodies an iteration, comes first where redundant points are more
 // than one in so many bodies; than one in four of `many_bodies`.
 inline constexpr std::size_t bodies_a_point = 2, many_bodies = 64, of_many_a_point = 4;
@@ -131,8 +128,7 @@ inline constexpr double most_met = 0.1;          // of the open pairs: more are 
 
 // internal_edges.cpp
 namespace tolerances::internal_edges {
-inline constexpr double flush =
-    10.0;  // of the overlap at which pairs count as met: less stands out of no face
+inline constexpr double flush = 10.0;  // of the overlap at which pairs are met: less stands out of no face
 inline constexpr double same_face_cosine = 0.9;  // cosine of normals: what both lie on
 inline constexpr std::size_t max_earlier = 8;    // of the meetings of a body, that may occlude later ones
 inline constexpr double simultaneous = 0.05;     // of a step: which of two meetings comes first is not known
@@ -144,12 +140,10 @@ inline constexpr double side_cosine = 0.5;                    // of the normal o
 namespace tolerances::overlap_search {
 inline constexpr double search_factor = 4.0;  // of the deepest overlap: gaps that the projection may close
 inline constexpr double min_separation_to_propagate =
-    1e-9;  // of the smaller body's radius: a body displaced by less pushes no other
-inline constexpr double min_separation_to_propagate_pgs =
-    5e-4;  // the same for PGS, where each extra row slows fifty iterations
-inline constexpr std::size_t max_neighbours =
-    32;                             // bodies of a ring: where more part at once, the next step will tell
-inline constexpr int max_hops = 4;  // of neighbours that the projection sees
+    1e-9;  // of the smaller body's radius: less pushes no other
+inline constexpr double min_separation_to_propagate_pgs = 5e-4;  // the same for PGS, whose rows cost more
+inline constexpr std::size_t max_neighbours = 32;  // of a ring of bodies: else the next step tells
+inline constexpr int max_hops = 4;                 // of neighbours that the projection sees
 }  // namespace tolerances::overlap_search
 
 // pgs_schedule.cpp

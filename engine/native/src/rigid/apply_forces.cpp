@@ -55,7 +55,7 @@ void Forces::find_all() {
 void Forces::kick_free_body(int i) noexcept {
     BodyState& s = live_.bodies[i];
     s.velocity += kick(i);
-    s.angular_momentum += twist(i);
+    s.angular_momentum += angular_impulse(i);
 }
 
 double Forces::potential_energy() const noexcept {

@@ -37,12 +37,10 @@ public:
     int body_of(std::size_t coordinate) const noexcept;
 
 private:
-    struct
-        Screw {  // a motion: angular, and linear of the point; or a force: torque about the point, and force
+    struct Screw {  // a motion: angular, and linear of the point; a force: torque about it, force
         Vec3 turn, shift;
     };
-    struct
-        Inertia {  // of a motion, into momentum: symmetric blocks xx yy zz xy xz yz and the one between them
+    struct Inertia {  // of a motion, into momentum: blocks xx yy zz xy xz yz, and the one between
         double turn[6], shift[6];
         Mat3 mixed;
     };
@@ -61,9 +59,8 @@ private:
     };
     struct Chart {  // where the step begins
         Quat relative;
-        Mat3 turned, turned_across,
-            turned_along;  // by a turn of the hinge: sine and 1 − cosine of it take the latter
-        Vec3 offset;       // to the joint from the carrier's centre, in the latter's axes
+        Mat3 turned, turned_across, turned_along;  // by the hinge: its sine and 1 − cosine take the latter
+        Vec3 offset;  // to the joint from the carrier's centre, in the latter's axes
         Vec3 slid;
         double coordinate = 0.0;  // of a spring, or where turns are counted
     };

@@ -85,8 +85,7 @@ private:
         std::vector<int> other_edges;  // of a row over more than two bodies, −1: it does not move by itself
         std::size_t wide_at = 0;       // in wide_
     };
-    struct
-        Worst {  // row residual, its block, and the largest speed that rows and forces ask for, m/s or rad/s
+    struct Worst {  // row residual, its block, and the largest speed asked for, m/s or rad/s
         double residual = 0.0, speed = 0.0;
         int block = 0;
     };

@@ -1,8 +1,8 @@
 // Stage: contact points. Pairs that are closed where the step begins, and pairs that will touch within it along v (supported
 // bodies) or v + dv_ext (free ones): where, when and in which order, see contacts/contact_stage.hpp.
 //
-// reads: places and velocities of bodies, dv_ext. writes: the contact stage's points, scratch_.poses, scratch_.velocities, scratch_.free_velocities,
-// touching_, scratch_.start_of_contacts; sleepers that were met.
+// reads: places and velocities of bodies, dv_ext. writes: the contact stage's points; poses, velocities, free_velocities and
+// start_of_contacts of scratch_; touching_; sleepers that were met.
 #include "rigid/mixed_rows.hpp"
 
 namespace spook {
@@ -22,7 +22,7 @@ void MixedRows::detect() {
         const Vec3 dv = forces_.kick(i);
         for (int k = 0; k < 3; ++k) scratch_.free_velocities[i][k] += dv[k];
         if (dot(model_.constants[i].torque, model_.constants[i].torque) > 0.0) {
-            const Vec3 dw = turned_by(model_.constants[i], s, forces_.twist(i));
+            const Vec3 dw = turned_by(model_.constants[i], s, forces_.angular_impulse(i));
             for (int k = 0; k < 3; ++k) scratch_.free_velocities[i][3 + k] += dw[k];
         }
     }
@@ -33,7 +33,7 @@ void MixedRows::detect() {
 
 /// In a step that began without contacts, whether bodies meet because of what joints make of their velocities, scratch_.next:
 /// cast along their own they do not. Then the step is to be solved with contacts.
-bool MixedRows::meet_late() {
+bool MixedRows::find_late_contacts() {
     const auto any = [this](auto is) {
         return scratch_.last_rows == LastRows::mixed &&
                std::any_of(system.rows.begin(), system.rows.end(), is);

@@ -1,6 +1,5 @@
-// Energy that comes out of nothing: an outcome, not "completed". Compositions and corrections are asked, since they keep energy and
-// their rows can add to it: of compositions the final state tells, while corrections may gain and lose on the way. Plain SPOOK is not:
-// it dissipates by its method, and is asked by the books (engine/books.py).
+// Energy that comes out of nothing: an outcome, not "completed". Asked of compositions, by the final state, and of corrections, on the
+// way: they keep energy, and their rows can add to it. Plain SPOOK dissipates, and is asked by the books (engine/books.py).
 //
 // reads: places and velocities of bodies, drives. writes: what the run has known of its energy.
 #include <algorithm>
@@ -13,11 +12,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::energy_made;
-
-}  // namespace
 
 void EnergyMade::begin() {
     live_.energy.most_kinetic = kinetic_energy(model_, live_, joints_);
@@ -28,8 +23,9 @@ void EnergyMade::begin() {
     double off[6];
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k) {
         joints_.overstep(k, live_.bodies, off);
-        live_.energy.is_powered |= std::any_of(off, off + joints_.blocks()[k].size,
-                                               [](double each) { return std::fabs(each) > OVERSTEPPED; });
+        live_.energy.is_powered |= std::any_of(off, off + joints_.blocks()[k].size, [](double each) {
+            return std::fabs(each) > initial_overstep;
+        });
     }
 }
 
@@ -47,11 +43,11 @@ bool EnergyMade::has_power() const noexcept {
 bool EnergyMade::is_due() const noexcept {
     if (model_.half_step || live_.energy.is_powered) return false;
     // In a plane each look costs a tenth of a step, and space is to answer alike.
-    return model_.curved || live_.moved % LOOKS == 0;
+    return model_.curved || live_.moved % steps_between_looks == 0;
 }
 
 void EnergyMade::note(double penetration) {
-    live_.energy.is_powered = has_power() || (live_.moved == 1 && penetration > OVERSTEPPED);
+    live_.energy.is_powered = has_power() || (live_.moved == 1 && penetration > initial_overstep);
     const double kinetic = kinetic_energy(model_, live_, joints_);
     live_.energy.most_kinetic = std::max(live_.energy.most_kinetic, kinetic);
     live_.energy.most = std::max(live_.energy.most, kinetic + forces_.potential_energy());
@@ -68,14 +64,14 @@ void EnergyMade::judge(RunReport& report) const {
     double reached =
         model_.composed || !model_.half_step ? kinetic + forces_.potential_energy() : live_.energy.most;
     if (!model_.composed) reached = std::max(reached, live_.energy.most);
-    double least = ROUNDING * std::abs(live_.energy.begun);
+    double least = rounding * std::abs(live_.energy.begun);
     if (!model_.composed) {  // what a step's fall is worth: the first order of the step
         const double fall = model_.h * norm(model_.gravity);
         for (const int i : model_.constrained)
             if (model_.constants[i].moves()) least += model_.constants[i].mass * fall * fall;
     }
     const double gained = reached - live_.energy.begun;
-    if (!(gained > MOST_GAINED * most + least)) return;
+    if (!(gained > max_gain * most + least)) return;
     report.status = Status::unsettled;
     report.failed_step = report.steps;
     report.failed_body = *std::min_element(

@@ -54,20 +54,22 @@ public:
         if (!force_.empty()) dv += (model_.h / model_.constants[body].mass) * force_[body];
         return share_.empty() ? dv : share_[body] * dv;
     }
-    Vec3 twist(int body) const noexcept { return share(body) * model_.h * model_.constants[body].torque; }
+    Vec3 angular_impulse(int body) const noexcept {
+        return share(body) * model_.h * model_.constants[body].torque;
+    }
     const std::vector<Vec3>& accelerations() const noexcept { return acceleration_; }
     const std::vector<Vec3>& of_springs_and_fields() const noexcept { return force_; }
 
     /// The part of a body's forces that is still to act in this step: all of it, until shares are given out.
     double share(int body) const noexcept { return share_.empty() ? 1.0 : share_[body]; }
-    void give_out() { share_.assign(model_.constants.size(), 1.0); }
-    void keep_share(int body, double share) noexcept { share_[body] = share; }
+    void begin_shares() { share_.assign(model_.constants.size(), 1.0); }
+    void set_share(int body, double share) noexcept { share_[body] = share; }
     void leave_out_sleepers() noexcept {
         if (live_.sleep.sleepers == 0) return;
         for (const int body : model_.constrained)
             if (live_.asleep(body)) share_[body] = 0.0;
     }
-    void act_wholly() noexcept { share_.clear(); }
+    void end_shares() noexcept { share_.clear(); }
 
     double potential_energy() const noexcept;
     /// Whether they may give energy that no book has.

@@ -106,9 +106,8 @@ void StringStiffness::keep_angular_momentum() {
     }
 }
 
-/// The turn that gives some bodies an angular momentum as if they were one. It is found in axes along the line through
-/// their centre and what is heavy and far: a row of light bodies between two heavy ones has about it a part in 1e9 of
-/// its inertia across, which would be lost in sums of both.
+/// The turn that gives some bodies an angular momentum as if they were one, found in axes along the line through their centre and
+/// what is heavy and far: the inertia of a row of bodies about it would be lost in sums with that across.
 Vec3 StringStiffness::turn_of(const std::vector<int>& members, Vec3 centre, Vec3 angular_momentum) const {
     Vec3 line{1.0, 0.0, 0.0};
     double most = 0.0;

@@ -11,15 +11,11 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::impact;
 
-}  // namespace
-
 /// Bodies moved to the time of an event take the part of their forces that acts before it.
-void MixedRows::lead_events() {
-    forces_.give_out();
+void MixedRows::act_before_events() {
+    forces_.begin_shares();
     forces_.leave_out_sleepers();
     for (int i : model_.constrained) {
         const double lead = contacts_->toi_fraction(i);
@@ -32,7 +28,7 @@ void MixedRows::lead_events() {
         s.angular_velocity += dw;
         for (int k = 0; k < 3; ++k)
             scratch_.velocities[i][k] += dv[k], scratch_.velocities[i][3 + k] += dw[k];
-        forces_.keep_share(i, 1.0 - lead);
+        forces_.set_share(i, 1.0 - lead);
     }
 }
 
@@ -43,7 +39,7 @@ void MixedRows::impact() {
     judge_contacts();
     for (const int i : model_.constrained)
         if (contacts_->toi_fraction(i) > 0.0 && !live_.asleep(i))
-            forces_.keep_share(i, 1.0 - contacts_->toi_fraction(i));
+            forces_.set_share(i, 1.0 - contacts_->toi_fraction(i));
     const auto add_to_before = [this](double sign) {
         if (!model_.half_step) return;
         for (const int i : model_.constrained) {

@@ -132,7 +132,7 @@ inline void soften_all(Inertia6& m, const double* softness, Vec3 tilt, double ti
         soften<2>(k, softness[0]);
     }
     gather(k, m);
-    if (!(tilt_softness > 0.0) || !(dot(tilt, tilt) > SLIGHT)) return;
+    if (!(tilt_softness > 0.0) || !(dot(tilt, tilt) > slight_tilt)) return;
     const Twist r = m * Twist{{}, tilt};
     const double v[6] = {r.linear.x, r.linear.y, r.linear.z, r.angular.x, r.angular.y, r.angular.z};
     const double gain = tilt_softness / (1.0 + tilt_softness * dot(tilt, r.angular));

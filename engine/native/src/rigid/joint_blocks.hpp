@@ -11,8 +11,7 @@ namespace spook {
 /// One block of up to six rows between two bodies: a joint's own rows, or those of its free coordinate.
 struct JointBlock {
     int joint = 0;
-    bool axial =
-        false;  // motor, limit, spring, armature, friction, in this order, as far as the joint has them
+    bool axial = false;           // motor, limit, spring, armature, friction, in this order, as it has them
     int first = -1, second = -1;  // bodies of the scene, −1 the world
     int size = 1;
     int rotor = -1;  // the row of its armature

@@ -236,21 +236,21 @@ void JointSet::overstep(int index, std::span<const BodyState> bodies, double* ou
         axial.lower == axial.upper ? low : std::min(0.0, low) + std::max(0.0, high);
 }
 
-double JointSet::given_back(int index, int& row) const noexcept {
+double JointSet::overstep_to_return(int index, int& row) const noexcept {
     const JointBlock& block = blocks_[index];
     const Joint& joint = joints_[block.joint];
-    const double given = states[block.joint].given;
+    const double overstep = states[block.joint].initial_overstep;
     row = 0;
-    if (!(given > 0.0) || states[block.joint].broken) return 0.0;
+    if (!(overstep > 0.0) || states[block.joint].broken) return 0.0;
     if (!block.axial)
         return joint.general >= 0 && generals_[joint.general].one_sided
-                   ? time_step_ * generals_[joint.general].row.violation_gain * given
+                   ? time_step_ * generals_[joint.general].row.violation_gain * overstep
                    : 0.0;
     const Axial& axial = *drives_.of(block.joint);
     row = axial.has_motor ? 1 : 0;
     const double angle = states[block.joint].angle;
     const bool low = angle - axial.lower <= axial.upper - angle;
-    return (low ? -1.0 : 1.0) * time_step_ * axial.limit.violation_gain * given;
+    return (low ? -1.0 : 1.0) * time_step_ * axial.limit.violation_gain * overstep;
 }
 
 double JointSet::coordinate(int index, std::span<const BodyState> bodies) const noexcept {

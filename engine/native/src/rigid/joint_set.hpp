@@ -97,7 +97,7 @@ public:
     }
     /// How far the one-sided row of a block is to come back in this step, since the scene began beyond it: a part of
     /// its overstep(), whose sign it has; `row` is its index. 0 where there is none.
-    double given_back(int block, int& row) const noexcept;
+    double overstep_to_return(int block, int& row) const noexcept;
     /// From now on the turns of this hinge are counted.
     void track(int joint) noexcept {
         if (std::find(followed_.begin(), followed_.end(), joint) == followed_.end())

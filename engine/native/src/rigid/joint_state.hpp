@@ -19,27 +19,21 @@ struct JointState {
     const double* multipliers(bool axial) const noexcept {
         return axial ? axial_multiplier.data() : multiplier.data();
     }
-    Vec3 first_reach,
-        second_reach;  // from the centres to the point where forces are read, at the last step
+    Vec3 first_reach, second_reach;  // from the centres to where forces were read last
     bool broken = false;
     signed char at_limit = 0;  // 1 or −1: the lower or upper limit was closed in the last step,
     signed char closed = 0;    // and is in this one
     signed char met = 0;       // the end at which an impact of the step has left it: it was on its way there
-    double rebounds =
-        0.0;  // only what arrives faster than this, m/s or rad/s: an impact of the step has answered it
-    double given =
-        -1.0;  // how far the scene began beyond its limit, as far as it still is; negative: not known
-    bool folds = false;    // the stops of the joint are hit several times in the step,
-    double fold_to = 0.0;  // and its coordinate is here behind the last, m or rad
-    double rotor =
-        std::numeric_limits<double>::quiet_NaN();  // speed of its armature, m/s or rad/s; NaN: not known yet
-    double rotor_lead =
-        0.0;             // by which the coordinate went faster over the last step than its row began with
-    double angle = 0.0;  // unwrapped coordinate of a hinge that needs it
+    double rebounds = 0.0;     // slower than this, m/s or rad/s, an impact of the step has answered it
+    double initial_overstep = -1.0;  // of its limit, as far as it is left; negative: not known
+    bool folds = false;              // the stops of the joint are hit several times in the step,
+    double fold_to = 0.0;            // and its coordinate is here behind the last, m or rad
+    double rotor = std::numeric_limits<double>::quiet_NaN();  // its armature's speed; NaN: not known
+    double rotor_lead = 0.0;  // of the coordinate over the last step, before its row at the start
+    double angle = 0.0;       // unwrapped coordinate of a hinge that needs it
     // N s: of an eye's row; of a tyre's rows along and across; of a joint's friction, as far as it follows the load
     std::array<double, 2> bound{};
-    double slides =
-        1.0;  // a tyre: by how much softer than its slip stiffness its rows are, for its ellipse to hold them
+    double slides = 1.0;  // a tyre: by how much softer than its slip stiffness its rows are
 };
 
 /// A joint that broke: in which step of h, and under what.

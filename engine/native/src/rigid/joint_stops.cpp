@@ -7,30 +7,25 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::joint_stops;
 
-}  // namespace
-
-/// What the scene began with beyond the limit is no violation: it would come back as a speed, at a tiny step as megajoules.
-/// The bodies are moved back instead (JointSet::given_back()). A rebound goes no further within the step than its `room`,
-/// to the other end.
+/// What the scene began with beyond the limit would come back as a speed: the bodies are moved back instead
+/// (JointSet::overstep_to_return()). A rebound goes no further within the step than its `room`, to the other end.
 double JointStops::right(double inwards, double violation, double rate, const Regularisation& row,
                          double restitution, double room, JointState& state, StopRow& stop) noexcept {
     const double beyond = std::max(0.0, -inwards * violation);
-    state.given = state.given < 0.0 ? beyond : std::min(state.given, beyond);
-    if (state.given > 0.0) some_given_ = true, violation += inwards * state.given;
+    state.initial_overstep = state.initial_overstep < 0.0 ? beyond : std::min(state.initial_overstep, beyond);
+    if (state.initial_overstep > 0.0) some_overstepped_ = true, violation += inwards * state.initial_overstep;
     const double gap = inwards * violation, approach = -inwards * rate;
     const bool open = gap > 0.0, hit = approach > 0.0 && state.at_limit * inwards <= 0.0;
     // A far end asks for no more than what is out of reach: solvers take what rows ask for the size of a system's speeds.
-    const double closing = std::min(gap / time_step_, OUT_OF_REACH + AS_FAST * std::abs(rate));
+    const double closing = std::min(gap / time_step_, unreachable_rate + unreachable_ratio * std::abs(rate));
     double value = open ? -inwards * closing : row.upsilon * rate - row.violation_gain * violation;
     stop.touching = !open || state.met * inwards > 0.0;
     stop.rebound = 0.0;
     stop.hit = approach > state.rebounds && (open ? time_step_ * approach > gap : hit);
     stop.cut = restitution > 0.0 && stop.hit && restitution * approach > room / time_step_;
-    if (stop.cut && fold_ && state.given == 0.0)
+    if (stop.cut && fold_ && state.initial_overstep == 0.0)
         value = fold(inwards, violation, approach, restitution, state, stop);
     else if (restitution > 0.0 && stop.hit)
         value = stop.rebound = inwards * std::min(restitution * approach, std::max(0.0, room) / time_step_);
@@ -59,7 +54,7 @@ double JointStops::fold(double inwards, double violation, double approach, doubl
         }
     }
     const double gone = std::min(left * speed, stop.range);  // since the last impact
-    state.folds = some_given_ = true;
+    state.folds = some_overstepped_ = true;
     state.fold_to =
         state.angle - violation + (way == inwards ? inwards * gone : inwards * (stop.range - gone));
     stop.room = unbounded;

@@ -1,4 +1,5 @@
-// Rows that only push one way: limits of free coordinates, and wires that may go slack.
+// Stops of joints, rows that only push one way: limits of free coordinates, and wires that may go slack. What they ask for is said
+// here; they are solved with all other rows (solve_velocities.cpp), and rebound in impacts (contacts/impact_solver.hpp).
 //
 // reads: the time step. writes: what the states of joints say of stops.
 #pragma once
@@ -21,7 +22,7 @@ public:
     void let_fold() noexcept { fold_ = true; }
     /// Whether some limit was assembled, since this was asked last, that a step does not end at by its velocities: the scene
     /// began beyond it, or it folds.
-    bool take_given() noexcept { return std::exchange(some_given_, false); }
+    bool take_some_overstepped() noexcept { return std::exchange(some_overstepped_, false); }
     /// A new step: whose stops were closed in the one before is known from then on, however often rows are assembled.
     void begin_step(LargeArray<JointState>& states) noexcept {
         for (const int joint : joints_) {
@@ -40,7 +41,7 @@ private:
                 StopRow& stop) noexcept;
 
     double time_step_;
-    bool some_given_ = false, fold_ = false;
+    bool some_overstepped_ = false, fold_ = false;
     std::vector<int> joints_;
 };
 

@@ -217,7 +217,7 @@ bool JointTree::has_all_rotors() const noexcept {
 bool JointTree::has_small_trees() const {
     std::vector<int> in_tree(static_cast<std::size_t>(trees_), 0);
     for (const Node& node : nodes_) in_tree[node.tree] += node.coordinates();
-    const int most = has_light() ? MOST_WITH_LIGHT : MOST_IN_A_TREE;
+    const int most = has_light() ? max_coordinates_with_light : max_coordinates_per_tree;
     return coordinates_ > 0 && *std::max_element(in_tree.begin(), in_tree.end()) <= most;
 }
 
@@ -225,7 +225,7 @@ bool JointTree::has_small_trees() const {
 bool JointTree::has_light() const noexcept {
     const auto [least, most] = std::minmax_element(
         nodes_.begin(), nodes_.end(), [](const Node& a, const Node& b) { return a.mass < b.mass; });
-    return least != nodes_.end() && least->mass < LIGHT * most->mass;
+    return least != nodes_.end() && least->mass < light_mass_ratio * most->mass;
 }
 
 /// The joints that are left, and which of their rows say more than the forest does.
@@ -265,7 +265,7 @@ bool JointTree::close(const LargeArray<BodyState>& start) {
         rows_ += loop.kept;
         reduced += loop.kept * static_cast<int>(loop.columns.size());
     }
-    if (rows_ > std::min(MOST_ROWS, coordinates_ - 1)) return false;
+    if (rows_ > std::min(max_loop_rows, coordinates_ - 1)) return false;
     start_rows_.assign(static_cast<std::size_t>(reduced), 0.0);
     end_rows_ = start_rows_;
     multiplier_.assign(static_cast<std::size_t>(rows_), 0.0);
@@ -409,21 +409,21 @@ bool JointTree::order() {
         for (const Closing::Column& column : loop.columns)
             loop.places.push_back(place_of_[nodes_[column.node].first + column.coordinate]);
     system_.prepare(coordinates_ + rows_, reach);
-    return reach <= (has_light() ? MOST_WITH_LIGHT : FARTHEST);
+    return reach <= (has_light() ? max_coordinates_with_light : max_bandwidth);
 }
 
 /// Takes the scene into a plane if nothing in it leaves one that two axes of the world span.
 void JointTree::flatten() {
-    constexpr double ROUNDING = 4e-16;  // of a unit vector
+    constexpr double rounding = 4e-16;  // of a unit vector
     int normal = -1;
     for (const Node& node : nodes_)
         for (int i = 0; i < 3 && normal < 0 && node.turns == 1; ++i)
             if (std::fabs(node.axis[i]) > 0.9) normal = i;
     if (normal < 0 || !joints_->rotors().empty()) return;
     const Plane3 flat{normal};
-    const auto lies = [&](Vec3 axis) { return std::fabs(axis[normal]) <= ROUNDING; };
+    const auto lies = [&](Vec3 axis) { return std::fabs(axis[normal]) <= rounding; };
     const auto stands = [&](Vec3 axis) {
-        return std::fabs(axis[flat.first()]) <= ROUNDING && std::fabs(axis[flat.second()]) <= ROUNDING;
+        return std::fabs(axis[flat.first()]) <= rounding && std::fabs(axis[flat.second()]) <= rounding;
     };
     std::vector<PlaneTree::Node> nodes;
     for (const Node& node : nodes_) {
@@ -434,7 +434,7 @@ void JointTree::flatten() {
                         body.start_rotation(normal, 2)};
         const Vec3 spin{body.inertia.x * axis.x, body.inertia.y * axis.y, body.inertia.z * axis.z};
         const double inertia = dot(axis, spin);
-        if (!(norm(spin - inertia * axis) <= 4.0 * ROUNDING * inertia)) return;  // it would wobble
+        if (!(norm(spin - inertia * axis) <= 4.0 * rounding * inertia)) return;  // it would wobble
         const Vec3 from_parent =
             node.parent < 0 ? Vec3{} : body.start - constants_[nodes_[node.parent].body].start;
         nodes.push_back({node.body, node.parent, node.end, node.slides == 1, place_of_[node.first],

@@ -86,7 +86,7 @@ bool LoadDependentBounds::follow_tyre(int tyre, MixedSystem& solved, JointSet& j
     const double now = free && slip.total > 0.0 ? state.slides / slip.total : 0.0;  // 1/|F|
     // |F| that it may have. A wheel that its own friction lifts would be let go and caught in turn: it goes half the way.
     double may = slip.load, next = 1.0;
-    if (round_ > PATIENT) may = 0.5 * (may + length_over(rows, of.friction));
+    if (round_ > patient_rounds) may = 0.5 * (may + length_over(rows, of.friction));
     if (may > 0.0 && slip.total > may) {
         next = slip.total / may;
         const double rise = round_ > 0 && last.answer > 0.0 && now > 0.0

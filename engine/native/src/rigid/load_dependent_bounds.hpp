@@ -20,9 +20,9 @@ namespace spook {
 
 class LoadDependentBounds {
 public:
-    static constexpr int MOST_ROUNDS = 100;
-    static constexpr int PATIENT = 8;        // rounds, before steps are halved
-    static constexpr double AGREED = 1e-11;  // of the pull or the load
+    static constexpr int max_rounds = 100;
+    static constexpr int patient_rounds = 8;  // rounds, before steps are halved
+    static constexpr double agreed = 1e-11;   // of the pull or the load
 
     /// Which rows there are; the first step begins with bounds of zero.
     void take(const JointSet& joints, bool eyes, bool tyres, bool bearings);
@@ -41,8 +41,7 @@ public:
 
 private:
     struct Guess {
-        double bound = 0.0,
-               answer = 0.0;  // of a tyre that slides: the factor and 1/|F|, zero if there is none
+        double bound = 0.0, answer = 0.0;  // of a tyre that slides: the factor, 1/|F|; else 0
     };
     void see(double off, int block) noexcept {
         if (off > off_) off_ = off, worst_ = block;

@@ -47,13 +47,13 @@ public:
     bool may_touch() const noexcept { return fresh_contacts_ && fresh_contacts_->possible(); }
     /// Whether the step has any.
     bool touching() const noexcept { return touching_; }
-    void touch_nothing() noexcept { touching_ = false; }
+    void clear_touching() noexcept { touching_ = false; }
 
     /// The stage: contact points of the step.
     void detect();
     /// In a step that began without contacts, whether bodies meet because of what joints make of their velocities,
     /// scratch.next: cast along their own they do not. Then the step is to be solved with contacts.
-    bool meet_late();
+    bool find_late_contacts();
     /// The stages: impacts, and velocities of all bodies that have rows.
     void solve(bool touching);
 
@@ -73,7 +73,7 @@ public:
 
 private:
     void note_start_of_contacts();
-    void lead_events();
+    void act_before_events();
     void impact();
     void fill_masses();
     void fill_momenta(bool forces);

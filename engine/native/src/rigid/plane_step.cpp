@@ -10,11 +10,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::plane_step;
-
-}  // namespace
 
 void PlaneStep::analyse(std::span<const BodyConstants> constants, const JointSet& joints,
                         std::span<const int> tied, const Options& options) {
@@ -40,7 +36,7 @@ void PlaneStep::analyse(std::span<const BodyConstants> constants, const JointSet
         node.body = body;
         node.mass = c.mass;
         node.inertia = dot(axis, spin);
-        if (!(norm(spin - node.inertia * axis) <= 4.0 * ROUNDING * node.inertia)) return;  // it would wobble
+        if (!(norm(spin - node.inertia * axis) <= 4.0 * rounding * node.inertia)) return;  // it would wobble
         node.over_mass = 1.0 / node.mass;
         node.over_inertia = 1.0 / node.inertia;
         node_of[body] = static_cast<int>(nodes_.size());
@@ -72,9 +68,9 @@ bool PlaneStep::take_joint(std::span<const BodyConstants> constants, const Joint
     if (block.axial || (from.kind != JointKind::hinge && from.kind != JointKind::lock &&
                         from.kind != JointKind::prismatic && from.kind != JointKind::planar))
         return false;
-    const auto lies = [this](Vec3 v) { return std::fabs(v[plane_.normal]) <= ROUNDING * norm(v); };
+    const auto lies = [this](Vec3 v) { return std::fabs(v[plane_.normal]) <= rounding * norm(v); };
     const auto stands = [this](Vec3 v) {
-        return std::fabs(v[plane_.first()]) <= ROUNDING && std::fabs(v[plane_.second()]) <= ROUNDING;
+        return std::fabs(v[plane_.first()]) <= rounding && std::fabs(v[plane_.second()]) <= rounding;
     };
     if (!lies(from.first_arm) || !lies(from.second_arm)) return false;
     const auto node = [&](int body) {
@@ -128,9 +124,9 @@ bool PlaneStep::holds(std::span<const BodyConstants> constants, std::span<const 
         if (node.body < 0) continue;
         const BodyState& s = bodies[node.body];
         const Vec3 torque = constants[node.body].torque, turn{s.turn.x, s.turn.y, s.turn.z};
-        if (!lies(acceleration[node.body], ROUNDING) || !stands(torque, ROUNDING) ||
-            !lies(s.displacement, IN_PLANE) || !lies(s.velocity, IN_PLANE) || !stands(turn, IN_PLANE) ||
-            !stands(s.angular_momentum, IN_PLANE))
+        if (!lies(acceleration[node.body], rounding) || !stands(torque, rounding) ||
+            !lies(s.displacement, in_plane) || !lies(s.velocity, in_plane) || !stands(turn, in_plane) ||
+            !stands(s.angular_momentum, in_plane))
             return false;
         node.kick = plane_(options_.time_step * acceleration[node.body]);
         node.turn_kick = node.over_inertia * (options_.time_step * torque[plane_.normal]);
@@ -219,7 +215,7 @@ void PlaneStep::assemble() noexcept {
         put({0.0, 0.0, -on}, {0.0, 0.0, on}, 2.0 * joint.sense * between.sine);
     }
     std::copy(blank_.begin(), blank_.end(), envelope_.begin());
-    for (const Meeting& m : meetings_) {
+    for (const Coupling& m : couplings_) {
         const Lever &one = levers_[m.lever], &two = shares_[m.other];
         envelope_[m.to] += one.x * two.x + one.y * two.y + one.turn * two.turn;
     }
@@ -243,7 +239,7 @@ bool PlaneStep::factor() noexcept {
             pivot -= row[s] * lower;
             row[s] = lower;
         }
-        if (!(pivot > DOUBTFUL * scale)) return false;
+        if (!(pivot > doubtful_pivot * scale)) return false;
         inverse_[r] = 1.0 / pivot;
     }
     return true;
@@ -269,7 +265,7 @@ void PlaneStep::solve() noexcept {
 bool PlaneStep::find_velocities() noexcept {
     assemble();
     if (!factor()) return false;
-    if (options_.corrections > 0) bend_back();
+    if (options_.corrections > 0) take_past_curvature();
     solve_refined();
     if (options_.corrections > 0) correct();
     for (Node& node : nodes_) {
@@ -280,8 +276,8 @@ bool PlaneStep::find_velocities() noexcept {
     return true;
 }
 
-/// As RowCurvature::bend_back(): where the rows came from is known.
-void PlaneStep::bend_back() noexcept {
+/// As RowCurvature::take_past_curvature(): where the rows came from is known.
+void PlaneStep::take_past_curvature() noexcept {
     for (std::size_t r = 0; r < rows_.size(); ++r) {
         const double back = last_violation_[r] - violation_[r] + options_.time_step * rate_[r];
         asked_[r] -= rows_[r].gain * 0.25 * std::clamp(back, -rows_[r].cap, rows_[r].cap);

@@ -102,7 +102,7 @@ private:
         Vec2 first_arm, second_arm, axes[2];
         Vec2 first_reach, second_reach;
     };
-    struct Meeting {  // of two rows on one body, into the envelope
+    struct Coupling {  // of two rows on one body, into the envelope
         int to, lever, other;
     };
 
@@ -121,7 +121,7 @@ private:
     void solve_refined() noexcept;
     void look(const Joint& joint, const Pose& a, const Pose& b, double* violation) const noexcept;
     double changed(int row, const Node& a, const Node& b) const noexcept;
-    void bend_back() noexcept;
+    void take_past_curvature() noexcept;
     void correct() noexcept;
     void advance(Vec2 velocity, double rate, Pose& pose) const noexcept;
 
@@ -131,9 +131,8 @@ private:
     std::vector<Joint> joints_;
     std::vector<int> joint_at_;  // per joint of the scene: its place in joints_
     std::vector<Row> rows_;
-    std::vector<Lever> levers_,
-        shares_;  // per row its first body's and its second's; the same over their masses
-    std::vector<Meeting> meetings_;
+    std::vector<Lever> levers_, shares_;  // per row and body; over their masses
+    std::vector<Coupling> couplings_;
     std::uint64_t blocks_ = 0;
     std::vector<int> first_, start_;  // of a row in the envelope: its first column, and where that stands
     std::vector<double> blank_, envelope_, inverse_, softness_, asked_, right_, multiplier_;

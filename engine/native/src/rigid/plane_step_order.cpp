@@ -8,11 +8,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::plane_step_order;
-
-}  // namespace
 
 /// Joints that follow each other along the mechanism have their rows near each other: Cuthill and McKee's order. False if
 /// the envelope is too wide all the same.
@@ -66,8 +62,7 @@ bool PlaneStep::order_rows(const JointSet& joints) {
 /// Where the rows stand in the envelope, and which of them meet on a body that moves. False if it is too wide.
 bool PlaneStep::place_rows(const JointSet& joints) {
     const int count = static_cast<int>(joints_.size()), n = static_cast<int>(rows_.size());
-    std::vector<std::vector<std::pair<int, int>>> at(nodes_.size() -
-                                                     1);  // per node: joints, and with which end
+    std::vector<std::vector<std::pair<int, int>>> at(nodes_.size() - 1);  // joints, which end
     const auto end_of = [this](int k) {
         return k + 1 < static_cast<int>(joints_.size()) ? joints_[k + 1].row : static_cast<int>(rows_.size());
     };
@@ -87,9 +82,9 @@ bool PlaneStep::place_rows(const JointSet& joints) {
             size += r - first + 1;
         }
     }
-    if (n == 0 || static_cast<std::size_t>(size) > WIDEST * rows_.size()) return false;
+    if (n == 0 || static_cast<std::size_t>(size) > max_mean_width * rows_.size()) return false;
     std::vector<std::pair<int, int>> met;
-    meetings_.clear();
+    couplings_.clear();
     for (const auto& ends : at)
         for (std::size_t one = 0; one < ends.size(); ++one)
             for (std::size_t two = 0; two <= one; ++two) {
@@ -98,10 +93,10 @@ bool PlaneStep::place_rows(const JointSet& joints) {
                 met.emplace_back(k, j);
                 for (int r = joints_[k].row; r < end_of(k); ++r)
                     for (int s = joints_[j].row; s < end_of(j) && s <= r; ++s)
-                        meetings_.push_back({start_[r] + s, 2 * r + end, 2 * s + other});
+                        couplings_.push_back({start_[r] + s, 2 * r + end, 2 * s + other});
             }
-    std::stable_sort(meetings_.begin(), meetings_.end(),
-                     [](const Meeting& a, const Meeting& b) { return a.to < b.to; });
+    std::stable_sort(couplings_.begin(), couplings_.end(),
+                     [](const Coupling& a, const Coupling& b) { return a.to < b.to; });
     std::sort(met.begin(), met.end());
     blocks_ = static_cast<std::uint64_t>(std::unique(met.begin(), met.end()) - met.begin());
     blank_.assign(static_cast<std::size_t>(size), 0.0);

@@ -117,7 +117,7 @@ bool PlaneTree::look_at(const double* increments) noexcept {
         }
         m.angle = increments[k];
         m.moved = half_turn(m.angle);
-        if (!(m.moved.cosine > FARTHEST)) return false;
+        if (!(m.moved.cosine > min_half_turn_cosine)) return false;
     }
     return true;
 }
@@ -340,7 +340,7 @@ bool PlaneTree::stage(double tau, LargeArray<BodyState>& bodies, double* increme
         if (round.settled(size, moved, !closings_.empty())) break;
     }
     for (const Course& course : courses_)
-        if (!(course.moved.cosine > FARTHEST)) return false;
+        if (!(course.moved.cosine > min_half_turn_cosine)) return false;
     move(tau);
     ++rounds;
     place();

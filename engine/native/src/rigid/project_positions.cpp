@@ -40,7 +40,7 @@ Vec3 solved(const Mat3& a, Vec3 b) noexcept {
 }  // namespace
 
 void OverlapProjection::project_positions() {
-    if (joints_.stops().take_given()) project_limits();
+    if (joints_.stops().take_some_overstepped()) project_limits();
     if (mixed_.touching()) project_overlaps();
 }
 
@@ -181,7 +181,7 @@ void OverlapProjection::project_limits() {
             continue;
         }
         int row = 0;
-        const double back = joints_.given_back(static_cast<int>(k), row);
+        const double back = joints_.overstep_to_return(static_cast<int>(k), row);
         if (back == 0.0) continue;
         scratch_.overstep[scratch_.overstep_at[k] + row] -= back;
         beyond[island] = 1;

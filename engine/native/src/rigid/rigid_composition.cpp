@@ -27,11 +27,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::rigid_composition;
-
-}  // namespace
 
 void RigidComposition::take() {
     const bool tilted =  // joint coordinates see inertias along the bodies' own axes
@@ -47,7 +43,7 @@ void RigidComposition::begin() {
     const std::size_t stages = composition_stages(model_.method.composition).size();
     in_tree_ = tree_.coordinates() > 0 && tree_.holds(live_.bodies);
     unknowns_ = in_tree_ ? static_cast<std::size_t>(tree_.coordinates()) : rows;
-    live_.history.assign(static_cast<std::size_t>(DIFFERENCES) * unknowns_ * stages, 0.0);
+    live_.history.assign(static_cast<std::size_t>(max_differences) * unknowns_ * stages, 0.0);
     live_.guess_order.assign(stages, 0);
     pace_.assign(std::max(rows, unknowns_), 0.0);
     multiplier_.assign(std::max(rows, unknowns_), 0.0);
@@ -124,7 +120,7 @@ double RigidComposition::tension_rate(double allowed) {
         turn.push_back(light * Vec3{1.0 - 0.3 * (i % 4), 0.4 * (i % 3) - 0.5, 0.7 - 0.25 * (i % 5)});
     }
     double fastest = most;
-    for (int round = 0; round < ROUNDS; ++round) {
+    for (int round = 0; round < power_iterations; ++round) {
         std::fill(rows_.right.begin(), rows_.right.end(), 0.0);
         for (std::size_t k = 0; k < model_.constrained.size(); ++k) {
             if (model_.constants[model_.constrained[k]].particle) continue;
@@ -146,7 +142,7 @@ double RigidComposition::tension_rate(double allowed) {
         if (round > 0) fastest = size;  // the first is of the start
         for (Vec3& each : turn) each = (1.0 / size) * each;
     }
-    return std::min(most, ALIKE * fastest);
+    return std::min(most, rate_safety * fastest);
 }
 
 /// Steps whose longest stage is too long for the tension are taken in parts, in halves of halves; once parted they remain so.
@@ -156,9 +152,9 @@ void RigidComposition::look_at_tension() {
         longest = std::max(longest, model_.h * std::abs(stage));
     int parts = live_.parts;
     const double turned =
-        longest * longest * tension_rate(NEAR * MOST_OF_RATE * parts * parts / (longest * longest));
-    while (turned > MOST_OF_RATE * parts * parts && parts < MOST_PARTS) parts *= 2;
-    live_.tension_look = turned > NEAR * MOST_OF_RATE * parts * parts ? OFTEN : SELDOM;
+        longest * longest * tension_rate(near_limit * max_rate * parts * parts / (longest * longest));
+    while (turned > max_rate * parts * parts && parts < max_parts) parts *= 2;
+    live_.tension_look = turned > near_limit * max_rate * parts * parts ? often : seldom;
     if (parts == live_.parts) return;
     live_.parts = parts;
     live_.stage_steps = 0;
@@ -230,7 +226,7 @@ void RigidComposition::catch_up() {
 /// step to step, as many as would have told the last one best.
 void RigidComposition::guess(std::size_t stage, double span) {
     const double* difference =
-        live_.history.data() + static_cast<std::size_t>(DIFFERENCES) * unknowns_ * stage;
+        live_.history.data() + static_cast<std::size_t>(max_differences) * unknowns_ * stage;
     std::fill(multiplier_.begin(), multiplier_.end(), 0.0);
     for (int k = 0; k < live_.guess_order[stage]; ++k)
         for (std::size_t i = 0; i < unknowns_; ++i) multiplier_[i] += span * *difference++;
@@ -238,11 +234,11 @@ void RigidComposition::guess(std::size_t stage, double span) {
 
 /// The k-th difference of a new pace is what k differences before it failed to tell.
 void RigidComposition::remember(std::size_t stage, double span) {
-    double* difference = live_.history.data() + static_cast<std::size_t>(DIFFERENCES) * unknowns_ * stage;
+    double* difference = live_.history.data() + static_cast<std::size_t>(max_differences) * unknowns_ * stage;
     // A loop can come to a singular position, where long extrapolation leads into another of its branches.
     const bool loops = !in_tree_ && joints_.count() > static_cast<int>(model_.constrained.size());
     const auto known =
-        static_cast<int>(std::min<std::int64_t>(live_.stage_steps, loops ? 3 : DIFFERENCES - 1));
+        static_cast<int>(std::min<std::int64_t>(live_.stage_steps, loops ? 3 : max_differences - 1));
     for (std::size_t i = 0; i < unknowns_; ++i) pace_[i] = multiplier_[i] / span;
     double least = std::numeric_limits<double>::infinity();
     bool falling = true;  // beyond the first that grows they tell of noise, or of a sudden change
@@ -264,7 +260,7 @@ void RigidComposition::remember(std::size_t stage, double span) {
 void RigidComposition::forget() { std::fill(live_.history.begin(), live_.history.end(), 0.0); }
 
 void RigidComposition::forget(std::size_t stage) {
-    const std::size_t numbers = static_cast<std::size_t>(DIFFERENCES) * unknowns_;
+    const std::size_t numbers = static_cast<std::size_t>(max_differences) * unknowns_;
     std::fill_n(live_.history.begin() + static_cast<std::ptrdiff_t>(numbers * stage), numbers, 0.0);
     live_.guess_order[stage] = 0;
 }

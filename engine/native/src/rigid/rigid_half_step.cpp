@@ -1,5 +1,7 @@
 // With v and ℓ at mid-step the step is the variational one: ℓ₊ = ℓ₋ + h torque + Gᵀλ in world axes, and the turn
 // of ℓ₊ over h, so that gyroscopic terms are of order 2 as well. Only the start has to be found.
+//
+// reads: bodies, accelerations that the rows allow. writes: velocities and momenta at the start and at samples, speeds of rotors.
 #include <algorithm>
 
 #include "rigid/half_step.hpp"

@@ -13,11 +13,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::rigid_hold;
-
-}  // namespace
 
 void StageHold::begin() {
     const std::size_t rows = rows_.rows();
@@ -27,15 +23,15 @@ void StageHold::begin() {
     step_.assign(rows, 0.0);
     change_.assign(rows, 0.0);
     last_plain_ = last_step_ = change_;
-    mixing_.assign(2 * rows * MIXED, 0.0);
+    mixing_.assign(2 * rows * mixing_depth, 0.0);
     axes_.assign(model_.constrained.size(), {});
     extent_.clear();
     for (int k = 0; k < static_cast<int>(blocks.size()); ++k)
         for (int i = 0; i < blocks[k].size; ++i) extent_.push_back(joints_.gain(k, i).extent);
-    dense_ = model_.solver == RigidSolver::block && rows_.rows() <= DENSE;
+    dense_ = model_.solver == RigidSolver::block && rows_.rows() <= max_dense_rows;
     if (!dense_) return;
     dense_rows_.prepare(static_cast<int>(rows_.rows()));
-    meetings_.clear();
+    couplings_.clear();
     std::vector<int> first_row{0};
     for (const JointBlock& block : blocks) first_row.push_back(first_row.back() + block.size);
     const auto moving = [&](int k, int end) {
@@ -47,7 +43,7 @@ void StageHold::begin() {
             for (int l = 0; l <= k && moving(k, end) >= 0; ++l)
                 for (int other = 0; other < rows_.ends(l); ++other)
                     if (moving(l, other) == moving(k, end))
-                        meetings_.push_back({k, l, first_row[k], first_row[l], end, other, moving(k, end)});
+                        couplings_.push_back({k, l, first_row[k], first_row[l], end, other, moving(k, end)});
 }
 
 /// G M⁻¹ Gᵀ from the Jacobians as assembled.
@@ -55,7 +51,7 @@ bool StageHold::factor_dense() {
     const auto blocks = joints_.blocks();
     const int rows = static_cast<int>(rows_.rows());
     for (int i = 0; i < rows; ++i) std::fill_n(dense_rows_.row(i), i + 1, 0.0);
-    for (const Meeting& m : meetings_) {
+    for (const Coupling& m : couplings_) {
         const int body = m.body;
         const double *mine = rows_.end_rows(m.block, m.end), *its = rows_.end_rows(m.other, m.other_end);
         const double over = 1.0 / model_.constants[body].mass;
@@ -105,7 +101,7 @@ double StageHold::violations_ahead(double tau) {
 /// the difference between the matrix at the start of the stage and the true derivative. `kept` pairs are remembered.
 void StageHold::mix(int iteration, int& kept) {
     const std::size_t rows = rows_.rows();
-    if (iteration > 0 && kept < MIXED) {
+    if (iteration > 0 && kept < mixing_depth) {
         // One more pair: how the plain step changed (made orthonormal) when Λ went on by so much.
         double* turned = mixing_.data() + 2 * rows * static_cast<std::size_t>(kept);
         double* moved = turned + rows;
@@ -147,13 +143,13 @@ bool StageHold::iterate(double tau, bool dense) {
     for (int iteration = 0;; ++iteration) {
         const double off = violations_ahead(tau), ratio = off / before;
         ++live_.newton_iterations;
-        if (off <= SETTLED) return true;
+        if (off <= settled) return true;
         if (off < 1e-12 &&
             ratio > 0.5) {  // down in the rounding, which mixing of redundant rows makes larger
             if (plain) return true;
             plain = true;
         }
-        if (!(off < FARTHEST) || iteration == MOST_ITERATIONS) return false;
+        if (!(off < max_predicted_violation) || iteration == max_iterations) return false;
         const double over = -1.0 / tau;
         if (dense) {
             for (std::size_t row = 0; row < rows; ++row) step_[row] = over * violation_[row];
@@ -208,7 +204,7 @@ bool StageHold::seek(double tau) {
     rows_.push(step_.data());
     for (std::size_t row = 0; row < rows; ++row) multiplier_[row] += step_[row];
     if (dense_) rows_.fill_inertias();
-    return rows_.matrix.factor(SINGULAR) && iterate(tau, false);
+    return rows_.matrix.factor(singular_pivot) && iterate(tau, false);
 }
 
 }  // namespace spook

@@ -5,6 +5,8 @@
 // the speed of a motor and the rest of a spring where the step's velocities live: at its end, at mid-step with
 // half_step_velocities; a kinematic body's pace at mid-step, so that its place is second order; a path or an angle gives
 // the velocity that leads to where the step ends.
+//
+// reads: the time, places and velocities of bodies. writes: loads, forces on bodies, drives of joints, velocities of kinematic bodies.
 #include <algorithm>
 #include <limits>
 

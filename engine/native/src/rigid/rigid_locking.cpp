@@ -15,11 +15,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::rigid_locking;
-
-}  // namespace
 
 /// Which bodies joints tie to which, and which of these close a loop.
 class LoopWatch::Ties {
@@ -133,8 +129,8 @@ void LoopWatch::begin() {
         take_probe(loop, 0.0);
         loop.probe.clear_counters();
         loop.may_lock = false;
-        const double shorter = std::min(1.0, FEW / static_cast<double>(loop.blocks.size()));
-        if (!loop.probe.factor(NEARLY * shorter * shorter)) continue;
+        const double shorter = std::min(1.0, few_joints / static_cast<double>(loop.blocks.size()));
+        if (!loop.probe.factor(near_dependence * shorter * shorter)) continue;
         const auto redundant = static_cast<std::int64_t>(loop.probe.counters().floored_pivots);
         const auto rows = static_cast<std::int64_t>(loop.weakness.size());
         loop.may_lock = redundant > 0 && loop.probe.unknowns() - 2 * rows + redundant > 0;
@@ -189,7 +185,7 @@ void LoopWatch::find_extents(Loop& loop) {
     }
     const double mean = sum > 0.0 ? sum / count : 1.0;
     for (std::size_t k = 0; k < loop.square.size(); ++k)
-        loop.square[k] = loop.square[k] > POINT * POINT * mean ? loop.square[k] / ends[k] : mean;
+        loop.square[k] = loop.square[k] > point_arm * point_arm * mean ? loop.square[k] / ends[k] : mean;
 }
 
 /// After a solve, before its velocities are taken.
@@ -214,7 +210,7 @@ double LoopWatch::motion_of(const Loop& loop) const {
 
 bool LoopWatch::stops(const RigidState::Watched& seen, double motion) const noexcept {
     // What stands moves by rounding, and that may stop as it likes: it would be looked at in nearly every step.
-    const double told = LITTLE * TAKEN * std::max(seen.motion, AT_REST * seen.given);
+    const double told = slight_share * max_taken * std::max(seen.motion, at_rest * seen.given);
     return motion < 0.5 * seen.last && seen.last > told;
 }
 
@@ -251,8 +247,7 @@ void LoopWatch::watch(Loop& loop, RigidState::Watched& seen) {
 
     double work = 0.0, load = driven(loop);
     const double held = loop.held_back(model_.constants, live_.bodies, model_.constrained);
-    const double* y =
-        loop.repeated.data() + loop.weakness.size();  // minus the change of the probe's velocities
+    const double* y = loop.repeated.data() + loop.weakness.size();  // minus the probe's velocities
     for (std::size_t k = 0; k < loop.members.size(); ++k) {
         const int i = model_.constrained[loop.members[k]];
         const double* x = rows_.solution.data() + rows_.body_at(loop.members[k]);
@@ -270,20 +265,21 @@ void LoopWatch::watch(Loop& loop, RigidState::Watched& seen) {
         y += 3;
     }
     seen.given = load;
-    const double most = TAKEN * seen.motion, before = seen.work;
+    const double most = max_taken * seen.motion, before = seen.work;
     seen.work += (stopped ? 1.0 : static_cast<double>(seen.wait)) * work;
     seen.held += std::sqrt(held);
     seen.load += std::sqrt(load);
     const bool little =
-        std::abs(seen.work - before) < LITTLE * TAKEN * std::max(seen.motion, AT_REST * load) &&
-        held < LITTLE * HELD * HELD * load;
-    seen.wait = little ? std::clamp(2 * seen.wait, SOON, LATE) : SOON;
+        std::abs(seen.work - before) < slight_share * max_taken * std::max(seen.motion, at_rest * load) &&
+        held < slight_share * max_held * max_held * load;
+    seen.wait = little ? std::clamp(2 * seen.wait, soon, late) : soon;
     seen.next = live_.step + seen.wait;
-    const bool took = std::abs(seen.work) > most && seen.motion > AT_REST * load;
-    const bool holds = seen.load > 0.0 && seen.held > HELD * seen.load;
+    const bool took = std::abs(seen.work) > most && seen.motion > at_rest * load;
+    const bool holds = seen.load > 0.0 && seen.held > max_held * seen.load;
     // Near its equilibrium little pulls a mechanism: what is held back of that would be seen by now, and nothing of it is.
     const double steps = static_cast<double>(live_.step);
-    const double told = std::max(REPEATED * REPEATED * load, STANDS * STANDS * seen.motion / (steps * steps));
+    const double told = std::max(min_repeated * min_repeated * load,
+                                 standing_ratio * standing_ratio * seen.motion / (steps * steps));
     if (!took && !holds) {
         if (!(held > told)) return;
         loop.repeat();
@@ -351,9 +347,9 @@ bool LoopWatch::Loop::bends(const JointSet& joints, const LargeArray<BodyConstan
         }
     }
     const double count = static_cast<double>(blocks.size());
-    size /= NEARLY / (count * count);
+    size /= near_dependence / (count * count);
     if (!(motion > floor * size)) return false;  // so flat that rounding decides
-    return std::sqrt(extent) * std::abs(grows) > BENT / (count * count) * motion * std::sqrt(size);
+    return std::sqrt(extent) * std::abs(grows) > min_growth / (count * count) * motion * std::sqrt(size);
 }
 
 /// 2 J of what motors and springs alone would set in motion.
@@ -387,7 +383,7 @@ double LoopWatch::driven(const Loop& loop) {
 /// λ' of the last solve, with the sign of the solution, and what it changes of the velocities.
 bool LoopWatch::find_repeated(Loop& loop) {
     const double size = static_cast<double>(loop.blocks.size());
-    take_probe(loop, NEARLY / (size * size));  // the rows of a long chain move each other but little
+    take_probe(loop, near_dependence / (size * size));  // the rows of a long chain move each other but little
     if (!loop.probe.factor(0.0)) return false;
     loop.repeated.assign(static_cast<std::size_t>(loop.probe.unknowns()), 0.0);
     std::size_t row = 0;
@@ -404,7 +400,7 @@ void LoopWatch::note_locked(const Loop& loop) {
     const auto most = std::max_element(share.begin(), share.end());
     live_.named.clear();
     for (std::size_t k = 0; k < share.size(); ++k)
-        if (share[k] > TOLD * *most) live_.named.push_back(joints_.blocks()[loop.blocks[k]].joint);
+        if (share[k] > named_share * *most) live_.named.push_back(joints_.blocks()[loop.blocks[k]].joint);
     live_.locked = model_.mover(joints_.blocks()[loop.blocks[most - share.begin()]]);
 }
 

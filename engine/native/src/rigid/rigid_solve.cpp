@@ -1,4 +1,6 @@
-// The rows of a step in which all are bilateral, solved: link by link, or in one factorisation.
+// The rows of a step in which all are bilateral, solved: link by link (locked_tree.hpp), or in one factorisation (block_rows.hpp).
+//
+// reads: rows of joints, masses, momenta, dv_ext. writes: velocities and angular momenta of bodies; multipliers once they are asked for.
 #include <algorithm>
 
 #include "rigid/bilateral_solve.hpp"
@@ -57,8 +59,8 @@ bool BilateralSolve::find(bool ahead) {
         rows_.assemble();
         rows_.fill_inertias();
         rows_.fill_momenta();
-        if (model_.curved) curvature_.bend_first();
-        else if (model_.method.corrections > 0) curvature_.bend_back();
+        if (model_.curved) curvature_.predict_curvature();
+        else if (model_.method.corrections > 0) curvature_.take_past_curvature();
         clock_.mark(Stage::assemble_rows);
         finite = rows_.factor_and_solve();
         if (rows_.parted() && model_.method.corrections == 0) loops.note_projected();
@@ -87,7 +89,7 @@ void BilateralSolve::take_velocities(bool ahead) {
         return clock_.mark(Stage::solve_block);
     }
     if (model_.method.corrections > 0) {
-        model_.curved ? curvature_.correct_bend() : curvature_.correct();
+        model_.curved ? curvature_.refine_curvature() : curvature_.correct();
         clock_.mark(Stage::correct_curvature);
     }
     if (model_.stiff) stiffness.keep_angular_momentum();

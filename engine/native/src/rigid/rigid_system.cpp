@@ -166,7 +166,7 @@ void RigidSystem::reset(StageClock* clock) {
     replaying_ = false;
     early_joints_.clear();
     plane_.forget();
-    forces_.act_wholly();
+    forces_.end_shares();
     sleeping_.begin();
     if (forces_.follow_the_time()) forces_.follow_time();
     rows_.reset();

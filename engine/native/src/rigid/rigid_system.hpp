@@ -55,9 +55,8 @@ public:
     }
 
     struct Snapshot;
-    /// All that the coming steps depend on, drives apart; going back to it gives the bits of going on from it. Where
-    /// velocities were looked ahead for with contacts, it is what was before, and they are found again: what their
-    /// contacts left for the end of the step is too much to keep.
+    /// All that the coming steps depend on, drives apart; going back to it gives the bits of going on from it. Where velocities
+    /// were looked ahead for with contacts, it is what was before.
     void keep(Snapshot& kept) const;
     void go_back(const Snapshot& kept);
 

@@ -34,7 +34,7 @@ Quat restored(int first, Quat q) noexcept {
 /// To rounding.
 bool is_about_one_axis(Vec3 v) noexcept {
     const double xx = v.x * v.x, yy = v.y * v.y, zz = v.z * v.z;
-    return std::fmin(std::fmin(xx + yy, yy + zz), zz + xx) <= STEADY * (xx + yy + zz);
+    return std::fmin(std::fmin(xx + yy, yy + zz), zz + xx) <= steady_squared * (xx + yy + zz);
 }
 
 /// s(t) for A t², B t² up to PART²/4: the series of sn, to the ninth power.
@@ -99,9 +99,9 @@ Quat FreeRotor::triaxial_turn(double h, Vec3 p) const noexcept {
     if (is_about_one_axis(p) && is_about_one_axis(w)) return mean_turn(h, p);  // as what a hinge holds
     // The fastest spin on the path: where it lies in the plane of the outer axes.
     const double angle = std::fabs(h) * std::sqrt(energy * (over_.x + over_.z) - squared * over_.x * over_.z);
-    if (angle <= STRETCH) return short_turn(h, angle, p);
-    if (!(angle <= FAR)) return mean_turn(h, p);
-    const double count = std::ceil(angle * (1.0 / STRETCH));
+    if (angle <= piece_angle) return short_turn(h, angle, p);
+    if (!(angle <= tumbling_angle)) return mean_turn(h, p);
+    const double count = std::ceil(angle * (1.0 / piece_angle));
     Quat q;
     for (int k = static_cast<int>(count); k > 0; --k)
         q = unit(q * short_turn(h / count, angle / count, transposed_times(rotation(q), p)));
@@ -121,7 +121,7 @@ Quat FreeRotor::short_turn(double h, double angle, Vec3 p) const noexcept {
     const double p1 = p.x * p.x + share * p.y * p.y, p3 = p.z * p.z + (1.0 - share) * p.y * p.y;  // P²
     const double pace_a = a * b * p3, pace_b = b * (b - a) * p1;
     const double e1 = j.x * p1, e3 = j.z * p3, w1 = j.x * e1, w3 = j.z * e3, energy = e1 + e3;
-    const int parts = std::max(1, static_cast<int>(std::ceil(angle * (1.0 / PART))));
+    const int parts = std::max(1, static_cast<int>(std::ceil(angle * (1.0 / series_angle))));
     const double t = h / parts;
 
     const double s = pace(pace_a, pace_b, 0.5 * t), ss = s * s, as = pace_a * ss, bs = pace_b * ss;
@@ -136,7 +136,7 @@ Quat FreeRotor::short_turn(double h, double angle, Vec3 p) const noexcept {
         return (along_slope - y * along * across_slope / (cd + y * across)) * (over * over) * std::sqrt(cd);
     };
     double behind;
-    if (angle <= SHORT) {
+    if (angle <= short_angle) {
         behind = energy - 0.5 * (rate(ss * gauss2[0]) + rate(ss * gauss2[1]));
     } else {
         double rates[4];

@@ -12,9 +12,8 @@ public:
     /// Principal moments, positive [kg m²].
     explicit FreeRotor(Vec3 moments) noexcept;
 
-    /// The turn over a time h, which may be negative; `p`: its angular momentum in principal axes, where it begins. So is the
-    /// turn. Momentum and energy are kept to rounding; a steady spin w turns by h w, however large that is. Where a body
-    /// tumbles by more than a thousand radians in h, by its mean turn.
+    /// The turn over a time h, which may be negative, and `p`, the angular momentum, in the principal axes where it begins. Momentum
+    /// and energy are kept to rounding. Where a body tumbles by more than a thousand radians in h, its mean turn.
     Quat turn(double h, Vec3 p) const noexcept;
 
 private:
@@ -25,10 +24,9 @@ private:
     Quat short_turn(double h, double angle, Vec3 p) const noexcept;
 
     Kind kind_ = Kind::sphere;
-    int first_ =
-        0;  // the axis taken as x: a symmetric body's is its z, a triaxial one has its middle moment about y
-    double unit_ = 1.0;                 // of momenta and moments: a power of two
-    Vec3 over_{1, 1, 1};                // 1/moment, in that order and unit
+    int first_ = 0;       // taken as x: the z of a symmetric body, else so that y has the middle moment
+    double unit_ = 1.0;   // of momenta and moments: a power of two
+    Vec3 over_{1, 1, 1};  // 1/moment, in that order and unit
     double wide_ = 0.0, narrow_ = 0.0;  // over_: x − z, y − z
 };
 

@@ -53,8 +53,8 @@ void RowCurvature::curve(bool solved, const std::vector<Vec6>* mixed) {
     for (int i : model_.constrained)
         if (!live_.asleep(i)) look(i);
     for (int i : model_.driven) look(i);
-    bend_.resize(rows_.rows());
-    bent_.resize(rows_.rows());
+    taken_.resize(rows_.rows());
+    past_.resize(rows_.rows());
     std::size_t row = 0;
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k) {
         const JointBlock& block = joints_.blocks()[k];
@@ -66,9 +66,9 @@ void RowCurvature::curve(bool solved, const std::vector<Vec6>* mixed) {
         for (int i = 0; i < block.size; ++i, ++row) {
             const JointSet::RowGain gain = joints_.gain(k, i);
             const double cap = model_.method.correction_cap * gain.extent;
-            if (!solved) bent_[row] = gain.violation * 0.25 * std::clamp(back[i], -cap, cap);
-            bend_[row] =
-                bent_[row] + gain.violation * (0.25 + gain.relaxation) * std::clamp(ahead[i], -cap, cap);
+            if (!solved) past_[row] = gain.violation * 0.25 * std::clamp(back[i], -cap, cap);
+            taken_[row] =
+                past_[row] + gain.violation * (0.25 + gain.relaxation) * std::clamp(ahead[i], -cap, cap);
         }
     }
 }
@@ -77,22 +77,22 @@ void RowCurvature::keep_right() {
     first_right_.assign(rows_.right.begin(), rows_.right.begin() + static_cast<std::ptrdiff_t>(rows_.rows()));
 }
 
-void RowCurvature::bend_first() {
+void RowCurvature::predict_curvature() {
     keep_right();
     curve(false);
-    for (std::size_t row = 0; row < rows_.rows(); ++row) rows_.right[row] -= bend_[row];
+    for (std::size_t row = 0; row < rows_.rows(); ++row) rows_.right[row] -= taken_[row];
 }
 
-void RowCurvature::correct_bend() {
+void RowCurvature::refine_curvature() {
     for (int round = 0; round < model_.method.corrections; ++round) {
         curve(true);
         for (std::size_t row = 0; row < rows_.rows(); ++row)
-            rows_.right[row] = first_right_[row] - bend_[row];
+            rows_.right[row] = first_right_[row] - taken_[row];
         rows_.solve_again();
     }
 }
 
-void RowCurvature::bend_back() {
+void RowCurvature::take_past_curvature() {
     violations_at(joints_, live_.bodies, violation_.data());
     std::size_t row = 0;
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)

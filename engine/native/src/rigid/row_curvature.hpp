@@ -23,7 +23,7 @@ public:
 
     // Rows in `rows`, that keep their violations from step to step:
     /// Into the right sides what the way here has bent.
-    void bend_back();
+    void take_past_curvature();
     /// Solves again with what the way on bends.
     void correct();
 
@@ -31,10 +31,10 @@ public:
     /// What curvature takes from the right sides. c₋ and, before the first solve, c₊ are those of the velocities at hand,
     /// so that what spins steadily is right at once; then c₊ is that of the solution: `mixed`, or of `rows`.
     void curve(bool solved, const std::vector<Vec6>* mixed = nullptr);
-    double bend(std::size_t row) const noexcept { return bend_.empty() ? 0.0 : bend_[row]; }
+    double taken(std::size_t row) const noexcept { return taken_.empty() ? 0.0 : taken_[row]; }
     /// The same for `rows`, before they are solved, and again.
-    void bend_first();
-    void correct_bend();
+    void predict_curvature();
+    void refine_curvature();
 
 private:
     void take_solution(const double* x, int body, BodyState& s) const noexcept;
@@ -45,8 +45,8 @@ private:
     const JointSet& joints_;
     BlockRows& rows_;
     LargeArray<BodyState> trial_, from_, behind_;  // per body
-    // Per row; bent_ and bend_: what is taken from the right sides for the way here, and in all.
-    std::vector<double> bent_, bend_, first_right_, violation_, ahead_;
+    // Per row; past_ and taken_: what is taken from the right sides for the way here, and in all.
+    std::vector<double> past_, taken_, first_right_, violation_, ahead_;
 };
 
 }  // namespace spook

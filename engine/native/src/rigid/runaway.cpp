@@ -11,7 +11,7 @@ namespace {
 
 using namespace tolerances::runaway;
 
-/// Whether a joint pulls at one of its bodies, of mass m at an arm l, with a tension T of which T h²/(m l) is above TAUT.
+/// Whether a joint pulls at one of its bodies, of mass m at an arm l, with a tension T of which T h²/(m l) is above `taut`.
 bool is_taut(const JointBlock& block, const JointSet::State& state, bool second, double mass,
              double h) noexcept {
     if (block.axial) return false;
@@ -19,14 +19,13 @@ bool is_taut(const JointBlock& block, const JointSet::State& state, bool second,
     const int linear = std::min(block.size, 3);
     for (int i = 0; i < linear; ++i) impulse = std::max(impulse, std::abs(state.multiplier[i]));
     const double arm = norm(second ? state.second_reach : state.first_reach);
-    return arm > 0.0 && h * impulse > TAUT * mass * arm;
+    return arm > 0.0 && h * impulse > taut * mass * arm;
 }
 
 }  // namespace
 
-/// A body that a joint makes go round by a radian a step, and pulls at with a tension T of which T h²/(m l) is above
-/// TAUT: rows that stand still in the step no longer guide its way. −1 if there is none. An arm along the axis, as of a
-/// wheel beside its hinge, stays where it is, and so does the ground under a tyre.
+/// A body that a taut joint makes go round by a radian a step: rows that stand still in the step no longer guide its way. −1 if there
+/// is none. An arm along the axis, as of a wheel beside its hinge, stays where it is, and so does the ground under a tyre.
 int find_whirling(const RigidModel& model, const RigidState& live, const JointSet& joints,
                   std::span<const int> bodies, const std::function<void()>& deliver) {
     if (joints.blocks().empty()) return -1;
@@ -47,7 +46,7 @@ int find_whirling(const RigidModel& model, const RigidState& live, const JointSe
             for (const bool second : {false, true}) {
                 if ((second ? block.second : block.first) != i) continue;
                 const Vec3 around = cross(second ? state.second_reach : state.first_reach, spin);
-                if (body.mass * dot(around, around) > ASIDE * dot(spin, s.angular_momentum) &&
+                if (body.mass * dot(around, around) > passing_energy * dot(spin, s.angular_momentum) &&
                     is_taut(block, state, second, body.mass, model.h))
                     return i;
             }

@@ -3,10 +3,9 @@
 // Bodies that are connected by contacts, joints or springs are an island; what does not move by itself joins none. An
 // island whose bodies all were slower than the method's sleep_speed, |v| + |w| r and as measured by where they got,
 // for so many steps in a row, half of their load held, falls asleep: velocities zero, places as they are to the last bit,
-// forces to be read as they were. It takes no part in a step but for being met: it stays in the search for pairs of those that are awake,
-// at rest. Whatever gets a point with a sleeper, or moves what it touches or is attached to, wakes its island, and the
-// velocities of that step are found anew: nothing was moved yet. Falling asleep takes the kinetic energy that was left,
-// and lying there neither takes nor gives any.
+// forces to be read as they were. It takes no part in a step but stays in the search for pairs, at rest. Whatever gets a point with
+// a sleeper, or moves what it touches or is attached to, wakes its island (wake.cpp), and the velocities of that step are
+// found anew. Falling asleep takes the kinetic energy that was left.
 //
 // Never asleep: bodies that displace a fluid, whose load or joint follows the time, whose joints have friction that
 // follows their load, and what touches a body that moves as it is told, or a surface that moves along itself.
@@ -21,11 +20,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::sleep;
-
-}  // namespace
 
 void Sleeping::take(const RigidScene& scene) {
     if (!(model_.method.sleep_speed > 0.0) || !mixed_.may_touch()) return;

@@ -41,7 +41,7 @@ void RigidSystem::keep(Snapshot& kept) const {
 
 void RigidSystem::go_back(const Snapshot& kept) {
     plane_.forget();
-    forces_.act_wholly();  // of a step that was left unfinished
+    forces_.end_shares();  // of a step that was left unfinished
     live_ = kept.state;
     static_cast<JointStates&>(joints_) = kept.joints;
     mixed_.system = kept.warm.mixed;

@@ -2,9 +2,9 @@
 //
 //     M v₊ − Σ Gᵀ z = M v + h f,    w = G v₊ + Sig z − r,    lower <= z <= upper, w = 0 between the bounds.
 //
-// Bilateral rows alone go to one factorisation (rigid_solve.cpp); rows with bounds are written into MixedRows::system and
-// solved by pivoting, Newton's method on the cone or projected Gauss–Seidel, see contacts/. Impacts come first, and again where the
-// solve brings some about.
+// Bilateral rows alone go to one factorisation (rigid_solve.cpp). Rows with bounds, stops of joints among them (joint_stops.hpp), are
+// written into MixedRows::system and solved island by island (contacts/solve_islands.cpp): by pivoting and Newton's method on the
+// cone (contacts/friction_direct.hpp says when), or by projected Gauss–Seidel. Impacts come first, and where the solve brings some about.
 //
 // reads: points, rows of joints, masses, momenta, dv_ext. writes: velocities and angular momenta of bodies, multipliers of
 // joints, the contact cache, share_; what is unsettled.
@@ -104,7 +104,7 @@ void MixedRows::solve(bool touching) {
     scratch_.last_rows = LastRows::mixed;
     const auto blocks = joints_.blocks();
     fill_masses();
-    if (touching) lead_events();
+    if (touching) act_before_events();
     const auto impact_needed = [&] {
         return touching && model_.stages.runs(Stage::impact) && contacts_->impact_needed(system);
     };
@@ -136,7 +136,7 @@ void MixedRows::solve(bool touching) {
         scratch_.next = scratch_.free_velocities;
         for (std::size_t k = 0; k < model_.constrained.size(); ++k)
             scratch_.next[model_.constrained[k]] = system.velocity[k];
-        if (meet_late()) return solve(true);
+        if (find_late_contacts()) return solve(true);
     }
     if (touching && !load_dependent_.empty()) {
         load_dependent_.begin();
@@ -145,7 +145,7 @@ void MixedRows::solve(bool touching) {
     take_multipliers();
     if (touching) take_velocities(false, [this](int k) { return !contacts_->has_rows(k); });
     else take_velocities(false, {});
-    forces_.act_wholly();
+    forces_.end_shares();
     clock_.mark(solver);
 }
 
@@ -188,7 +188,7 @@ void MixedRows::fill_momenta(bool forces) {
         const int i = model_.constrained[k];
         const BodyState& s = live_.bodies[i];
         const Vec3 p = model_.constants[i].mass * (forces ? s.velocity + forces_.kick(i) : s.velocity);
-        const Vec3 l = forces ? s.angular_momentum + forces_.twist(i) : s.angular_momentum;
+        const Vec3 l = forces ? s.angular_momentum + forces_.angular_impulse(i) : s.angular_momentum;
         system.momentum[k] = {p.x, p.y, p.z, l.x, l.y, l.z};
     }
 }
@@ -348,7 +348,7 @@ void MixedRows::fill_rows(bool solved) {
             if (const int i = numbers.stop.row; i >= 0) numbers.stop.given += dot(jacobian[i], given);
         }
         for (int i = 0; i < rows.size; ++i)
-            numbers.right[i] -= curvature_.bend(at + static_cast<std::size_t>(i));
+            numbers.right[i] -= curvature_.taken(at + static_cast<std::size_t>(i));
         if (const int i = rows.rotor; i >= 0) numbers.right[i] -= rows.softness[i] * scratch_.impulses[k][i];
         rows.right = numbers.right;
         rows.lower = numbers.lower;
@@ -381,15 +381,15 @@ bool MixedRows::solve_joints() {
             finite = report.finite;
         }
         if (!finite || load_dependent_.empty()) return finite;
-        if (iterative && round == LoadDependentBounds::PATIENT) {
+        if (iterative && round == LoadDependentBounds::patient_rounds) {
             load_dependent_.begin();
             load_dependent_.follow(system, joints_, true);
             return true;
         }
         const auto [off, same] = load_dependent_.follow(system, joints_);
         same_matrix = same;
-        if (off <= LoadDependentBounds::AGREED) return true;
-        if (round < LoadDependentBounds::MOST_ROUNDS) continue;
+        if (off <= LoadDependentBounds::agreed) return true;
+        if (round < LoadDependentBounds::max_rounds) continue;
         // In speeds: what the missing impulse would have given the lightest of its bodies.
         const RowBlock& rows = system.rows[load_dependent_.worst()];
         const int body = model_.constrained[rows.second >= 0 ? rows.second : rows.first];

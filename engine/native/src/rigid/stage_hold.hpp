@@ -36,11 +36,11 @@ private:
     double* multiplier_ = nullptr;
     bool dense_ = false;
     DenseRows dense_rows_;
-    struct Meeting {                    // of two blocks on one moving body
+    struct Coupling {                   // of two blocks on one moving body
         int block, other, row, column;  // row and column: the first of each
         int end, other_end, body;
     };
-    std::vector<Meeting> meetings_;
+    std::vector<Coupling> couplings_;
 };
 
 }  // namespace spook

@@ -1,9 +1,9 @@
-// The order of a step of h: what step() calls, in this order, each stage in the file of its name; impact is called by solve velocities.
+// The order of a step of h: what step() calls, each stage in the file of its name. What a step writes first is StepScratch::begin().
 //
 //   wake               wake.cpp               what moving bodies touch or hold is awake; again, with all that follows, for what is met
 //   apply forces       apply_forces.cpp       dv_ext = h M⁻¹ f
 //   detect             detect.cpp             contact points: where, and when in the step
-//   impact             impact.cpp             contacts and stops with restitution rebound
+//   impact             impact.cpp             contacts and stops with restitution rebound; called by solve velocities
 //   solve velocities   solve_velocities.cpp   v₊ with joints, contacts and friction; impacts that it brings about come first
 //   integrate          integrate.cpp          q₊ = q + h v₊
 //   project positions  project_positions.cpp  overlaps go, and leave no trace in v
@@ -17,11 +17,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::step;
-
-}  // namespace
 
 void RigidSystem::step() {
     if (mixed_.contacts() || model_.constants.size() >= looking_from) Watch::look();
@@ -73,14 +69,14 @@ void RigidSystem::leave_out_sleepers() {
     if (live_.sleep.sleepers == 0) return;
     keep(before_waking_);
     residual_before_waking_ = mixed_.residual;
-    forces_.give_out();
+    forces_.begin_shares();
     forces_.leave_out_sleepers();
 }
 
 /// Whether sleepers were met: they are awake then, and all is as it was, to be found anew.
 bool RigidSystem::wake_met() {
     if (live_.sleep.sleepers == 0) return false;
-    forces_.act_wholly();
+    forces_.end_shares();
     if (mixed_.contacts()->woken().empty()) return false;
     const std::vector<int> woken = mixed_.contacts()->woken();
     go_back(before_waking_);
@@ -98,7 +94,7 @@ void RigidSystem::solve_velocities() {
     }
     if (!mixed_.touching() && model_.solver == RigidSolver::block && live_.sleep.sleepers == 0) {
         if (!bilateral_.find(contacts)) return;
-        if (!contacts || !mixed_.meet_late()) return bilateral_.take_velocities(contacts);
+        if (!contacts || !mixed_.find_late_contacts()) return bilateral_.take_velocities(contacts);
     }
     bilateral_.forget();
     if (!mixed_.touching()) mixed_.solve(false);

@@ -88,7 +88,7 @@ void TreeRungeKutta::stages(double time, double h) {
 /// By which rates are measured, sizes in a second.
 double TreeRungeKutta::fastest() const noexcept {
     const std::size_t n = tree_.coordinates();
-    double found = RESTING / model_.h;
+    double found = resting_rate / model_.h;
     for (std::size_t i = 0; i < n; ++i)
         found = std::max(
             {found, std::fabs(start_[n + i]) / tree_.extent(i), std::fabs(there_[n + i]) / tree_.extent(i)});
@@ -163,23 +163,23 @@ void TreeRungeKutta::go_on(double time, double left) {
         if (controlled && !(live_.part > 0.0)) live_.part = first_guess();
         for (bool again = false;;) {
             ++live_.newton_iterations;
-            const bool last = !controlled || live_.part * LITTLE_MORE >= left;
+            const bool last = !controlled || live_.part * last_part >= left;
             const double before = live_.part;
             const double h = last ? left : std::min(before, 0.5 * left);
             stages(time, h);
             if (controlled) {
                 const double off = error(h);
                 // No NaN does. Between knots that are nearer than that, times are rounded.
-                const bool fits = off <= 1.0 || (h <= SMALLEST * model_.h && std::isfinite(off));
+                const bool fits = off <= 1.0 || (h <= min_part * model_.h && std::isfinite(off));
                 const double stretch =
-                    off > 0.0 ? std::clamp(SAFE / root_of_order(off), SHORTEST, again ? 1.0 : LONGEST)
-                              : (off == 0.0 ? LONGEST : SHORTEST);
+                    off > 0.0 ? std::clamp(safety / root_of_order(off), min_growth, again ? 1.0 : max_growth)
+                              : (off == 0.0 ? max_growth : min_growth);
                 live_.part = h * stretch;
                 if (fits && h < before) live_.part = std::max(live_.part, before);
                 if (!fits) {
                     again = true;
                     ++live_.halved_steps;
-                    if (live_.part < SMALLEST * model_.h) return lose();
+                    if (live_.part < min_part * model_.h) return lose();
                     Watch::look();
                     continue;
                 }

@@ -50,7 +50,7 @@ void JointSet::assemble_tyre(const Joint& joint, State& state, std::span<const B
     put(2, at.sideways);
     right.right[0] = joint.gain[0].upsilon * dot(at.normal, slip) - joint.gain[0].violation * at.height;
     right.lower[0] = 0.0;
-    const double speed = std::abs(dot(at.forward, wheel.velocity - under)) + CREEP;
+    const double speed = std::abs(dot(at.forward, wheel.velocity - under)) + creep_speed;
     form.softness[0] = blocks_[joint.block].softness[0];
     for (int k = 0; k < 2; ++k) {
         form.softness[1 + k] = state.slides * speed / (form.slip_stiffness[k] * time_step_);

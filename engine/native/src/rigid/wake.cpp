@@ -10,11 +10,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::wake;
-
-}  // namespace
 
 /// Wakes the bodies that a body that moves as it is told touches or holds.
 void Sleeping::wake() {
@@ -40,7 +36,7 @@ bool Sleeping::sleep_through() {
         std::any_of(model_.driven.begin(), model_.driven.end(), [this](int i) { return is_moving(i); }))
         return false;
     mixed_.contacts()->sleep_through();
-    mixed_.touch_nothing();
+    mixed_.clear_touching();
     return true;
 }
 
