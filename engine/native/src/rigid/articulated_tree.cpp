@@ -10,9 +10,6 @@ namespace spook {
 
 namespace {
 
-Vec3 vector_of(Quat q) noexcept { return {q.x, q.y, q.z}; }
-Vec3 carried(const Mat3& turned, Vec3 v) noexcept { return v + turned * v; }
-
 Vec3 symmetric_times(const double* s, Vec3 v) noexcept {
     return {s[0] * v.x + s[3] * v.y + s[4] * v.z, s[3] * v.x + s[1] * v.y + s[5] * v.z,
             s[4] * v.x + s[5] * v.y + s[2] * v.z};

@@ -44,15 +44,6 @@ struct Writer {
     }
 };
 
-/// The turn of the second body seen from the first, in the first body's frame.
-Quat relative_turn(const BodyState& first, const BodyState& second) noexcept {
-    Quat q = conjugate(first.turn) * second.turn;
-    if (q.w < 0.0) q = {-q.w, -q.x, -q.y, -q.z};
-    return q;
-}
-
-Vec3 carried(const BodyState& body, Vec3 v) noexcept { return v + body.turn_less_one * v; }
-
 /// |d| − rest of d = span + gap, and |d|. |d|² − |span|² without cancellation; span and rest differ only if the scene
 /// says so.
 double stretch(const JointConstants& joint, Vec3 gap, double& length) noexcept {

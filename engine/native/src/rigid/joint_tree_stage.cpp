@@ -9,14 +9,6 @@
 
 namespace spook {
 
-namespace {
-
-Vec3 times(Vec3 a, Vec3 b) noexcept { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
-Vec3 vector_of(Quat q) noexcept { return {q.x, q.y, q.z}; }
-Vec3 carried(const Mat3& turned, Vec3 v) noexcept { return v + turned * v; }
-
-}  // namespace
-
 /// What the stage starts from.
 void JointTree::take(const LargeArray<BodyState>& bodies) noexcept {
     for (std::size_t k = 0; k < nodes_.size(); ++k) {

@@ -4,12 +4,6 @@
 
 namespace spook {
 
-namespace {
-
-Vec3 carried(const BodyState& body, Vec3 v) noexcept { return v + body.turn_less_one * v; }
-
-}  // namespace
-
 Twist LockedTree::momentum_of(const Link& link, const BodyState& s, const LockedLoads& loads) const noexcept {
     const double h = loads.time_step;
     Twist momentum{{}, s.angular_momentum};
@@ -45,9 +39,8 @@ void LockedTree::locate(std::size_t k, std::span<const BodyState> bodies, Work& 
 
     const BodyState &first = hold.child_is_first ? child : other,
                     &second = hold.child_is_first ? other : child;
-    Quat q = conjugate(first.turn) * second.turn;
-    if (q.w < 0.0) q = {-q.w, -q.x, -q.y, -q.z};
-    work.tilt = carried(first, {q.x, q.y, q.z});
+    const Quat q = relative_turn(first, second);
+    work.tilt = carried(first, vector_of(q));
     const double over = 1.0 / q.w;
     work.tilt_softness = gain.softness[1] * (over * over);
     work.left.linear = gain.upsilon[0] * slip.linear - gain.violation[0] * gap;

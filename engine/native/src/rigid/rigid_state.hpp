@@ -2,8 +2,6 @@
 // the start: a violation of 1e-11 m is then known to sixteen digits, however far from the origin the scene lies.
 #pragma once
 
-#include <vector>
-
 #include "rigid/rigid_scene.hpp"
 #include "rigid/rotation.hpp"
 
@@ -41,6 +39,13 @@ inline Vec3 position(const BodyConstants& body, const BodyState& state) noexcept
 }
 inline Quat orientation(const BodyConstants& body, const BodyState& state) noexcept {
     return state.turn * body.start_turn;
+}
+/// A vector that the body has turned with since the start.
+constexpr Vec3 carried(const BodyState& body, Vec3 v) noexcept { return carried(body.turn_less_one, v); }
+/// The turn of the second body seen from the first, in the first body's frame.
+inline Quat relative_turn(const BodyState& first, const BodyState& second) noexcept {
+    const Quat q = conjugate(first.turn) * second.turn;
+    return q.w < 0.0 ? Quat{-q.w, -q.x, -q.y, -q.z} : q;
 }
 /// Body axes to world axes.
 Mat3 axes(const BodyConstants& body, const BodyState& state) noexcept;

@@ -21,8 +21,6 @@ namespace {
 
 using namespace tolerances::rotation;
 
-Vec3 times(Vec3 a, Vec3 b) noexcept { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
-
 /// v with the axis `first` as x, and back.
 Vec3 ordered(int first, Vec3 v) noexcept {
     return first == 0 ? v : first == 1 ? Vec3{v.y, v.z, v.x} : Vec3{v.z, v.x, v.y};

@@ -41,6 +41,12 @@ inline Mat3 rotation_less_one(Quat q) noexcept {
              2 * (q.x * q.z - q.w * q.y), 2 * (q.y * q.z + q.w * q.x), -2 * (xx + yy)}};
 }
 
+/// v turned by R, given R − 1.
+constexpr Vec3 carried(const Mat3& turn_less_one, Vec3 v) noexcept { return v + turn_less_one * v; }
+constexpr Vec3 vector_of(Quat q) noexcept { return {q.x, q.y, q.z}; }
+/// Entry by entry.
+constexpr Vec3 times(Vec3 a, Vec3 b) noexcept { return {a.x * b.x, a.y * b.y, a.z * b.z}; }
+
 /// Back to unit length; one Newton step is exact to rounding for a drift of rounding.
 inline Quat unit(Quat q) noexcept {
     const double s = 1.5 - 0.5 * (q.w * q.w + q.x * q.x + q.y * q.y + q.z * q.z);

@@ -1,12 +1,12 @@
 #include "rigid/tyre_rows.hpp"
 
 #include "rigid/joint_set.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
 
 Stand stand(const JointConstants& joint, double radius, const BodyState& road,
             const BodyState& wheel) noexcept {
-    const auto carried = [](const BodyState& body, Vec3 v) { return v + body.turn_less_one * v; };
     const Vec3 axle = carried(wheel, joint.axes[0]);
     Stand at;
     at.normal = carried(road, joint.axes[1]);

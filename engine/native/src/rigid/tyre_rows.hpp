@@ -11,7 +11,6 @@
 #pragma once
 
 #include "rigid/joint_rows.hpp"
-#include "rigid/tolerances.hpp"
 
 namespace spook {
 
