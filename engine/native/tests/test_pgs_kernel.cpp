@@ -148,7 +148,7 @@ std::vector<double> heap(bool portable, FrictionModel model) {
     };
     for (int turn = 0; turn < 3; ++turn) {
         const FrictionReport report = solver.run(12, 1e-10, 0.02, more);
-        const RowsResidual worst = solver.worst(0.02);
+        const RowsResidual worst = solver.worst(0.02, 0.02);
         out.insert(out.end(), {report.residual, static_cast<double>(report.pgs_iterations), worst.residual,
                                static_cast<double>(worst.row), solver.work()});
     }

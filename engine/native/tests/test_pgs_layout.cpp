@@ -84,7 +84,7 @@ std::vector<double> solved(const std::vector<PgsContact>& all, Given given, bool
         for (std::size_t k = from; k < end; ++k) EXPECT(solver.add(list[k]) == static_cast<int>(k));
     }
     solver.run(12, 0.0, 0.0, nullptr);
-    const RowsResidual worst = solver.worst(1e9);
+    const RowsResidual worst = solver.worst(1e9, 1e9);
     std::vector<double> out;
     for (int b = 0; b < bodies; ++b)
         for (const double v : solver.velocity(b)) out.push_back(v + 0.0);

@@ -258,7 +258,7 @@ int go_on(Heap& heap, int iterations, double focus) {
     int done = 0;
     for (int turn = 0; turn < 1000; ++turn) {
         done += heap.solver.run(iterations, 1e-13, focus, nothing_more).pgs_iterations;
-        if (!(heap.solver.worst(focus).residual > focus)) return done;
+        if (!(heap.solver.worst(focus, focus).residual > focus)) return done;
     }
     return forever;
 }
@@ -357,7 +357,7 @@ void work_is_what_was_updated() {
     EXPECT_NEAR(heap.solver.work() * (bodies + 1), (3.0 + 1.0 / 16.0) * bodies + 3.0 + (bodies - 2) / 16.0,
                 1e-9);
     const double before = heap.solver.work();
-    heap.solver.worst(0.5);
+    heap.solver.worst(0.5, 0.5);
     EXPECT_NEAR(heap.solver.work(), before + 0.5, 1e-12);
     MixedSystem again = heap.system;
     heap.solver.start(again, FrictionModel::cone);
@@ -432,7 +432,7 @@ void the_worst_contact_is_found_where_it_is() {
             Heap heap(system);
             for (int k = 0; k < 30; ++k) heap.add(any_contact(random, 20, friction));
             heap.solver.run(static_cast<int>(1 + seed % 4), 1e-13, 0.0, nothing_more);
-            const RowsResidual found = heap.solver.worst(1.0);
+            const RowsResidual found = heap.solver.worst(1.0, 1.0);
             // Both measure the same law, friction from another side: nothing may be off by more than the figure says.
             if (friction == 0.0) {
                 EXPECT_NEAR(found.residual, heap.worst(), 1e-12);

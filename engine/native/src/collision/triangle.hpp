@@ -15,9 +15,6 @@ struct Triangle {
 
     Triangle(const Primitive& primitive, const Pose& at) noexcept;
 
-    Vec3 place(int corner) const noexcept {
-        return apply(at, mesh.corners[static_cast<std::size_t>(corner)]);
-    }
     /// Whether a contact along `n` (from the triangle) on its farthest corner, edge or face meets no neighbour first.
     bool genuine(Vec3 n) const noexcept;
     /// Of the face, looked at along its normal: which corners, in bits 0 to 2, and which sides, in bits 3 to 5, are

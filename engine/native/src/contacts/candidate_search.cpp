@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include "collision/cylinder.hpp"
 #include "contacts/contact_geometry.hpp"

@@ -1,7 +1,6 @@
 // Bodies that are connected by rows are solved together, the others apart.
 #pragma once
 
-#include <exception>
 #include <functional>
 #include <map>
 #include <utility>

@@ -48,7 +48,6 @@ public:
     void order(std::vector<CachedContact>& cache) { order_by_key(cache, unordered_, places_); }
 
     PgsSolver& solver() noexcept { return solver_; }
-    const PgsSolver& solver() const noexcept { return solver_; }
 
 private:
     PgsSolver solver_;

@@ -1,11 +1,9 @@
 #include "contacts/contact_stage.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "contacts/contact_geometry.hpp"
 #include "contacts/tolerances.hpp"
-#include "linear/regularisation.hpp"
 
 namespace spook {
 

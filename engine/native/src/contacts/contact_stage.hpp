@@ -39,7 +39,6 @@
 // which E₊ <= E. It exists: s = 0 is free fall, E₊ − E = −½ |k|²_M, and E₊ is convex in s.
 #pragma once
 
-#include <cstdint>
 #include <memory>
 #include <vector>
 

@@ -4,7 +4,6 @@
 // end of the step with the velocities a solve found, and what lies deep there gets a row for the step itself, with the gap
 // that to first order closes to the depth found.
 #include <algorithm>
-#include <cmath>
 
 #include "collision/shape_cast.hpp"
 #include "contacts/candidate_search.hpp"

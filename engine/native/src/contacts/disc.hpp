@@ -1,8 +1,6 @@
 // The friction of one contact by itself, where a step of projection would be slow.
 #pragma once
 
-#include <algorithm>
-
 #include "linear/elementary.hpp"
 
 namespace spook {

@@ -1,6 +1,5 @@
 #include "contacts/friction_pgs.hpp"
 
-#include <algorithm>
 #include <cmath>
 
 #include "contacts/pgs_rows.hpp"

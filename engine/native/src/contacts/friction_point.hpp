@@ -1,7 +1,6 @@
 // Which rows of a mixed system are Coulomb friction, and how they are bounded.
 #pragma once
 
-#include <cmath>
 #include <vector>
 
 #include "contacts/mass_factors.hpp"

@@ -1,8 +1,6 @@
 // Contacts and bodies as iterations of PGS read and write them: bodies in a line each, contacts one behind the other.
 #pragma once
 
-#include <vector>
-
 #include "contacts/friction_point.hpp"
 #include "contacts/pgs_kernel.hpp"
 #include "contacts/pgs_rows.hpp"

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <utility>
 
-#include "contacts/contact_geometry.hpp"
 #include "contacts/tolerances.hpp"
 #include "run/watch.hpp"
 

@@ -1,7 +1,6 @@
 // Projected Gauss–Seidel over contacts in compact form, with joints, for as many bodies as there are.
 #pragma once
 
-#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -57,7 +56,6 @@ public:
     /// The contact furthest from its law, as rows_residual() measures it; `row` is the contact's index. The next run goes on at
     /// those further off than `focus` [m/s], or, where these are few, than nearly what is `allowed`.
     RowsResidual worst(double focus, double allowed);
-    RowsResidual worst(double focus) { return worst(focus, focus); }
 
 private:
     using Scheduled = PgsSchedule::Scheduled;

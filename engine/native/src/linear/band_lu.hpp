@@ -20,7 +20,6 @@ public:
         values_.assign(static_cast<std::size_t>(unknowns) * static_cast<std::size_t>(width_), 0.0);
         exchanged_.assign(static_cast<std::size_t>(unknowns), 0);
     }
-    int unknowns() const noexcept { return unknowns_; }
     int reach() const noexcept { return reach_; }
     void clear() noexcept { std::fill(values_.begin(), values_.end(), 0.0); }
     double& at(int i, int j) noexcept {

@@ -15,7 +15,6 @@ public:
         values_.assign(count * count, 0.0);
         inverse_.assign(count, 0.0);
     }
-    int rows() const noexcept { return rows_; }
     /// The lower triangle, row-major; to be filled before factor().
     double* row(int i) noexcept { return values_.data() + i * rows_; }
 

@@ -2,14 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 namespace spook {
 
 void BlockRows::take() {
     std::size_t spare = 0;
     for (const JointBlock& block : joints_.blocks()) {
-        count_ += static_cast<std::uint64_t>(block.size);
+        count_ += static_cast<std::size_t>(block.size);
         spare_at_.push_back(spare);
         spare += static_cast<std::size_t>(12 * block.size);
     }

@@ -6,7 +6,6 @@
 // factored by blocks (linear/block_ldlt.hpp), refined, and redundant rows told apart (linear/redundant_rows.hpp).
 #pragma once
 
-#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -31,9 +30,7 @@ public:
 
     /// Finds out how many rows there are.
     void take();
-    std::uint64_t count() const noexcept { return count_; }
-    /// That, as it is summed over.
-    std::size_t rows() const noexcept { return static_cast<std::size_t>(count_); }
+    std::size_t rows() const noexcept { return count_; }
     void analyse();
     void reset();
 
@@ -103,7 +100,7 @@ private:
     LargeArray<double> spare_;  // Jacobians with nowhere else to go, per block 2 × rows × 6
     std::vector<std::size_t> spare_at_;
     LargeArray<double> wide_;  // Jacobians of the bodies beyond a row's first two
-    std::uint64_t count_ = 0;
+    std::size_t count_ = 0;
 };
 
 }  // namespace spook

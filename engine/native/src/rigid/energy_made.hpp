@@ -2,7 +2,7 @@
 #pragma once
 
 #include "rigid/forces.hpp"
-#include "run/run_loop.hpp"
+#include "run/report.hpp"
 
 namespace spook {
 

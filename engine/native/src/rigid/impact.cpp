@@ -3,7 +3,6 @@
 //
 // reads: points, masses and rows of joints. writes: velocities of bodies and scratch_.velocities, impulses of impacts, share_ (the part of
 // the forces still to act after an event), stops that were hit.
-#include <algorithm>
 #include <cmath>
 
 #include "rigid/mixed_rows.hpp"

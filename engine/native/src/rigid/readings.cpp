@@ -4,6 +4,7 @@
 #include <limits>
 
 #include "rigid/rotors.hpp"
+#include "run/quantities.hpp"
 
 namespace spook {
 

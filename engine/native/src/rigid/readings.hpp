@@ -4,7 +4,6 @@
 #include "rigid/bilateral_solve.hpp"
 #include "rigid/mixed_rows.hpp"
 #include "rigid/plane_path.hpp"
-#include "run/quantities.hpp"
 
 namespace spook {
 

@@ -69,7 +69,6 @@ public:
     void set_rest(int joint, double rest);
 
     void reset(StageClock* clock);
-    RigidSolver solver() const noexcept { return model_.solver; }
     void count(RunReport& report, std::int64_t steps) const;
     using Unsettled = spook::Unsettled;
     std::vector<double> final_state();

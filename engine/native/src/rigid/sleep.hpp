@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "collision/broad_phase.hpp"
-#include "linear/vec.hpp"
 
 namespace spook {
 

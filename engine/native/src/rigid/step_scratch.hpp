@@ -5,7 +5,6 @@
 #include <vector>
 
 #include "contacts/contact_islands.hpp"
-#include "contacts/pivot_solver.hpp"
 #include "linear/large_array.hpp"
 #include "linear/vec.hpp"
 #include "rigid/joint_state.hpp"
