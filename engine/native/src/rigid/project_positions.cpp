@@ -396,7 +396,7 @@ bool OverlapProjection::keep_momenta(const std::vector<int>& members, double lim
                     cross(model_.position(model_.constrained[k], live_.bodies) - centre, s.velocity) +
                 s.angular_momentum;
     }
-    if (after <= limit * (1.0 + rounding)) return true;
+    if (after <= limit * (1.0 + energy_rounding)) return true;
     const Vec3 drift = (1.0 / mass) * momentum, turn = solved(inertia, spin);
     const double rigid = mass * dot(drift, drift) + dot(turn, spin);
     if (!(rigid <= limit) || !finite(turn)) return false;

@@ -57,13 +57,13 @@ inline constexpr double min_half_turn_cosine = 0.3;  // cosine of half the turn 
 
 // project_positions.cpp
 namespace tolerances::project_positions {
-inline constexpr int most_rounds = 10;         // of Newton's method
-inline constexpr double held = 1e-13;          // of a joint's size: a violation that is rounding
-inline constexpr double nearly_held = 1e-11;   // and what may be left where rounding is worse
-inline constexpr int most_halvings = 4;        // of the displacement
-inline constexpr double rounding = 4e-16;      // of the energy
-inline constexpr int max_projections = 4;      // of a step
-inline constexpr std::size_t few_members = 8;  // bodies of an island: most are no larger
+inline constexpr int most_rounds = 10;            // of Newton's method
+inline constexpr double held = 1e-13;             // of a joint's size: a violation that is rounding
+inline constexpr double nearly_held = 1e-11;      // and what may be left where rounding is worse
+inline constexpr int most_halvings = 4;           // of the displacement
+inline constexpr double energy_rounding = 4e-16;  // of the energy
+inline constexpr int max_projections = 4;         // of a step
+inline constexpr std::size_t few_members = 8;     // bodies of an island: most are no larger
 }  // namespace tolerances::project_positions
 
 // rigid_composition.cpp
