@@ -37,7 +37,7 @@ GUARDS = (
     Guard("an import has a time limit", APART, "patience = START_LIMIT + request.time_limit", "patience = 1e9", "tracker/measure/test_gates hangs"),
     Guard("what is called good is held to its limit", APART, "if sample.passed != (", "if False and sample.passed != (", "tracker/measure/test_gates limit_that_is_changed"),
     Guard("a catalogue that asks nothing is no green", APART, "if not run.samples:", "if False:", "tracker/measure/test_gates asks_nothing"),
-    Guard("what supports nothing is no green", "tracker/cli/main.py", 'if any(sample.outcome != "not_supported" for sample in document.samples):', "if True:", "tracker/measure/test_gates supports_nothing"),
+    Guard("what supports nothing is no green", "tracker/cli/report_table.py", 'if any(sample.outcome != "not_supported" for sample in document.samples):', "if True:", "tracker/measure/test_gates supports_nothing"),
     Guard("what is no longer supported is lost", "tracker/judge/exact_values.py", "return state.level is not None and (state.red", "return False and (state.red", "tracker/judge/test_support_lost"),
     Guard("another definition hides no loss", "tracker/judge/series_history.py", "return next((nights[i] for i in before), None)", "return None", "tracker/judge/test_support_lost definition"),
     Guard("a worker that ended has not answered", WORKERS, 'return (Lost("crashed", DIED, self.place.value),)', 'return (Lost("not_supported", DIED, self.place.value),)', "tracker/measure/test_gates exit_code_0"),

@@ -111,7 +111,7 @@ def test_without_the_script_of_tonight_charts_are_drawn_and_the_page_says_what_l
     visit(driver, site, "error-time.html")
     wait_for(driver, SOME_DRAWN)
 
-    assert "tonight.js could not be loaded" in driver.find_element("id", "measured").text
+    assert "tonight.js could not be loaded" in driver.find_element("id", "measured-when").text
     assert not driver.find_element("id", "earlier").is_displayed(), "no night is known to lay beside"
 
 
