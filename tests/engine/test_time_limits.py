@@ -188,7 +188,7 @@ def test_the_clock_runs_while_a_scene_is_compiled(side: int, limit: float) -> No
 
 
 def test_a_held_run_tells_in_time_how_far_it_came() -> None:
-    scene, method = wedged(300, Method(half_step_velocities=True))
+    scene, method = wedged(600, Method(half_step_velocities=True))
     with start(scene, time_step=TIME_STEP, method=method, observe={"energy": Energy()}) as run:
         began = time.process_time()
         with pytest.raises(SimulationFailed) as failed:
@@ -329,7 +329,7 @@ def falls_and_fails() -> Made:
     torque = (sys.float_info.max - inertia) / (TIME_STEP * (FAILS - 0.5))  # N m
     spin = Load(name="spin", body="spun", torque=(0.0, 0.0, torque))
     scene = Scene(bodies=(ground(), *balls, spun), forces=(spin,), gravity=DOWN)
-    return scene, Method(solver="iterative", iterations=3000, residual_tolerance=0.0)
+    return scene, Method(solver="iterative", iterations=6000, residual_tolerance=0.0)
 
 
 @pytest.fixture(scope="module")

@@ -323,7 +323,7 @@ def test_what_falls_onto_tiles_lands_on_their_plane(
     a blow against that side, and one in five that rebounded. Settled sweeps may leave a tenth of a metre per second."""
     rng = np.random.default_rng(7)
     z = SLIDERS[slider][1]
-    for _ in range(6):
+    for _ in range(12):
         h, drop = float(rng.choice((1 / 60, 1 / 240))), float(rng.choice((1e-3, 0.01, 0.1, 0.3)))
         heading, speed, y = (
             float(rng.uniform(0.0, 0.7)),

@@ -9,6 +9,7 @@ import pytest
 
 from spook_tracker.engine import (
     Box,
+    Final,
     Maximum,
     Method,
     Penetration,
@@ -46,6 +47,18 @@ def test_a_pile_with_few_iterations_still_carries_its_weight(sweeps: int) -> Non
     assert found.overlap < 0.02 * pile.RADIUS
     assert abs(found.balance_error) < 1e-10
     assert found.energy_rise < 1e-9
+
+
+def test_every_step_of_the_nightly_pile_settles() -> None:
+    result = simulate(
+        pile.scene(),
+        time_step=pile.TIME_STEP,
+        steps=pile.STEPS,
+        method=pile.SWEEPS,
+        observe={"depth": Final(quantity=Penetration())},
+    )
+    assert result.completed, result.failure
+    assert result["depth"] < 1e-3
 
 
 def test_a_heap_of_boxes_by_few_iterations_sinks_in_no_further_than_a_residual_leads() -> None:

@@ -136,7 +136,7 @@ def test_after_a_year_of_seasons_a_tenth_is_told() -> None:
 def test_a_level_that_the_machine_visits_for_ten_nights_is_known_from_the_third_visit_on(draw: str) -> None:
     """Also where a night of a visit strays, where visits were never red, and where one begins in its noise."""
     late = []
-    for series in range(10):
+    for series in range(20):
         told = red(1e-3 * battery.visits(10, 1.08)(battery.generator(draw, series), NIGHTS + 100))
 
         assert battery.starts(told, 1) <= 2

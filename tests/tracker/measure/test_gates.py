@@ -85,13 +85,8 @@ def test_what_is_imported_cannot_end_any_gate(command: tuple[str, ...]) -> None:
     assert "ended with exit code 0 before it was done" in done.stderr
 
 
-@pytest.mark.parametrize(
-    ("act", "where"),
-    [
-        *((act, "an engine") for act in ENDS_THE_PROCESS),
-        *((act, where) for act in ("sys.exit()", "killed") for where in ("a catalogue", "build_info")),
-    ],
-)
+@pytest.mark.parametrize("where", WHERE)
+@pytest.mark.parametrize("act", ENDS_THE_PROCESS)
 def test_whatever_ends_the_process_that_imports_it_is_said_and_is_not_green(act: str, where: str) -> None:
     done = gate(("run",), **WHERE[where](ENDS_THE_PROCESS[act]))
 

@@ -44,15 +44,9 @@ def sends(signal: str, to: str) -> str:
 
 
 @pytest.mark.parametrize(
-    ("signal", "to"),
-    [
-        *(
-            (name, "kill(os.getppid()")
-            for name in ("SIGTERM", "SIGINT", "SIGHUP", "SIGKILL", "SIGPIPE", "SIGUSR1")
-        ),
-        *((name, "killpg(0") for name in ("SIGTERM", "SIGINT")),  # to its group
-    ],
+    "to", ["kill(os.getppid()", "killpg(0"], ids=["to the one that decides", "to its group"]
 )
+@pytest.mark.parametrize("signal", ["SIGTERM", "SIGINT", "SIGHUP", "SIGKILL", "SIGPIPE", "SIGUSR1"])
 def test_a_signal_that_an_engine_sends_is_no_green_unless_all_was_measured(signal: str, to: str) -> None:
     code, said = ended(sends(signal, to) + TOY)
 

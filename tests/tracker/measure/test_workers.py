@@ -80,7 +80,6 @@ def test_who_hangs_dies_or_is_greedy_costs_its_own_piece():
     assert found["hog"] == crew.Lost("crashed", "the piece of work ran out of memory")
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system cannot fork")
 def test_a_copy_that_a_piece_forks_answers_nothing():
     pieces = ["fork a", "b", "fork c", *(f"piece {n}" for n in range(5))]
     found = list(crew.answers(work, pieces, 1, crew.Limits()))

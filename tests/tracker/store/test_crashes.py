@@ -36,7 +36,7 @@ from tests.histories.documents import definition, run, sample
 from tests.places import TOYS
 
 COMMANDS = ("nightly", "publish", "copy", "run", "import", "upgrade", "months")
-ROUNDS = int(os.environ.get("SPOOK_CRASH_ROUNDS", "2"))
+ROUNDS = int(os.environ.get("SPOOK_CRASH_ROUNDS", "3"))
 SHORT = len(COMMANDS) > ROUNDS
 TRIES = 40  # for one kill, of a command that keeps ending before it
 LONG = ("nightly", "run")  # commands that start others: played to their end in the long form only
@@ -239,7 +239,7 @@ def test_whatever_is_killed_the_history_is_whole(url: str, tmp_path: Path) -> No
     filled(url, tmp_path)
     desk = Desk(url, tmp_path)
     before = stored(url)
-    lasts = dict.fromkeys(COMMANDS, 1.0)  # s, as far as is known
+    lasts = dict.fromkeys(COMMANDS, 3.0)  # s, as far as is known
     missed = 0
 
     for number in range(ROUNDS):

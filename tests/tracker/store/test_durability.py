@@ -67,7 +67,8 @@ def test_writers_at_the_same_time_wait_for_each_other(url):
     assert stored_runs(url) == {f"{name}-{number}" for name in ("one", "two") for number in range(10)}
 
 
-def test_nine_writers_that_meet_on_a_new_database_lose_nothing(url):
+@pytest.mark.parametrize("attempt", range(2))
+def test_nine_writers_that_meet_on_a_new_database_lose_nothing(url, attempt):
     """The first makes the tables; the others neither take them for something strange nor collide."""
     writers = [begun(write_once_told, url, name) for name in range(9)]
     for _, pipe in writers:

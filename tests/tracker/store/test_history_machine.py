@@ -159,7 +159,7 @@ class Storage(RuleBasedStateMachine):
 
 
 SETTINGS = settings(
-    max_examples=4, stateful_step_count=6, deadline=None, suppress_health_check=list(HealthCheck)
+    max_examples=6, stateful_step_count=6, deadline=None, suppress_health_check=list(HealthCheck)
 )
 
 
@@ -170,6 +170,6 @@ def test_storage_keeps_what_a_dictionary_keeps_in_files(sqlite_template):
 def test_storage_keeps_what_a_dictionary_keeps_on_a_server_and_between_both(
     sqlite_template, postgresql_server, postgresql_template
 ):
-    few = settings(SETTINGS, max_examples=2)
+    few = settings(SETTINGS, max_examples=3)
     templates = (sqlite_template, postgresql_server, postgresql_template)
     run_state_machine_as_test(lambda: Storage(*templates), settings=few)
