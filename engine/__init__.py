@@ -72,6 +72,7 @@ from spook_tracker.engine.joints import (
 )
 from spook_tracker.engine.meshes import HeightField, TriangleMesh
 from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.misuse import explain_misuse
 from spook_tracker.engine.observe import (
     AngularMomentum,
     AngularVelocity,
@@ -206,3 +207,5 @@ __all__ = [
     "simulate",
     "start",
 ]
+
+explain_misuse(globals()[name] for name in __all__)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 import operator
+from collections.abc import Iterable
 from typing import Any
 
 from spook_tracker.engine.errors import MethodError, SceneError
 
 Vector = tuple[float, float, float]
 Rotation = tuple[float, float, float, float]  # unit quaternion (w, x, y, z), body to world
+MOST_NAMED = 8  # names that a message lists
 
 
 def number(owner: str, field: str, value: object) -> float:
@@ -100,6 +102,26 @@ def name(kind: str, value: object) -> str:
     if not isinstance(value, str) or not value.strip():
         raise SceneError(f"a {kind} needs a name, not {value!r}")
     return value
+
+
+def nearest(value: object, names: Iterable[str]) -> str:
+    """The way out of a name that is not there: those like it, else the first there are."""
+    import difflib  # only where something is wrong
+
+    there = list(names)
+    near = difflib.get_close_matches(value, there, n=3) if isinstance(value, str) else []
+    if near:
+        return f"did you mean {' or '.join(map(repr, near))}?"
+    more = f" and {len(there) - MOST_NAMED} more" if len(there) > MOST_NAMED else ""
+    return f"there {'is' if len(there) == 1 else 'are'} {', '.join(map(repr, there[:MOST_NAMED]))}{more}"
+
+
+def unknown(kind: str, value: object, names: Iterable[str]) -> str:
+    """There is none of that name, and which there are."""
+    there = list(names)
+    return f"there is no {kind} named {value!r}" + (
+        f"; {nearest(value, there)}" if there else ", nor any other"
+    )
 
 
 def step_count(value: Any) -> int:

@@ -77,7 +77,9 @@ def observations(observe: Mapping[str, Observable]) -> list[_core.Observation]:
     found = []
     for name, what in observe.items():
         if type(what) not in _REDUCTIONS:
-            raise MethodError(f"observe {name!r}: {what!r} is not a Trace, Final, Maximum, ... of a quantity")
+            raise MethodError(
+                f"observe {name!r}: give a Trace, Final, Maximum, … of a quantity, not {what!r}"
+            )
         found.append(
             _core.Observation(
                 quantity=places[what.quantity],
@@ -102,7 +104,9 @@ def distinct_quantities(observe: Mapping[str, Observable]) -> list[Any]:
                 f"observe must map names to a Trace, Final, Maximum, ..., and {name!r} is not a name"
             )
         if not isinstance(what, Observable):
-            raise MethodError(f"observe {name!r}: {what!r} is not a Trace, Final, Maximum, ... of a quantity")
+            raise MethodError(
+                f"observe {name!r}: give a Trace, Final, Maximum, … of a quantity, not {what!r}"
+            )
         quantities.setdefault(what.quantity)
     return list(quantities)
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 
 from spook_tracker.engine import _core
-from spook_tracker.engine.bodies import Particle
-from spook_tracker.engine.check import Vector
+from spook_tracker.engine.bodies import Body, Particle
+from spook_tracker.engine.check import Vector, unknown
 from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.errors import MethodError
-from spook_tracker.engine.joints import AxialJoint, Distance
+from spook_tracker.engine.joints import AxialJoint, Constraint, Distance
 from spook_tracker.engine.observe import (
     AngularMomentum,
     AngularVelocity,
@@ -127,15 +127,15 @@ def _of_constraint(
 
 
 def _body(scene: Scene, name: str) -> int:
-    return _index("body", name, (body.name for body in scene.bodies))
+    return _index("body", name, scene.bodies)
 
 
 def _constraint(scene: Scene, name: str) -> int:
-    return _index("constraint", name, (constraint.name for constraint in scene.constraints))
+    return _index("constraint", name, scene.constraints)
 
 
-def _index(kind: str, name: str, names: Iterable[str]) -> int:
-    for index, known in enumerate(names):
-        if known == name:
+def _index(kind: str, name: str, items: Sequence[Body | Constraint]) -> int:
+    for index, known in enumerate(items):
+        if known.name == name:
             return index
-    raise MethodError(f"observe: there is no {kind} named {name!r}")
+    raise MethodError(f"observe: {unknown(kind, name, (item.name for item in items))}")

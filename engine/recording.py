@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from spook_tracker.engine import recorded_joints
 from spook_tracker.engine.bodies import Particle, RigidBody
+from spook_tracker.engine.check import unknown
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.forces import CentralGravity, Spring
 from spook_tracker.engine.joints import AxialJoint, Distance, Hinge
@@ -197,7 +198,7 @@ def _index(scene: Scene, name: str) -> int:
     for index, body in enumerate(scene.bodies):
         if body.name == name:
             return index
-    raise MethodError(f"observe: there is no body named {name!r}")
+    raise MethodError(f"observe: {unknown('body', name, (body.name for body in scene.bodies))}")
 
 
 def _moves(body: Particle | RigidBody) -> bool:

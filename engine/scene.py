@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 from spook_tracker.engine import check
 from spook_tracker.engine.bodies import WORLD, Body, PairFriction, Particle, RigidBody
-from spook_tracker.engine.check import Vector
+from spook_tracker.engine.check import Vector, unknown
 from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.display import display, framed
 from spook_tracker.engine.errors import EngineError, SceneError
@@ -100,7 +100,8 @@ class Scene:
             for name in pair.between:
                 body = known.get(name)
                 if not isinstance(body, RigidBody):
-                    raise SceneError(f"pair_frictions: there is no rigid body named {name!r}")
+                    rigid = (there for there, one in known.items() if isinstance(one, RigidBody))
+                    raise SceneError(f"pair_frictions: {unknown('rigid body', name, rigid)}")
                 if body.material.oriented:
                     raise SceneError(
                         f"pair_frictions: {name!r} has a friction that differs with the direction"
@@ -138,8 +139,12 @@ class Scene:
         for name, _ in relation.terms:
             if not isinstance(joints.get(name), AxialJoint):
                 raise SceneError(
-                    f"relation {relation.name!r}: there is no hinge or prismatic joint named {name!r}, and only those "
-                    "have a coordinate"
+                    f"relation {relation.name!r}: only a hinge or a prismatic joint has a coordinate, and "
+                    + unknown(
+                        "such joint",
+                        name,
+                        (end for end, one in joints.items() if isinstance(one, AxialJoint)),
+                    )
                 )
 
     @staticmethod
@@ -147,11 +152,12 @@ class Scene:
         owner = f"wire {wire.name!r}"
         for name, _ in wire.wound:
             if not isinstance(joints.get(name), Hinge):
-                raise SceneError(f"{owner}: there is no hinge named {name!r} to wind it")
+                hinges = (there for there, joint in joints.items() if isinstance(joint, Hinge))
+                raise SceneError(f"{owner} winds on hinges, and {unknown('hinge', name, hinges)}")
         for end, point in wire.through:
             body = known.get(end)
             if body is None and end != WORLD:
-                raise SceneError(f"{owner}: there is no body named {end!r}")
+                raise SceneError(f"{owner}: {unknown('body', end, known)}")
             if isinstance(body, Particle) and point != body.position:
                 raise SceneError(
                     f"{owner}: particle {end!r} has only its centre, {body.position}; run through that"
@@ -166,7 +172,7 @@ class Scene:
         owner = f"tyre {tyre.name!r}"
         for end in tyre.between:
             if end not in known and end != WORLD:
-                raise SceneError(f"{owner}: there is no body named {end!r}")
+                raise SceneError(f"{owner}: {unknown('body', end, known)}")
             if isinstance(known.get(end), Particle):
                 raise SceneError(f"{owner}: {end!r} is a particle; wheels and roads need rigid bodies")
         wheel = known[tyre.between[1]]
@@ -185,7 +191,7 @@ class Scene:
                 and end not in known
                 and not (end == WORLD and isinstance(constraint, Joint))
             ):
-                raise SceneError(f"{owner}: there is no body named {end!r}")
+                raise SceneError(f"{owner}: {unknown('body', end, known)}")
         tied = [known.get(end) if isinstance(end, str) else None for end in constraint.between]
         if not any(isinstance(body, Particle) or (body and body.motion == "dynamic") for body in tied):
             raise SceneError(f"{owner}: neither end can move, so it constrains nothing")
@@ -211,7 +217,7 @@ class Scene:
         )
         for end in named:
             if isinstance(end, str) and end not in known:
-                raise SceneError(f"{owner}: there is no body named {end!r}")
+                raise SceneError(f"{owner}: {unknown('body', end, known)}")
         if isinstance(force, Load) and any(force.torque) and isinstance(known[force.body], Particle):
             raise SceneError(f"{owner}: {force.body!r} is a particle and cannot take a torque")
         if isinstance(force, Spring):
@@ -237,7 +243,7 @@ class Scene:
             raise SceneError(f"no_contact: {pair!r} is not a pair of names")
         for name in pair:
             if name not in known:
-                raise SceneError(f"no_contact: there is no body named {name!r}")
+                raise SceneError(f"no_contact: {unknown('body', name, known)}")
         if pair[0] == pair[1]:
             raise SceneError(f"no_contact: {pair[0]!r} cannot touch itself; name two bodies")
         return (pair[0], pair[1])
@@ -262,14 +268,14 @@ class Scene:
         for body in self.bodies if isinstance(name, str) else ():
             if body.name == name:
                 return body
-        raise SceneError(f"there is no body named {name!r}")
+        raise SceneError(unknown("body", name, (body.name for body in self.bodies)))
 
     def constraint(self, name: str) -> Constraint:
         """The constraint of that name."""
         for constraint in self.constraints if isinstance(name, str) else ():
             if constraint.name == name:
                 return constraint
-        raise SceneError(f"there is no constraint named {name!r}")
+        raise SceneError(unknown("constraint", name, (constraint.name for constraint in self.constraints)))
 
     def anchor(self, constraint: Distance | Spring, end: int) -> Vector:
         """World position [m] at the start of one end (0 or 1) of a distance constraint or a spring."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
 from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.misuse import explain_misuse
 from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.result import Result
 from spook_tracker.engine.scene import Scene
@@ -419,3 +420,6 @@ class ScalarTest:
         order = {"gate": 0, "companion": 1, "reported": 2, "explaining": 3}
         pairs = [(measurement, metric) for measurement in self.measurements for metric in measurement.metrics]
         return tuple(sorted(pairs, key=lambda pair: order[pair[1].role]))
+
+
+explain_misuse(one for one in tuple(globals().values()) if getattr(one, "__module__", "") == __name__)

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
+import inspect
 import math
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -16,6 +19,7 @@ from spook_tracker.engine import (
     Capsule,
     CentralGravity,
     Compound,
+    ContactForce,
     ConvexHull,
     Distance,
     EngineError,
@@ -48,6 +52,8 @@ from spook_tracker.engine import (
     compile,
     simulate,
 )
+from spook_tracker.engine.misuse import explain_misuse
+from spook_tracker.scalar_tests.case import Metric
 
 ORIGIN = (0.0, 0.0, 0.0)
 A = Particle(name="a", mass=1.0, position=(1.0, 0.0, 0.0))
@@ -238,6 +244,70 @@ def test_a_senseless_method_is_refused_by_name(options: dict[str, Any]) -> None:
 def test_observing_what_is_not_there_is_refused_by_name(scene: Scene, quantity: Any) -> None:
     with pytest.raises(MethodError, match=r"ghost|JointCoordinate"):
         compile(scene, time_step=0.01, observe={"x": Final(quantity=quantity)})
+
+
+@pytest.mark.parametrize(
+    ("quantity", "way_out"),
+    [
+        (Position("ston"), "no body named 'ston'; did you mean 'stone'?"),
+        (Position("ghost"), "no body named 'ghost'; there are 'stone', 'wall'"),
+        (ContactForce("stone", "ghost"), "no body named 'ghost'; there are 'stone', 'wall'"),
+        (Violation("ghost"), "no constraint named 'ghost', nor any other"),
+    ],
+)
+def test_observing_what_is_not_there_names_what_is(quantity: Any, way_out: str) -> None:
+    with pytest.raises(MethodError, match=f"{re.escape(way_out)}$"):
+        compile(stones(), time_step=0.01, observe={"x": Final(quantity=quantity)})
+
+
+def test_of_many_bodies_the_first_are_named() -> None:
+    heap = tuple(particle(name=f"ball {k}") for k in range(1000))
+    with pytest.raises(SceneError, match=r"there are 'ball 0', .* 'ball 7' and 992 more$"):
+        Scene(bodies=heap).body("ghost")
+
+
+MISCALLED: tuple[tuple[Callable[..., object], tuple[object, ...], dict[str, object], str], ...] = (
+    (Trace, (Position("stone"),), {}, "Trace takes its values by name: write Trace(quantity=…)"),
+    (
+        RigidBody,
+        ("stone", 1.0),
+        {},
+        "RigidBody takes its values by name: write RigidBody(name=…, position=…)",
+    ),
+    (Scene, ((A, B),), {}, "Scene takes its values by name: write Scene(bodies=…)"),
+    (Box, (0.2, 0.2, 0.2), {}, "Box takes them as one value, size: write Box((0.2, 0.2, 0.2))"),
+    (Sphere, (0.2, 0.2, 0.2), {}, "Sphere takes radius, not 3 values"),
+    (Sphere, (), {}, "Sphere needs radius: write Sphere(radius=…)"),
+    (Sphere, (0.2,), {"radius": 0.2}, "Sphere is given 'radius' twice, by its place and by its name"),
+    (Capsule, (0.2,), {}, "Capsule needs length: write Capsule(radius=…, length=…)"),
+    (Material, (), {"frictoin": 0.5}, "Material has no 'frictoin'; did you mean 'friction'"),
+    (Box, (), {"edges": (1.0, 1.0, 1.0)}, "Box has no 'edges'; there is 'size'"),
+    (Metric, (), {"limits": 1.0}, "Metric has no 'limits'; did you mean 'limit'"),
+)
+
+
+@pytest.mark.parametrize(("make", "given", "named", "sentence"), MISCALLED)
+def test_a_class_called_wrongly_says_how_it_is_called(
+    make: Callable[..., object], given: tuple[object, ...], named: dict[str, object], sentence: str
+) -> None:
+    with pytest.raises(TypeError) as caught:
+        make(*given, **named)
+    assert str(caught.value).startswith(sentence)
+
+
+def test_a_class_still_shows_its_fields_and_what_fails_within_it() -> None:
+    assert str(inspect.signature(Box)) == "(size: 'Vector') -> None"
+
+    @dataclasses.dataclass
+    class Broken:
+        width: float
+
+        def __post_init__(self) -> None:
+            len(self.width)  # type: ignore[arg-type]
+
+    explain_misuse([Broken])
+    with pytest.raises(TypeError, match="has no len"):
+        Broken(1.0)
 
 
 def test_observe_must_be_a_mapping_and_quantities_numbers() -> None:
