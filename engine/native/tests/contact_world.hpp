@@ -74,7 +74,7 @@ public:
                 free_velocity[k][i] += (1.0 - lead[k]) * h * gravity[i];
         if (touching) {
             momenta(free_velocity);
-            stage.solve(system, velocity);
+            stage.solve(system, velocity, {});
         }
         for (std::size_t k = 0, u = 0; k < bodies.size(); ++k) {
             ContactBody& b = bodies[k];

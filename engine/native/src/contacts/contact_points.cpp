@@ -70,4 +70,15 @@ void ContactPoints::remember(StepContact& point, const CachedContact& before, bo
     if (resists_turning) std::copy_n(before.turning, 3, own_extras(point).turning);
 }
 
+void ContactPoints::forget(const ContactBodies& bodies, const std::vector<char>& marked) {
+    if (marked.empty()) return;
+    for (StepContact& point : all) {
+        const auto [first, second] = bodies.solver_pair(point.contact);
+        if (!marked[std::max(first, second)]) continue;
+        point.solved = true;
+        point.normal = point.tangents[0] = point.tangents[1] = 0.0;
+        if (point.extras >= 0) std::fill_n(extras_[point.extras].turning, 3, 0.0);
+    }
+}
+
 }  // namespace spook

@@ -29,6 +29,9 @@ struct ContactPoints {
     /// What a point did in the step before, as where the solve starts.
     void remember(StepContact& point, const CachedContact& before, bool resists_turning);
 
+    /// The impulses of points of the bodies that are marked, by their index in MixedSystem, if any are: none.
+    void forget(const ContactBodies& bodies, const std::vector<char>& marked);
+
     /// Tells what they connect.
     void tie(const ContactBodies& bodies, IslandFinder& finder) const {
         for (const StepContact& point : all) finder.tie(bodies.solver_pair(point.contact));

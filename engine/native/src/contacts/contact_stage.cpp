@@ -152,8 +152,10 @@ bool ContactStage::by_rows(std::size_t joints) const noexcept {
     return state_.by_rows && joints + points_.all.size() <= few_jointed;
 }
 
-ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity) {
+ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vector<Vec6>& velocity,
+                                           const std::vector<char>& anew) {
     const std::size_t joints = system.rows.size();
+    points_.forget(model_->bodies, anew);
     motion_.velocity = velocity;
     ran_away_ = false;
     if (model_->options.solver == SolverKind::iterative && !model_->surfaces.resists_turning) {

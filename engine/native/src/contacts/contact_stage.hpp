@@ -97,7 +97,8 @@ public:
     };
     /// The resting stage. `system` holds mass, momentum M v + h f (less the forces before events) and rows of joints, `velocity`
     /// is v after the impact. Appends rows of contacts; fills velocity and multipliers. Unfinished where an impact comes first.
-    SolveEnd solve(MixedSystem& system, const std::vector<Vec6>& velocity);
+    /// Contacts of bodies `anew`, by their index in MixedSystem, start from nothing, whatever they have done.
+    SolveEnd solve(MixedSystem& system, const std::vector<Vec6>& velocity, const std::vector<char>& anew);
 
     /// Velocity to add to v₊ when positions advance, per moving body; empty when there is none. It leads an event's
     /// bodies to where they are at the step's end.

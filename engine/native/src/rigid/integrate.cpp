@@ -22,7 +22,8 @@ void RigidSystem::integrate() {
         deliver();
         return find_whirling({&body, 1});
     }
-    find_whirling(model_.constrained);
+    // Beside contacts an impact, too, turns a body by a radian, for a step or two: then it is tension that joints' work shows.
+    if (!mixed_.touching() || scratch_.led_by_joints) find_whirling(model_.constrained);
     if (!bilateral_.take_moved())
         for (int i : model_.constrained)
             if (!live_.asleep(i)) spook::integrate(model_.constants[i], model_.h, live_.bodies[i]);

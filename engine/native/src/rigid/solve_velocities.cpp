@@ -12,9 +12,13 @@
 #include <cmath>
 
 #include "contacts/friction_pgs.hpp"
+#include "contacts/friction_point.hpp"
 #include "rigid/mixed_rows.hpp"
+#include "rigid/tolerances.hpp"
 
 namespace spook {
+
+using namespace tolerances::solve_velocities;
 
 void MixedRows::take_stages(RigidModel& model) {
     StageList& stages = model.stages;
@@ -112,6 +116,9 @@ void MixedRows::solve(bool touching) {
     ContactStage::SolveEnd end;
     scratch_.other_ends.clear();
     scratch_.impulses.assign(blocks.size(), {});
+    scratch_.left_open.assign(blocks.size(), 0);
+    scratch_.led_by_joints = false;
+    scratch_.anew.clear();
     int corrected = 0;
     const auto to_correct = [&] { return model_.curved && corrected++ < model_.method.corrections; };
     do {
@@ -121,13 +128,12 @@ void MixedRows::solve(bool touching) {
         if (touching) clock_.mark(Stage::impact);
         fill_momenta(true);
         clock_.mark(Stage::assemble_rows);
-        if (touching) end = contacts_->solve(system, scratch_.velocities);
+        if (touching) end = contacts_->solve(system, scratch_.velocities, scratch_.anew);
         else end.finite = solve_joints();
         clock_.mark(solver);
     } while (end.finite && (impact_needed() || ((!touching || end.ends_passed) && find_other_ends()) ||
-                            to_correct()));  // the solve may find some that is to come first
-    if (touching) judge_contacts();
-    else if (model_.solver == RigidSolver::iterative) judge_pgs();
+                            to_correct() || leave_open()));  // the solve may find some that is to come first
+    touching ? judge_contacts() : judge_pgs();
     if (!end.finite) {
         live_.not_solved = model_.constrained.front();
         return;
@@ -208,6 +214,60 @@ void MixedRows::take_velocities(bool angular_too, const std::function<bool(int)>
     }
 }
 
+/// The work, J, of a joint that is led back to where it holds.
+double MixedRows::leading_work(std::size_t k) const {
+    if (!joints_.always_holds(joints_.blocks()[k])) return 0.0;
+    const RowBlock& block = system.rows[k];
+    double work = 0.0;
+    for (int i = 0; i < block.size; ++i)
+        work += block.multiplier[i] * (block.right[i] - block.softness[i] * block.multiplier[i]);
+    return work;
+}
+
+/// Whether that of some island's joints is more than all its bodies move with, and far more than it would take without the
+/// others: these are jammed, or a light one would have to go far round. What has opened stays so until the island has moved on,
+/// and the impulses met so far, which jams multiply, are forgotten. Asked of the first solve that settles.
+bool MixedRows::leave_open() {
+    std::vector<char>& open = scratch_.left_open;
+    if (std::any_of(open.begin(), open.end(), [](char each) { return each != 0; }))
+        return scratch_.led_by_joints = false;
+    double work = 0.0, energy = 0.0;
+    for (std::size_t k = 0; k < open.size(); ++k) work += std::max(0.0, leading_work(k));
+    if (work > 0.0)
+        for (std::size_t b = 0; b < system.mass.size(); ++b)
+            for (int a = 0; a < 3; ++a)
+                energy += 0.5 * system.momentum[b][a] * system.momentum[b][a] / system.mass[b][0];
+    scratch_.led_by_joints = work > led_share * energy;
+    if (!(work > energy)) return false;
+    const Islands& islands = scratch_.finder.find(system);
+    std::vector<double>& spare = scratch_.dissipated;
+    spare.assign(islands.count, 0.0);
+    for (std::size_t b = 0; b < system.mass.size(); ++b) {
+        if (islands.of_body[b] < 0) continue;
+        Vec6 free = system.momentum[b];
+        solve_six(factor_six(system.mass[b]), free);
+        spare[islands.of_body[b]] += 0.5 * dot(free, system.momentum[b]);
+    }
+    for (std::size_t k = 0; k < open.size(); ++k) {
+        const RowBlock& block = system.rows[k];
+        double alone = 0.0;
+        for (int i = 0; i < block.size && joints_.always_holds(joints_.blocks()[k]); ++i)
+            if (const double own = own_inertia(system, block, i); own > 0.0)
+                alone += 0.5 * block.right[i] * block.right[i] / own;
+        spare[islands.of(block)] += most_of_alone * alone - leading_work(k);
+    }
+    bool any = false;
+    for (std::size_t k = 0; k < open.size(); ++k) {
+        if (!(spare[islands.of(system.rows[k])] < 0.0)) continue;
+        open[k] = any = true;
+        system.rows[k].multiplier = {}, system.rows[k].state = {};
+    }
+    scratch_.anew.resize(system.mass.size());
+    for (std::size_t b = 0; b < system.mass.size(); ++b)
+        scratch_.anew[b] = islands.of_body[b] >= 0 && spare[islands.of_body[b]] < 0.0;
+    return any;
+}
+
 /// The row of the other end of a block's stop: the coordinate may get there within the step, no further.
 RowBlock MixedRows::other_end(const RowBlock& block) {
     const int i = block.stop.row;
@@ -282,6 +342,7 @@ double MixedRows::pgs_tolerance() const {
 
 /// Holds PGS over joints alone to what contacts are held to.
 void MixedRows::judge_pgs() {
+    if (model_.solver != RigidSolver::iterative) return;
     const RowsResidual worst = rows_residual(system, {}, model_.method.friction);
     residual = std::max(residual, worst.residual);
     if (!(worst.residual > pgs_tolerance())) return;
@@ -336,6 +397,7 @@ void MixedRows::fill_rows(bool solved) {
         BlockRight numbers;
         joints_.assemble(static_cast<int>(k), live_.bodies, rows.first_jacobian[0].data(),
                          rows.second_jacobian[0].data(), numbers);
+        if (scratch_.left_open[k] && joints_.always_holds(blocks[k])) numbers.right = {};
         if (!joints_.others(static_cast<int>(k)).empty())
             fill_further(static_cast<int>(k), rows, numbers, further_[k]);
         for (int body : {blocks[k].first, blocks[k].second}) {
@@ -348,7 +410,8 @@ void MixedRows::fill_rows(bool solved) {
             if (const int i = numbers.stop.row; i >= 0) numbers.stop.given += dot(jacobian[i], given);
         }
         for (int i = 0; i < rows.size; ++i)
-            numbers.right[i] -= curvature_.taken(at + static_cast<std::size_t>(i));
+            numbers.right[i] -=
+                scratch_.left_open[k] ? 0.0 : curvature_.taken(at + static_cast<std::size_t>(i));
         if (const int i = rows.rotor; i >= 0) numbers.right[i] -= rows.softness[i] * scratch_.impulses[k][i];
         rows.right = numbers.right;
         rows.lower = numbers.lower;

@@ -132,6 +132,14 @@ namespace tolerances::sleep {
 inline constexpr double far = 1e3;  // m: as far out may a sleeper lie on a plane that begins to turn
 }
 
+// solve_velocities.cpp
+namespace tolerances::solve_velocities {
+inline constexpr double led_share =
+    0.1;  // of the kinetic energy: a step in which joints do more work leads bodies
+inline constexpr double most_of_alone =
+    100.0;  // times the work of leading each row back by itself: what a chain of bodies may take
+}  // namespace tolerances::solve_velocities
+
 // step.cpp
 namespace tolerances::step {
 inline constexpr std::size_t looking_from = 16;  // bodies: steps of fewer are too short for a look
