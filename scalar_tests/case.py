@@ -42,6 +42,11 @@ LimitKind = Literal[
 ]
 
 
+ReferenceKind = Literal[
+    "physical",
+    "method",  # what this method gives
+    "of another method",  # asked of an engine that owes it nothing: not told, though it stays in the definition
+]
 Part = Literal["ladder", "stability"]  # what every scene has, or the reason why not
 Reason = Literal[  # the world's own, and no others
     "exact at every step",  # an error that is rounding whatever the step: nothing to buy with run time
@@ -122,6 +127,7 @@ class Metric:
     set_point_source: str = ""
     set_point_kind: LimitKind = "method"
     reference: float | None = None  # the right value, where one exists
+    reference_kind: ReferenceKind = "physical"
     tolerance: float = 0.0
     relative_tolerance: float = 1e-9
     formerly: tuple[str, ...] = ()  # its earlier names, the first one first: its history goes on

@@ -221,6 +221,7 @@ POSITION_ERROR = Metric(
     set_point=(EXPECTED - 1e-9, EXPECTED + 1e-9),
     set_point_source="½ g t h: the step takes the velocity at the end of the step",
     reference=EXPECTED,
+    reference_kind="method",
     tolerance=1e-11,
 )
 VELOCITY_ERROR = Metric(

@@ -163,19 +163,35 @@ def _earlier(history: StoredHistory, before: str, after: str) -> RunInfo:
     """The run that `before` stands for beside `after`."""
     if before == FORK_POINT:
         return fork_point(history, after)
-    whose, _, word = after.rpartition("@")
-    if word == "latest" and before == (f"{whose}@previous" if whose else "previous"):
+    whose, at, word = after.rpartition("@")
+    if word == "latest" and before == f"{whose}{at}previous":
         return _previous(history, after) or history.resolve(before)
+    if word == "latest" and before == f"{whose}{at}last-green":
+        return _previous(history, after, green=True) or _no_green(history.resolve(before))
     return history.resolve(before)
 
 
-def _previous(history: StoredHistory, name: str) -> RunInfo | None:
-    """The run before another as that is judged: on its branch, and of its version only if it measured the same there."""
+def _no_green(only: RunInfo) -> RunInfo:
+    """UnknownName: a run is no news against itself."""
+    from spook_tracker.tracker.document.errors import UnknownName
+
+    raise UnknownName(
+        f"no version before the latest has kept every limit, {only.engine.version} itself is the first; name a version"
+    )
+
+
+def _previous(history: StoredHistory, name: str, green: bool = False) -> RunInfo | None:
+    """The run before another as that is judged: on its branch, and of its version only if it measured the same there.
+
+    With `green` the newest of them that kept every limit.
+    """
     from spook_tracker.tracker.judge.lane import line_of, of_version
 
     *line, run = line_of(history.runs(), history.resolve(name))
     version = {other.id for other in of_version(line, run)}
     for other in reversed(line):
+        if green and not other.green:
+            continue
         if other.id not in version:
             return other
         if other.machine.fingerprint == run.machine.fingerprint and (
@@ -281,18 +297,15 @@ def trend(
 
     They are of `engine`, or of the first one that answers the test.
     """
-    import difflib
-
     from spook_tracker.tracker.document.errors import UnknownName
     from spook_tracker.tracker.judge.lane import histories, lines
     from spook_tracker.tracker.judge.series_history import judge_all
+    from spook_tracker.tracker.store.versions import unknown_test
 
     stem = test.removesuffix(":run-time")
     keys = [key for key in history.series_keys() if key == test or key.startswith(f"{stem}/")]
     if not keys:
-        near = difflib.get_close_matches(test, {key.partition("/")[0] for key in history.series_keys()}, n=3)
-        hint = f"did you mean {' or '.join(near)}?" if near else "`tracker db stats` shows what is recorded"
-        raise UnknownName(f"nothing is recorded of a test {test!r}; {hint}")
+        raise unknown_test(history.series_keys(), test)
     if metric is not None and not metric.startswith("work:"):
         stems = (metric, metric.removesuffix(":run-time"))
         keys = [key for key in keys if key.split("/")[2:3] and key.split("/")[2] in stems] or keys

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
+from spook_tracker.engine.check import nearest
 from spook_tracker.engine.errors import EngineError
 from spook_tracker.engine.result import Result, columns_of
 from spook_tracker.engine.scene import Scene
 from spook_tracker.tracker.document.errors import UnknownName
 from spook_tracker.tracker.store.history import History, SeriesHistory
+from spook_tracker.tracker.store.versions import unknown_test
 from spook_tracker.tracker.website.charts import Chart, Line
 from spook_tracker.tracker.website.diagrams import ladder_charts, trend_chart
 from spook_tracker.tracker.website.nights import Chapter, TestHistory, Trend, book
@@ -76,10 +78,10 @@ class _OfTest(History):
 
 def trend_figure(history: History, test: str, metric: str = "") -> Figure:
     """A test's value over versions, as on its page: of its first gate, or of `metric`. UnknownName if there is none."""
-    chapter, found = _in(book(_OfTest(history, test)).engines, test)
+    chapter, found = _in(history, book(_OfTest(history, test)).engines, test)
     named: Mapping[str, Trend] = {t.definition.metric: t for t in reversed(found.trends)}
     if metric and metric not in named:
-        raise UnknownName(f"{test} has no metric {metric!r}; it has {', '.join(sorted(named))}")
+        raise UnknownName(f"{test} has no metric {metric!r}; {nearest(metric, sorted(named))}")
     gates = found.gates() or found.trends
     return plotly_figure(trend_chart(named[metric] if metric else gates[0], chapter.nights, each="version"))
 
@@ -87,7 +89,7 @@ def trend_figure(history: History, test: str, metric: str = "") -> Figure:
 def ladder_figure(history: History, test: str) -> Figure:
     """A test's error against run time, all configurations and engines, as on its page. UnknownName without a ladder."""
     whole = book(_OfTest(history, test))
-    chapter, found = _in(whole.engines, test)
+    chapter, found = _in(history, whole.engines, test)
     peers = whole.peers(test) if chapter is whole else ()
     charts = ladder_charts(found, peers=peers, earlier=chapter.earlier)
     if not charts:
@@ -97,10 +99,10 @@ def ladder_figure(history: History, test: str) -> Figure:
     return plotly_figure(charts[0])
 
 
-def _in(engines: Iterable[Chapter], test: str) -> tuple[Chapter, TestHistory]:
+def _in(history: History, engines: Iterable[Chapter], test: str) -> tuple[Chapter, TestHistory]:
     """The first engine that has answered the test."""
     for chapter in engines:
         for found in chapter.tests:
             if found.name == test and found.trends:
                 return chapter, found
-    raise UnknownName(f"nothing is recorded of a test {test!r}; `tracker db stats` shows what is recorded")
+    raise unknown_test(history.series_keys(), test)

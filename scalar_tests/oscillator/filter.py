@@ -123,6 +123,7 @@ def _left(period: int) -> Metric:
         set_point=(exact * (1.0 - 1e-9), exact * (1.0 + 1e-9)),
         set_point_source="√α¹⁰",
         reference=exact,
+        reference_kind="method",
     )
 
 

@@ -51,31 +51,6 @@ class EngineWorker {
   }
 }
 
-// Where the browser draws nothing in three dimensions: the curves and numbers say all but that.
-class NoView {
-  constructor(host, movie) {
-    this.movie = movie;
-    this.shown = {};
-    host.classList.add("none");
-    host.textContent = "This browser has no WebGL, so the scene is not drawn. The curves and numbers are complete.";
-  }
-
-  load(movie) { this.movie = movie; }
-
-  show() {}
-
-  say() {}
-
-  paint() {}
-
-  resize() {}
-}
-
-// The scene, where it can be drawn.
-function sceneOrWords(host, movie) {
-  try { return new SceneView(host, movie); } catch (error) { return new NoView(host, movie); }
-}
-
 class LivePage {
   constructor(box) {
     Object.assign(this, { box, player: null, costs: [], id: 0 });

@@ -63,12 +63,8 @@ async function startReplay(box) {
     await threeFrom(box.dataset.three);
     for (const source of sources) { source.address = box.dataset.root + source.address; }
     const tonight = await movieFrom(sources[0]);
-    let player;
-    try { player = new Player(box, tonight, "t"); } catch (error) {
-      say(`The replay needs WebGL, which this browser does not offer (${error.message}). The picture shows the start.`);
-      return;
-    }
-    box.classList.add("moving");
+    const player = new Player(box, tonight, "t", sceneOrWords), { drawn } = player.view;
+    box.classList.toggle("moving", drawn);  // without, the still picture stays
     box.player = player;
     if (sources.length < 2) { return; }
     const other = player.select([["", tonight.ghost ? tonight.ghost.name : "nothing"], ...sources.slice(1).map((s) => [s.key, s.label])], "", (key) => {
@@ -82,7 +78,7 @@ async function startReplay(box) {
     beside.hidden = true;
     async function against(key) {
       const source = sources.find((s) => s.key === key);
-      beside.hidden = !source;
+      beside.hidden = !source || !drawn;
       player.beside(null);
       asked = key;
       say("");
@@ -105,7 +101,7 @@ async function startReplay(box) {
       first.dataset.sample = String(at);
       first.dataset.seen = String(firstDifference(tonight, night, SEEN * halfPicture(tonight)));
       player.use({ ...tonight, ghost: { name: source.label, position: night.position, orientation: night.orientation, energy: night.energy } }, true);
-      if (beside.querySelector("input").checked) { player.beside(night, label); }
+      if (drawn && beside.querySelector("input").checked) { player.beside(night, label); }
     }
     // Whatever keeps a night from being shown, tonight stays.
     async function laid(key) {

@@ -46,6 +46,7 @@ class SceneView {
     this.watch = new ResizeObserver(() => this.resize());
     this.watch.observe(host);
     this.shown = { ghost: true, forces: true, cones: true };
+    this.drawn = true;
     this.sample = 0;
     this.load(movie);
   }
@@ -441,4 +442,30 @@ class SceneView {
       this.mark();
     });
   }
+}
+
+// Where the browser draws nothing in three dimensions: the curves and numbers say all but that.
+class NoView {
+  constructor(host, movie) {
+    this.movie = movie;
+    this.shown = {};
+    this.drawn = false;
+    host.classList.add("none");
+    host.textContent = "This browser has no WebGL, so the scene is not drawn. The curves and numbers are complete.";
+  }
+
+  load(movie) { this.movie = movie; }
+
+  show() {}
+
+  say() {}
+
+  paint() {}
+
+  resize() {}
+}
+
+// The scene, where it can be drawn.
+function sceneOrWords(host, movie) {
+  try { return new SceneView(host, movie); } catch (error) { return new NoView(host, movie); }
 }

@@ -178,10 +178,14 @@ def test_a_history_is_drawn_with_the_traces_of_the_website(database: str, tmp_pa
 
 def test_of_a_history_one_test_is_read(database: str) -> None:
     with tracker.History.open(database) as history:
-        with pytest.raises(UnknownName, match="falling_object has no metric 'hight'; it has "):
+        with pytest.raises(UnknownName, match="falling_object has no metric 'hight'; there are "):
             history.plot("falling_object", "hight")
-        with pytest.raises(UnknownName, match="nothing is recorded of a test 'door'"):
+        with pytest.raises(UnknownName, match=r"no metric 'positon_error'; did you mean 'position_error'"):
+            history.plot("falling_object", "positon_error")
+        with pytest.raises(UnknownName, match="nothing is recorded of a test 'door'; `tracker db stats`"):
             history.plot("door")
+        with pytest.raises(UnknownName, match="'near_mis'; did you mean near_miss"):
+            history.plot("near_mis")
         with pytest.raises(UnknownName, match="tracker run near_miss --sweep"):
             history.plot("near_miss", ladder=True)
         assert len(history.to_dataframe().query("test == 'falling_object'")) > 0

@@ -156,7 +156,7 @@ def test_old_commits_join_the_history_once(
 
     assert first.exit_code == 0
     assert next(x for x in first.output.splitlines() if "recorded as run" in x).startswith("[1/3]")
-    assert f"{made[0][:12]} answers its own questions" in first.output
+    assert f"{made[0][:12]} measured with its own questions" in first.output
     assert "does not build" in first.output
     assert second.output.count("recorded already") == 2
 

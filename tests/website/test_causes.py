@@ -12,6 +12,9 @@ import pytest
 import spook_tracker.tracker.measure.trajectory as motion
 from spook_tracker.engine import simulate
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.tracker.document.wording import slug
+from spook_tracker.tracker.judge.standing import worst
+from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.causes import causes_of, told
 from spook_tracker.tracker.website.motions import SEEN, apart
 from spook_tracker.tracker.website.nights import book
@@ -25,7 +28,7 @@ SUBJECT, AUTHOR = "Fold <b>two</b> rods into one & save a step", "Dee O'Example"
 BROKEN, TONIGHT = 9, 9
 
 
-def nights(count=TONIGHT + 1, broken=BROKEN, motions=None):
+def nights(count=TONIGHT + 1, broken=BROKEN, motions=None, watched=-1):
     """Friction, a ladder of the chain and a companion of the door break with one commit; a beam drifts for good."""
     found = []
     for n in range(count):
@@ -40,6 +43,14 @@ def nights(count=TONIGHT + 1, broken=BROKEN, motions=None):
                 if s.series.startswith("beam/plain/deviation") else s
                 for s in night.samples
             ]  # fmt: skip
+            night = msgspec.structs.replace(night, samples=tuple(samples))
+        if n == watched:  # worse, and inside its limit
+            samples = [
+                msgspec.structs.replace(s, value=2e-3)
+                if s.series.startswith("door/half-step/energy_error")
+                else s
+                for s in night.samples
+            ]
             night = msgspec.structs.replace(night, samples=tuple(samples))
         if motions is not None:
             night = msgspec.structs.replace(night, trajectories=(motions[n >= broken],))
@@ -118,6 +129,38 @@ def test_every_series_of_a_cause_has_a_line_of_its_own_words(site):
         rows = re.findall(r'<th scope="row">(.*?)</th>', group, re.DOTALL)
         assert len(rows) == len(set(rows)) == len(cause.hits)
     assert "h = 0.1" in groups[0]
+
+
+def test_a_version_stands_for_the_worst_of_its_night(tmp_path):
+    """As each series is judged, whatever its limit: read here series by series, on the page from the red stretches."""
+    publish(nights(watched=6), tmp_path)
+    found = book(nights(watched=6))
+    told: dict[int, list[Class]] = {}
+    for test in found.tests:
+        for trend in test.trends:
+            for place, night in enumerate(trend.nights):
+                told.setdefault(night, []).append(trend.state_at(place))
+    page = (tmp_path / "versions.html").read_text()
+
+    assert {"fail", "watch", "pass"} <= {worst(states) for states in told.values()}
+    for night in found.nights:
+        (row,) = re.findall(rf'<tr id="run-{slug(night.id)}">.*?</tr>', page, re.DOTALL)
+        assert f"is-{worst(told[night.index])}" in row, night.label
+
+
+def test_a_page_shows_what_is_wrong_once_and_over_its_whole_width(driver, site):
+    opened(driver, site, "tests/friction.html", width=1400)
+    cards = [
+        card.text.split("FAIL")[0] + card.find_element("css selector", "p").text
+        for card in driver.find_elements("css selector", ".gate")
+    ]
+    right, edges = driver.execute_script(
+        "const box = document.querySelector('.gates.fill'), end = (e) => e.getBoundingClientRect().right;"
+        " return [end(box), [...box.children].map(end)]"
+    )
+
+    assert cards and len(cards) == len(set(cards))
+    assert max(edges) == pytest.approx(right, abs=1.0)
 
 
 def test_causes_say_what_became_of_them(site):

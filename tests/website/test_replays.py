@@ -124,6 +124,35 @@ def test_a_motion_of_tonight_that_cannot_be_read_says_why_and_not_that_webgl_lac
     driver.get_log("browser")  # says what is missing
 
 
+def test_without_webgl_the_picture_stays_with_a_sentence_and_the_curves(driver, tmp_path):
+    """Neither an empty box with a dead button, nor a second night beside the first that nothing can draw."""
+    publish(nights(1.0, 9.0), tmp_path / "public")
+    source = "HTMLCanvasElement.prototype.getContext = () => null;"
+    planted = driver.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": source})
+    try:
+        look(driver)
+        driver.get((tmp_path / "public" / "tests" / "friction.html").as_uri() + "#beside=1")
+        driver.execute_script("document.getElementById('replay').scrollIntoView()")
+        wait_for(driver, "document.querySelectorAll('#replay label select').length > 1")
+        driver.execute_script(
+            "const s = document.querySelector('#replay label select'); s.selectedIndex = 1; s.dispatchEvent(new Event('change'))"
+        )
+        wait_for(driver, "document.querySelectorAll('#replay .curve path.line').length > 1")
+        driver.execute_script("document.getElementById('replay').player.seek(5)")
+        stage, picture, clock, note = driver.execute_script(
+            "const box = document.getElementById('replay'); return [box.querySelector('.stage').textContent,"
+            " box.querySelector('svg.scenery').checkVisibility(), box.querySelector('.clock').textContent,"
+            " box.querySelector('.replay-note').textContent]"
+        )
+    finally:
+        driver.execute_cdp_cmd("Page.removeScriptToEvaluateOnNewDocument", planted)
+        driver.get_log("browser")
+
+    assert stage.startswith("This browser has no WebGL, so the scene is not drawn")
+    assert picture and not note
+    assert float(clock.split()[0]) > 0.0
+
+
 def test_an_engine_whose_module_cannot_be_read_answers_that_it_cannot_start(driver):
     static = resource("site") / "static"
     worker = "".join((static / name).read_text("utf-8") for name in ("packed.js", "live-engine.js"))

@@ -111,7 +111,8 @@ def compare(
     V is an engine version, a git tag, the start of a commit hash, a run id, latest, previous or last-green; or V1 and
     V2 are two engines by name, which are ranked: at equal error, which is ahead where and by what factor.
     A version is all runs of its commit; each machine that measured both is compared. Previous to the latest is the
-    version before it on its own branch, or an earlier run of its own that measured the same on that machine.
+    version before it on its own branch, or an earlier run of its own that measured the same on that machine; last-green
+    is the newest of those that kept every limit, which says nothing of what is worse inside its limits.
     V1 may be fork-point: the nearest measured commit of the main line that V2 builds on. The formats comment and
     annotations are for pull requests, and empty when nothing became worse.
     """
@@ -293,7 +294,10 @@ def trend(
     accepted: Path | None,
     database: str,
 ) -> None:
-    """Show the series of a test over versions: sparkline, change points, last values."""
+    """Show the series of a test over versions: sparkline, change points, last values.
+
+    Ends with exit code 1 where one of them is red in its newest night.
+    """
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.judge.choice import Choice
     from spook_tracker.tracker.library import trend as told_of
@@ -305,11 +309,15 @@ def trend(
         of_engine = every[0].nights[-1].night.run.engine.name
         maps = [] if metric else choice.of_maps(trend_of_maps(history, test, levels, of_engine))
     trends = [] if maps and kinds == ("map",) else choice.of_trends(every)
+    red = any(told.nights and told.nights[-1].red for told in trends) or any(
+        told.verdict.red for told in maps
+    )
+    code = RED if red else 0
     if as_json:
         from spook_tracker.tracker.cli.report_json import trend_json
 
         click.echo(trend_json(trends, maps))
-        return
+        click.get_current_context().exit(code)
     from spook_tracker.tracker.cli.report_trend import (
         FEW,
         gates_first,
@@ -329,6 +337,7 @@ def trend(
     for told in whole:
         say()
         say("\n".join(trend_lines(told, last)))
+    click.get_current_context().exit(code)
 
 
 @click.command("list", epilog=example("tracker list"))

@@ -128,7 +128,7 @@ def backfill_commits(
 def _commits(
     folder: Path, tests: Sequence[str], say: Callable[[str], None]
 ) -> tuple[Path, Callable[..., RunDocument]]:
-    """The repository one stands in, and a function that builds and asks a commit and says whose questions it answered.
+    """The repository one stands in, and a function that builds and measures a commit and says with whose tests.
 
     CommitError where no tracker.toml says how a commit is built.
     """
@@ -142,9 +142,15 @@ def _commits(
             "such as make; where there is nothing to build, 'true'"
         )
 
+    if not team.today.questions:
+        say(
+            "each commit is asked the tests of its own checkout; to ask all of them today's, name their files as "
+            "questions in [build] of tracker.toml"
+        )
+
     def measure(commit: str, *options: str) -> RunDocument:
         document, whose = team.measure(commit, folder, tests, *options)
-        say(f"{commit[:12]} answers {whose}: {subject(team.repository, commit)}")
+        say(f"{commit[:12]} measured with {whose}: {subject(team.repository, commit)}")
         return document
 
     return team.repository, measure

@@ -13,6 +13,7 @@ from spook_tracker.tracker.cli.report_compare import red_line, where
 from spook_tracker.tracker.cli.report_table import limit, measured, pairs
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
+from spook_tracker.tracker.judge.events import in_full
 from spook_tracker.tracker.judge.standing import FOLLOWED, is_red
 from spook_tracker.tracker.judge.tonight import Finding
 from spook_tracker.tracker.judge.vocabulary import WORSE_THAN_EXPECTED
@@ -60,7 +61,7 @@ def junit_of_night(findings: Sequence[Finding], then: Sequence[OldAnswers] = ())
     """
     cases = defaultdict(list)
     for finding in findings:
-        failure = f"{finding.name}: {finding.verdict.sentence}; {finding.blame}" if finding.red else ""
+        failure = f"{in_full(finding.name, finding.verdict.sentence)}; {finding.blame}" if finding.red else ""
         sample = finding.judged.night.sample if finding.judged else None
         crashed = sample is not None and sample.outcome == "crashed"
         what = (

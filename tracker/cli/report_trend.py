@@ -12,7 +12,7 @@ from spook_tracker.tracker.cli.console import NARROW, Column, clean, sparkline, 
 from spook_tracker.tracker.cli.report_table import ROLES, limit, number
 from spook_tracker.tracker.document.run_document import Run, SeriesDefinition
 from spook_tracker.tracker.document.wording import day
-from spook_tracker.tracker.judge.events import name_of
+from spook_tracker.tracker.judge.events import in_full, name_of
 from spook_tracker.tracker.judge.judged import BY_TIME, Judged, blame, commit_of, of_one_lineage
 from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.series_history import Told, is_noisy, lanes_of, on_one_clock
@@ -177,8 +177,8 @@ def changes(definition: SeriesDefinition, judged: Sequence[Judged]) -> list[str]
     if not is_noisy(definition):
         told = [j for j in judged if j.verdict.word not in ("identical", "same", "new") and not _repeats(j)]
         return [
-            f"{day(j.night.run.started)} {commit_of(j.night.run)}: {j.verdict.name or spaced(j.verdict.word)} "
-            f"{j.verdict.sentence}"
+            f"{day(j.night.run.started)} {commit_of(j.night.run)}: "
+            + in_full(j.verdict.name or spaced(j.verdict.word), j.verdict.sentence)
             for j in told
         ]
     lanes = lanes_of([j.night for j in judged], on_one_clock)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -52,6 +53,12 @@ def name_of(judged: Judged) -> str:
     if judged.stands == "watch" and not judged.night.sample.set_point_held:
         return "off its set point"
     return "no value" if judged.stands == "fail" else "worse"
+
+
+def in_full(name: str, sentence: str) -> str:
+    """What happened and by how much; the name is left out where the sentence says it, as in "crossed its limit"."""
+    words = re.findall(r"\w+", sentence)
+    return sentence if all(word in words for word in name.split()) else f"{name}: {sentence}"
 
 
 def events_of(told: Told) -> list[Event]:

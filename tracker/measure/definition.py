@@ -41,6 +41,7 @@ WORDING = {
     "model",
     "note",
     "question",
+    "reference_kind",
     "reference_source",
     "relative_tolerance",
     "role",

@@ -2,7 +2,7 @@
 
 A question is a metric at a time step with its parameters. It is asked once in each of the engine's
 configurations, whatever configuration of ours asks it first. What judges SPOOK's method goes: limits and set points
-of the kind "method", the limits of companions, orders of accuracy. A gate whose limit is physical stays one. A team's
+of the kind "method", the limits of companions, orders of accuracy, references that are what SPOOK gives. A gate whose limit is physical stays one. A team's
 own questions are about its own method: there both kinds hold.
 """
 
@@ -98,6 +98,9 @@ def _metric(metric: Metric, gates: bool, both_kinds: bool) -> Metric:
         limit_source=metric.limit_source if gate else "",
         set_point=metric.set_point if expected else None,
         set_point_source=metric.set_point_source if expected else "",
+        reference_kind="of another method"
+        if metric.reference_kind == "method" and not both_kinds
+        else metric.reference_kind,
     )
 
 

@@ -183,7 +183,7 @@ def metric_series(name: str, test: ScalarTest, measurement: Measurement, metric:
         set_point=metric.set_point,
         set_point_source=metric.set_point_source,
         set_point_kind=metric.set_point_kind,
-        reference=metric.reference,
+        reference=None if metric.reference_kind == "of another method" else metric.reference,
         tolerance=metric.tolerance,
         relative_tolerance=metric.relative_tolerance,
         test_version=definition_hash(measurement.measure, facts),

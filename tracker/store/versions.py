@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 
@@ -136,6 +136,13 @@ def _by_start(runs: list[RunInfo], name: str) -> RunInfo | None:
         near = tuple(sorted(text[:12] for text in meant))[:5]
         raise UnknownName(f"{name!r} could be {', '.join(near)}; write more characters", near)
     return _newest(by_hash or by_id) if meant else None
+
+
+def unknown_test(keys: Iterable[str], test: str) -> UnknownName:
+    """What to say of a test of which none of the recorded series is, with the tests that may be meant."""
+    near = difflib.get_close_matches(test, {key.partition("/")[0] for key in keys}, n=3)
+    hint = f"did you mean {' or '.join(near)}?" if near else "`tracker db stats` shows what is recorded"
+    return UnknownName(f"nothing is recorded of a test {test!r}; {hint}")
 
 
 def _newest(runs: list[RunInfo]) -> RunInfo:

@@ -20,6 +20,7 @@ from spook_tracker.tracker.document.wording import (
     slug,
     version,
 )
+from spook_tracker.tracker.judge.events import in_full
 from spook_tracker.tracker.website.charts import Band, Chart, Grid, Line, Scale, drawable, thinned, turning
 from spook_tracker.tracker.website.earlier_nights import Earlier
 from spook_tracker.tracker.website.events import Event
@@ -186,7 +187,7 @@ def _beginnings(events: Sequence[Event], trend: Trend) -> Line:
     """A mark at each first bad commit."""
     places = [trend.nights.index(as_night(event.first).index) for event in events]
     notes = [
-        f"{event.name}: {event.sentence}\nfirst bad commit {short_hash(event.first.engine) or 'unknown'}, "
+        f"{in_full(event.name, event.sentence)}\nfirst bad commit {short_hash(event.first.engine) or 'unknown'}, "
         f"{day(event.first.started)}\nnow {event.standing}"
         for event in events
     ]

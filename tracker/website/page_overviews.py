@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, TypedDict
 
 from spook_tracker.tracker.document.coverage import HEADINGS, coverage, rungs, summary
@@ -25,7 +25,7 @@ from spook_tracker.tracker.website.events import Event, map_verdicts
 from spook_tracker.tracker.website.feed import badge_words
 from spook_tracker.tracker.website.judged_nights import BLOCK, file_stem
 from spook_tracker.tracker.website.known_charts import KnownCharts
-from spook_tracker.tracker.website.nights import Book, TestHistory
+from spook_tracker.tracker.website.nights import Book, TestHistory, as_night
 from spook_tracker.tracker.website.page_index import RED, counts_by_night, health, lead
 from spook_tracker.tracker.website.page_rows import Page, address, row
 from spook_tracker.tracker.website.page_test import concluded, ladder_views
@@ -34,6 +34,7 @@ from spook_tracker.tracker.website.svg import grid_picture, picture
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.run_document import TestCard
+    from spook_tracker.tracker.judge.standing import Count
     from spook_tracker.tracker.judge.vocabulary import Class
     from spook_tracker.tracker.website.causes import HitRow, ToldCause
     from spook_tracker.tracker.website.nights import Trend
@@ -170,10 +171,11 @@ def compare(told: Comparisons, book: Book) -> Page:
     return Page("compare.html", "compare.html", "Compare two versions", "Two versions side by side.", context)
 
 
-def versions(book: Book) -> Page:
-    """Versions and machines."""
+def versions(book: Book, events: Sequence[Event]) -> Page:
+    """Versions and machines; a night stands for its limits, and for what is known by now to have been worse then."""
     nights = list(reversed(book.nights))
     counts = counts_by_night(book, MOST_NIGHTS)
+    states = _states(counts, events)
     machines = Counter(night.machine for night in book.nights)
     context = {
         "nights": [
@@ -183,11 +185,7 @@ def versions(book: Book) -> Page:
                 "machine": slug(night.machine.fingerprint),
                 "kept": counts[night.index].kept,
                 "gates": counts[night.index].limits,
-                "state": "none"
-                if not counts[night.index].limits
-                else "fail"
-                if counts[night.index].broken
-                else "pass",
+                "state": states[night.index],
                 "log": web_address(night.ci_address),
             }
             for night in nights[:MOST_NIGHTS]
@@ -199,6 +197,20 @@ def versions(book: Book) -> Page:
         ],
     }
     return Page("versions.html", "versions.html", "Versions and machines", "Versions and machines.", context)
+
+
+def _states(counts: Mapping[int, Count], events: Sequence[Event]) -> dict[int, Class]:
+    states: dict[int, Class] = {
+        night: "fail" if found.broken else "pass" if found.limits else "none"
+        for night, found in counts.items()
+    }
+    for event in events:
+        if event.standing == "accepted":
+            continue
+        for night in range(as_night(event.first).index, as_night(event.last).index + 1):
+            if night in states and CLASS_RANK[event.stands] < CLASS_RANK[states[night]]:
+                states[night] = event.stands
+    return states
 
 
 def data(book: Book, events: Sequence[Event]) -> Page:

@@ -44,7 +44,8 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event], charts: Kn
     found = broken(test)
     cards = found[:MOST_CARDS]
     first = [one.trend for one in found if one.trend.definition.kind != "ladder"][:MOST_CHARTS]
-    gates = [every[id(t)] for t in test.gates()]
+    told = {id(one.trend) for one in cards}  # not once more among the gates
+    gates = [every[id(t)] for t in test.gates() if id(t) not in told]
     judged = test.gates() + test.companions()
     break_points = test.of_kind("break_point")
     scalars = judged + test.reported()
@@ -95,14 +96,14 @@ def test_page(book: Book, test: TestHistory, events: Sequence[Event], charts: Kn
         "events": [event_row(e, book) for e in of_test(events, test)[:20]],
         "scalars": [every[id(t)] for t in scalars],
     }
-    told: Times = {
+    times_told: Times = {
         "rows": [every[id(t)] for t in times],
         "stage_times": stage_times(test),
         "saving": saved(test.card.saving),
         "saved": [s for s in test.card.stages if not s.kept and s.saved_seconds_per_step],
     }
     page = Page(here, "test.html", clean(test.card.title), clean(test.card.question), context, plotly=True)
-    page.nightly = (slug(test.name), told) if context["run_times"] else None
+    page.nightly = (slug(test.name), times_told) if context["run_times"] else None
     return page
 
 

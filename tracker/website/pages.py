@@ -86,7 +86,7 @@ def pages(
     yield Planned("regressions.html", "Regressions", partial(page_overviews.regressions, book, causes))
     if mutants:
         yield Planned(PATH, "Mutation tests", partial(mutants_page, mutants, book))
-    yield Planned("versions.html", "Versions", partial(page_overviews.versions, book))
+    yield Planned("versions.html", "Versions", partial(page_overviews.versions, book, events))
     yield Planned("data.html", "Data", partial(page_overviews.data, book, events))
     yield Planned("document.html", "Report", partial(page_overviews.document, book, causes))
     for test in book.tests:

@@ -249,16 +249,46 @@ def test_an_accepted_level_is_not_red(two_versions):
     assert "1 accepted, 1 improved, 1 changed" in shown.output
 
 
-def test_trend_shows_the_series_and_names_the_bad_night(two_versions):
+def test_trend_shows_the_series_names_the_bad_night_and_ends_as_judge_does(two_versions, monkeypatch):
     shown = tracker("trend", "fall", "position_error")
 
-    assert shown.exit_code == 0
+    assert (
+        shown.exit_code
+        == tracker("trend", "fall", "--json").exit_code
+        == tracker("judge", "latest").exit_code
+        == 1
+    )
     assert "█▁" in shown.output
     assert "✗ red" in shown.output
+    assert re.search(r"bbbbbbbbbbbb: crossed its limit$", shown.output, re.MULTILINE), (
+        "said once, not by name as well"
+    )
     assert tracker("trend", "fal").exit_code == 2
     assert "it has height, position_error" in tracker("trend", "fall", "nothing").stderr
     everything = tracker("trend", "fall").stdout
     assert everything.index("/position_error") < everything.index("/height"), "the gate comes first"
+    measure(monkeypatch, VERSION="1.2.0", HASH="c" * 40, PARENT=BAD)
+    assert tracker("trend", "fall").exit_code == 0
+
+
+def test_last_green_is_a_version_before_the_latest(monkeypatch):
+    """Compared with itself a version is never worse."""
+    measure(monkeypatch, VERSION="1.0.0", HASH=GOOD)
+    alone = tracker("compare", "last-green", "latest")
+    assert (alone.exit_code, alone.stdout) == (2, "")
+    assert "no version before the latest has kept every limit" in alone.stderr
+
+    measure(monkeypatch, VERSION="1.1.0", HASH=BAD, PARENT=GOOD, ERROR="-0.2")
+    red = tracker("compare", "last-green", "latest", "--format", "json")
+    measure(monkeypatch, VERSION="1.2.0", HASH="c" * 40, PARENT=BAD)
+    mended = tracker("compare", "last-green", "latest", "--format", "json")
+
+    assert (red.exit_code, mended.exit_code) == (1, 0)
+    assert (
+        json.loads(red.stdout)["before"]["version"]
+        == json.loads(mended.stdout)["before"]["version"]
+        == "1.0.0"
+    )
 
 
 def test_list_show_and_explain_tell_what_is_asked_and_what_it_needs():

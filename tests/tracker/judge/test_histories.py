@@ -107,7 +107,7 @@ def branched() -> list[RunDocument]:
 def test_a_branch_from_before_a_regression_marks_nothing_recovered(tracker: Any) -> None:
     code, said = tracker(branched(), "trend", "t", "m")
 
-    assert code == 0
+    assert code == 1
     assert "bbbbbbbbbbbb" not in said
     assert "recovered" not in said
     assert "flip-flop" not in said

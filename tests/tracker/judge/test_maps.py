@@ -233,7 +233,7 @@ def test_retention_keeps_a_map_of_each_machine_and_the_command_tells_the_loss(tm
         (found,) = [f for f in tonight(history, history.run(after.id)) if f.series == KEY]
         assert (found.good.id, found.bad.id, found.news) == (ours.id, mine.id, False)
     done = CliRunner().invoke(main, ["trend", "pendulum", "--db", address])
-    assert done.exit_code == 0, done.output
+    assert done.exit_code == 1, done.output
     assert "series red" in done.output.splitlines()[0]
     (line,) = [line for line in done.output.splitlines() if line.startswith(f"✗ {KEY}: missing")]
     assert mine.engine.git_hash[:8] in line

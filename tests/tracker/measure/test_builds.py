@@ -43,7 +43,7 @@ def test_the_first_bad_of_a_dozen_commits_is_found_in_the_range_that_the_history
     assert nights.output.count("1 of 1 values, recorded as run") == 2
     assert shown.exit_code == 1, shown.output
     assert f"first bad commit {pebble.commits[6][:12]}: Change number 6 (Ada Example)" in shown.output
-    assert f"{pebble.commits[2][:12]} answers its own questions" in shown.output, (
+    assert f"{pebble.commits[2][:12]} measured with its own questions" in shown.output, (
         "the accused range begins there"
     )
     assert pebble.commits[0][:12] not in shown.output
@@ -101,7 +101,7 @@ def test_todays_questions_are_put_to_commits_from_before_there_were_any(pebble: 
     shown = CliRunner().invoke(main, ["backfill", old])
 
     assert "1 of 1 values, recorded as run" in shown.output, shown.output
-    assert f"{old[:12]} answers today's questions" in shown.output
+    assert f"{old[:12]} measured with today's questions" in shown.output
     kept_there = {path.name for path in (pebble.folder / ".tracker-commits" / old[:12]).iterdir()}
     assert not kept_there & {"tracker.toml", "tracker-answers.json"}, (
         "what was laid over it is taken away again"

@@ -1,5 +1,7 @@
 """Whose a limit is decides which engine is held to it."""
 
+from dataclasses import replace
+
 import msgspec
 import pytest
 
@@ -7,6 +9,7 @@ from spook_tracker.engine.protocol import Configuration
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.document.run_document import SeriesDefinition
 from spook_tracker.tracker.measure.others import asked_of
+from spook_tracker.tracker.measure.question import metric_series
 from tests.histories.documents import run
 
 THEIRS = (Configuration(name="default", reason="the only one"),)
@@ -32,6 +35,42 @@ def test_another_engine_is_held_to_physical_limits_alone():
         for _, metric in test.metrics():
             assert metric.limit is None or metric.limit_kind == "physical"
             assert metric.set_point is None
+
+
+@pytest.mark.parametrize(
+    ("name", "metric", "kept"),
+    [
+        ("falling_object", "position_error", None),
+        ("oscillator_filter", "left_at_10", None),
+        ("friction", "force_ratio", 0.5),
+    ],
+)
+def test_another_engine_is_not_told_what_this_method_gives(name, metric, kept):
+    """A reference that is this method's own is no right value of another's: neither drawn nor judged by."""
+
+    def series_of(tests):
+        return next(
+            metric_series(name, tests[name], measurement, one)
+            for measurement, one in tests[name].metrics()
+            if one.name == metric
+        )
+
+    catalogue = {name: CATALOGUE[name]}
+    assert series_of(catalogue).reference is not None
+    theirs = series_of(asked_of(catalogue, THEIRS, gating=True))
+    assert theirs.reference == kept
+
+    whole = series_of(asked_of({name: all_physical(CATALOGUE[name])}, THEIRS, gating=True))
+    assert whole.reference is not None
+    assert theirs.test_version == whole.test_version, "the question is the same, and its history goes on"
+
+
+def all_physical(test):
+    measurements = (
+        replace(one, metrics=tuple(replace(metric, reference_kind="physical") for metric in one.metrics))
+        for one in test.measurements
+    )
+    return replace(test, measurements=tuple(measurements))
 
 
 def test_a_teams_own_question_holds_its_own_engine_whatever_the_kind():
