@@ -62,22 +62,20 @@ HISTORY = click.option(
     default="history",
     show_default=True,
     type=click.Path(path_type=Path),
-    help="Where the files of the months lie.",
+    help="Folder of the history, one file a month.",
 )
 
 
 @click.group("ci", epilog=example("tracker ci night", "tracker ci change"))
 def ci() -> None:
-    """A night, or a proposed change, in a CI service: history in, measure, judge, tell, history out."""
+    """For CI services: measure and judge a night, or a proposed change, with the history in a folder."""
 
 
 @ci.command(epilog=example("tracker ci night --history history --out public"))
 @HISTORY
 @click.option("--out", metavar="DIR", default="public", show_default=True, type=click.Path(path_type=Path))
 @click.option("--quick", is_flag=True, help="Leave out sweeps and stability studies.")
-@click.option(
-    "--site", metavar="URL", default="", help="Where the website will be, for links in the summary."
-)
+@click.option("--site", metavar="URL", default="", help="Address of the website, for links in the summary.")
 @executor_option
 @workers_option
 @limit_option
@@ -92,7 +90,7 @@ def night(
     context: click.Context, /, history: Path, out: Path, site: str, accepted: Path | None, database: str,
     **asked: Unpack[AskedOfNight],
 ) -> None:  # fmt: skip
-    """`tracker nightly` between the history that was kept and the history to keep."""
+    """Read the history, run `tracker nightly`, and write the history back."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.history import accepted_levels, history_of
     from spook_tracker.tracker.cli.main import nightly
@@ -129,8 +127,8 @@ def night(
     metavar="V",
     default="fork-point",
     show_default=True,
-    help="What it is compared with: a commit, or a name that the history knows; fork-point is where it leaves the "
-    "main line, or the nearest measured commit before where nothing says how commits are built.",
+    help="What to compare with: a commit, or a version in the history. fork-point is where the change left the main "
+    "line; if commits cannot be built, the nearest measured commit before that.",
 )
 @click.option(
     "--build",
@@ -138,7 +136,7 @@ def night(
     default="",
     help="Shell command that builds a commit; by default [build] of tracker.toml.",
 )
-@click.option("--quick", is_flag=True, help="Leave out run times, where they are compared.")
+@click.option("--quick", is_flag=True, help="Leave out run times.")
 @click.option(
     "--keep",
     "folder",
@@ -166,10 +164,10 @@ def change(
     context: click.Context, /, history: Path, base: str, build: str, quick: bool, folder: Path,
     comment_file: Path | None, accepted: Path | None, database: str, **asked: Unpack[Asked],
 ) -> None:  # fmt: skip
-    """Measure a proposed change beside its base, both built here; nothing of it is kept.
+    """Build and measure a proposed change and its base side by side; nothing is added to the history.
 
-    Values are compared exactly, run times between fresh processes of both, interleaved. Where nothing says how a commit
-    is built, the change is measured as it lies here and compared with the history, without run times.
+    Values are compared exactly, run times between fresh processes of both, interleaved. If nothing says how a commit is
+    built, the working tree is measured and compared with the history, without run times.
     """
     from spook_tracker.tracker.cli.change import beside_its_base, run_options
     from spook_tracker.tracker.cli.history import accepted_levels, history_of

@@ -10,12 +10,19 @@ from spook_tracker.tracker.cli.settings import present
 
 @click.command(epilog=example("tracker count pendulum --steps 100"))
 @click.argument("tests", nargs=-1, required=True, metavar="TEST...")
-@click.option("--steps", default=100, show_default=True, type=click.IntRange(min=1), help="Of each example.")
+@click.option(
+    "--steps",
+    default=100,
+    show_default=True,
+    type=click.IntRange(min=1),
+    help="Steps to count of each example.",
+)
 @source_options
 def count(tests: tuple[str, ...], steps: int, engine: str, catalogue: str) -> None:
     """Count the engine's instructions in the example scenes of tests, by valgrind's callgrind.
 
-    Where the processor shows no counter, as in most virtual machines; a minute each. The clock has no part in it.
+    For machines without a hardware counter, as most virtual machines; takes about a minute a test. Independent of the
+    clock.
     """
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.measure.callgrind import count_instructions

@@ -30,7 +30,7 @@ def kind_options(command: Command) -> Command:
 
 def engine_option(command: Command) -> Command:
     """--engine NAME: whose versions are meant."""
-    words = "Whose versions are meant; NAME@VERSION says it of one."
+    words = "The engine that versions refer to; NAME@VERSION sets it for one version."
     return click.option("--engine", metavar="NAME", help=words)(command)
 
 

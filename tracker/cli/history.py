@@ -79,13 +79,13 @@ def accepted_levels(file: Path | None = None) -> Sequence[Accepted]:
     type=click.Choice(["regression", "change", "never"]),
     default="regression",
     show_default=True,
-    help="What ends with exit code 1.",
+    help="What causes exit code 1.",
 )
-@click.option("--all", "everything", is_flag=True, help="Show what is identical, too.")
+@click.option("--all", "everything", is_flag=True, help="Also show identical values.")
 @click.option(
     "--against-history",
     is_flag=True,
-    help="Run times that are red against their history are red here, too, whatever V1 took.",
+    help="Run times that are red against their history are red, whatever V1 took.",
 )
 @engine_option
 @test_option
@@ -108,13 +108,13 @@ def compare(
 ) -> None:
     """Say what changed between two versions.
 
-    V is an engine version, a git tag, the start of a commit hash, a run id, latest, previous or last-green; or V1 and
-    V2 are two engines by name, which are ranked: at equal error, which is ahead where and by what factor.
-    A version is all runs of its commit; each machine that measured both is compared. Previous to the latest is the
-    version before it on its own branch, or an earlier run of its own that measured the same on that machine; last-green
-    is the newest of those that kept every limit, which says nothing of what is worse inside its limits.
-    V1 may be fork-point: the nearest measured commit of the main line that V2 builds on. The formats comment and
-    annotations are for pull requests, and empty when nothing became worse.
+    A version V is an engine version, a git tag, the start of a commit hash, a run id, latest, previous or last-green.
+    It comprises all runs of its commit; every machine that measured both versions is compared. "compare previous
+    latest" takes the version before the latest on its branch, or an earlier run of the same version that measured the
+    same on that machine; "compare last-green latest" takes the newest earlier version that kept every limit, whether or
+    not a value had become worse within its limit. V1 may be fork-point: the nearest measured commit of the main line
+    that V2 builds on. If V1 and V2 are names of engines, they are ranked: which is ahead at equal error, and by what
+    factor. The formats comment and annotations are for pull requests, and empty when nothing became worse.
     """
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.judge.choice import Choice
@@ -195,7 +195,7 @@ def _exit_as(document: CompareDocument, fail_on: str) -> None:
 @click.option(
     "--old-questions",
     is_flag=True,
-    help="Where a definition changed, also put the old question to this engine and compare its answers.",
+    help="If a test's definition changed, also run the old test on this engine and compare.",
 )
 @engine_option
 @test_option
@@ -216,10 +216,10 @@ def judge_command(
 ) -> None:
     """Judge a recorded or imported run against everything measured before it.
 
-    RUN is named as for compare: a version is all runs of its commit, of each series on each machine the last; a run's
-    id is that run alone. Latest is the latest night of every machine: what is red of the last runs of other machines
-    within a day is told, too. What is red ends with exit code 1, a run that measured nothing with 3, as do old
-    questions some of whose values cannot be told.
+    RUN is named as for compare. A version comprises all runs of its commit: of each series the last on each machine; a
+    run's id is that run alone. Latest is the latest night of every machine: what is red in the last runs of other
+    machines within a day is reported, too. Exit code 1 if anything is red; 3 if the run measured nothing, or if some
+    values of old questions could not be compared.
     """
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.report_compare import finding_lines, findings_json, old_answer_lines
@@ -274,9 +274,15 @@ def _by_old_questions(
 @click.argument("test")
 @click.argument("metric", required=False)
 @click.option(
-    "--last", type=click.IntRange(min=1), default=10, show_default=True, help="Values to list of each series."
+    "--last",
+    type=click.IntRange(min=1),
+    default=10,
+    show_default=True,
+    help="Number of values to list of each series.",
 )
-@click.option("--all", "everything", is_flag=True, help="Night by night, however many series there are.")
+@click.option(
+    "--all", "everything", is_flag=True, help="List the nights of every series, however many there are."
+)
 @engine_option
 @kind_options
 @json_option
@@ -296,7 +302,7 @@ def trend(
 ) -> None:
     """Show the series of a test over versions: sparkline, change points, last values.
 
-    Ends with exit code 1 where one of them is red in its newest night.
+    Exit code 1 if one of them is red in its newest night.
     """
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.judge.choice import Choice
@@ -346,7 +352,7 @@ def trend(
 @click.option(
     "--coverage",
     is_flag=True,
-    help="What each has: error against run time, stability, what leaving out saves; or why not.",
+    help="Show for each test whether it has error against run time, stability and the savings of left-out stages, or why not.",
 )
 @json_option
 @source_options
@@ -361,7 +367,7 @@ def list_tests(
     catalogue: str,
     database: str,
 ) -> None:
-    """List the scalar tests: what is asked, and against which limit. With --kind or --role, those that have such."""
+    """List the scalar tests: the question, and the limit. --kind and --role select those with such series."""
     from contextlib import nullcontext
     from fnmatch import fnmatchcase
 
@@ -413,7 +419,7 @@ def _kinds_of(test: ScalarTest) -> set[str]:
     "form",
     type=click.Choice(["text", "mjcf"]),
     default="text",
-    help="Or its scene as a file for MuJoCo.",
+    help="mjcf: the scene as a file for MuJoCo.",
 )
 @json_option
 @source_options
@@ -444,12 +450,12 @@ def show(test: str, form: str, as_json: bool, engine: str, catalogue: str) -> No
 @click.command(epilog=example("tracker explain falling_object --cost"))
 @click.argument("test")
 @click.option(
-    "--cost", is_flag=True, help="Also measure what each stage takes, and saves where it is left out."
+    "--cost", is_flag=True, help="Also measure what each stage costs, and what leaving it out saves."
 )
 @json_option
 @source_options
 def explain(test: str, cost: bool, as_json: bool, engine: str, catalogue: str) -> None:
-    """Say which stages of the engine the test's scene needs, which are left out, and why."""
+    """Say which stages of the engine a test's scene needs, which are left out, and why."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.report_catalogue import stage_table
     from spook_tracker.tracker.measure.cards import explained

@@ -15,7 +15,7 @@ from spook_tracker.tracker.cli.options import example
     "--build",
     metavar="COMMAND",
     default="",
-    help="Shell command that builds your engine; by default told from CMakeLists.txt, Cargo.toml, meson.build, Makefile.",
+    help="Shell command that builds your engine; by default derived from CMakeLists.txt, Cargo.toml, meson.build or Makefile.",
 )
 @click.option(
     "--tracker",
@@ -25,7 +25,7 @@ from spook_tracker.tracker.cli.options import example
     help="Repository of the tracker that the workflow calls; by default the one this package names.",
 )
 def init(engine: str, build: str, url: str) -> None:
-    """Write adapter, tracker.toml and workflow for ENGINE into this folder; what is there is never written over.
+    """Write adapter, tracker.toml and workflow for ENGINE into this folder; existing files are never overwritten.
 
     ENGINE is one of `tracker engines`, or the name of your own: its adapter then holds a stand-in, so that a first night
     runs before your engine is bound.

@@ -51,16 +51,16 @@ FIRST_STEPS = """\
 Tracks whether a physics engine became less accurate, less stable or slower.
 
 \b
-Three usual ways in:
+Three ways to use it:
   tracker nightly --out public     for a cron job: run, record, judge, publish
   tracker compare previous latest  at a desk: what changed between two versions
-  tracker serve public             look at the trend website
+  tracker serve public             view the website
 
 \b
 A first run:
   tracker init NAME                adapter, settings and workflow for an engine of your own
   tracker run                      measure every scalar test of this engine and record it
-  tracker list                     the questions that are asked
+  tracker list                     list the tests
 """
 
 
@@ -84,7 +84,7 @@ def _print_versions() -> None:
 
 
 all_option = click.option(
-    "--all", "everything", is_flag=True, help="Print every limit and value, not a line a test."
+    "--all", "everything", is_flag=True, help="Print every limit and value instead of a line per test."
 )
 
 
@@ -92,7 +92,7 @@ all_option = click.option(
 @click.argument("tests", nargs=-1, metavar="[TEST]...")
 @click.option("--sweep", is_flag=True, help="Also measure error against run time.")
 @click.option("--stability", is_flag=True, help="Also find break points and stability maps.")
-@click.option("--figures", is_flag=True, help="Also draw the figures' data.")
+@click.option("--figures", is_flag=True, help="Also compute the figures' data.")
 @click.option("--no-record", is_flag=True, help="Measure and print only.")
 @all_option
 @click.option(
@@ -291,7 +291,7 @@ def nightly(
 
 @main.command(epilog=example("tracker engines"))
 def engines() -> None:
-    """The engines that can be asked, in which configurations, and what is missing for the others."""
+    """List the engines that can be tested, with their configurations, and what is missing for the others."""
     import spook_tracker.tracker.cli.report_engines as report
     from spook_tracker.tracker.cli.console import say
 
@@ -300,7 +300,7 @@ def engines() -> None:
 
 @main.command(epilog=example("tracker publish --out public"))
 @click.option(
-    "--out", metavar="DIR", required=True, type=click.Path(path_type=Path), help="Where the site goes."
+    "--out", metavar="DIR", required=True, type=click.Path(path_type=Path), help="Folder for the website."
 )
 @with_database_option
 @website_options
@@ -313,7 +313,7 @@ def publish(
     accepted: Path | None,
     database: str,
 ) -> None:
-    """Build the website from what is recorded."""
+    """Build the website from the recorded runs."""
     from spook_tracker.tracker.cli.history import accepted_levels, history_of
     from spook_tracker.tracker.library import publish as build
 
@@ -334,7 +334,7 @@ def report(
     accepted: Path | None,
     database: str,
 ) -> None:
-    """Write the newest night as one document: a PDF, an HTML file that needs no other, or both."""
+    """Write the newest night as one document: a PDF, a self-contained HTML file, or both."""
     import tempfile
 
     from spook_tracker.tracker.cli.console import say
@@ -364,7 +364,7 @@ def report(
     "--port", default=8000, show_default=True, type=click.IntRange(0, 65535), help="0: any free one."
 )
 def serve(folder: Path, port: int) -> None:
-    """Look at a published website on this machine."""
+    """Serve a published website on this machine."""
     from functools import partial
     from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 

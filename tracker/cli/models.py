@@ -21,13 +21,13 @@ WORDS = {"model": "·", "runs": "✓", "part": "-", "refused": "✗", "fails": "
 @click.argument("packages", metavar="PACKAGE|DIR|FILE...", nargs=-1, required=True)
 @click.option(
     "--engine", "engines", metavar="NAME", multiple=True,
-    help="Also load each in this engine and take ten steps; of several, say which stand together at growing times.",
+    help="Also load each in this engine and take ten steps; with several engines, say which agree, and for how long.",
 )  # fmt: skip
 @click.option(
-    "--agree", is_flag=True, help="Also compare its swing, without contacts and losses, with MuJoCo's."
+    "--agree", is_flag=True, help="Also compare its motion, without contacts and losses, with MuJoCo's."
 )
-@click.option("--markdown", is_flag=True, help="Of several engines: a table for a document.")
-@click.option("--all", "everything", is_flag=True, help="Also list files that are parts of others.")
+@click.option("--markdown", is_flag=True, help="With several engines: a table for a document.")
+@click.option("--all", "everything", is_flag=True, help="Also list files that are parts of other models.")
 @click.option("--workers", default=2, show_default=True, type=click.IntRange(1, 256))
 def models_command(
     packages: tuple[str, ...],

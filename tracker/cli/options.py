@@ -76,7 +76,7 @@ def with_database_option(command: Command) -> Command:
         is_flag=True,
         expose_value=False,
         callback=_kept(),
-        help="Offer the SQLite file for download, as data/tracker.db.",
+        help="Publish the SQLite file as data/tracker.db.",
     )(command)
 
 
@@ -123,7 +123,7 @@ def model_option(command: Command) -> Command:
         is_eager=True,
         expose_value=False,
         callback=_model,
-        help="Ask about this MJCF, URDF or SDF file instead; may be repeated. Those of every night: [[model]] in tracker.toml.",
+        help="Test this MJCF, URDF or SDF file instead; may be repeated. For every night, list it as [[model]] in tracker.toml.",
     )(command)
 
 
@@ -135,7 +135,7 @@ def catalogue_option(command: Command) -> Command:
         envvar="TRACKER_CATALOGUE",
         default="standard",
         callback=_catalogue,
-        help="Other tables of scalar tests: module:NAME, with commas between; also TRACKER_CATALOGUE.",
+        help="Catalogues of scalar tests, as module:NAME, separated by commas; also TRACKER_CATALOGUE.",
     )(command)
 
 
@@ -180,7 +180,7 @@ def website_options(command: Command) -> Command:
             default="",
             expose_value=False,
             callback=_kept(_web_address),
-            help="Address of your project, for the foot of every page.",
+            help="Address of your project, linked at the foot of every page.",
         ),
         click.option(
             "--colour",
@@ -220,7 +220,7 @@ def pages_options(command: Command) -> Command:
             expose_value=False,
             callback=_kept(),
             type=click.Path(path_type=Path),
-            help="Record of engines wrong on purpose, for a page of the website.",
+            help="Results of deliberately wrong engines, as `make mutants` writes them, for a page of the website.",
         ),
     ):
         command = option(command)
@@ -240,7 +240,7 @@ def documents_option(command: Command) -> Command:
         expose_value=False,
         callback=_kept(_with_first_page),
         type=click.Path(exists=True, file_okay=False, path_type=Path),
-        help="A documentation as HTML files, to be published as docs/ and linked on every page.",
+        help="HTML documentation to publish as docs/ and link on every page.",
     )(command)
 
 
@@ -260,7 +260,7 @@ def limit_option(command: Command) -> Command:
         "--limit",
         metavar="SECONDS",
         type=Seconds(min=0.0, min_open=True),
-        help="Time of one simulation; by default 10 s for another engine.",
+        help="Wall time of one simulation; by default 10 s for other engines.",
     )(command)
 
 
@@ -273,7 +273,7 @@ def workers_option(command: Command) -> Command:
             default=MEMORY,
             show_default=True,
             type=click.IntRange(0, 1 << 30),
-            help="More than a process has at its start, for one piece of work; 0: no limit. Linux only.",
+            help="Memory that one task may add to its process; 0: no limit. Linux only.",
         ),
         click.option(
             "--time-limit",
@@ -281,14 +281,14 @@ def workers_option(command: Command) -> Command:
             default=TIME_LIMIT,
             show_default=True,
             type=Seconds(0.1, 1e6),
-            help="For one piece of work; what takes longer is ended and recorded as timed out.",
+            help="Wall time of one task; one that takes longer is stopped and recorded as timed out.",
         ),
         click.option(
             "--workers",
             default=2,
             show_default=True,
             type=click.IntRange(0, 256),
-            help="Processes that measure values, each watched; 0: the one that asks, where no piece can be ended.",
+            help="Processes that measure values; 0: this one, where no task can be stopped.",
         ),
     ):
         command = option(command)

@@ -20,10 +20,12 @@ KEPT = ".tracker-commits"
 
 @click.command(epilog=example("tracker bisect pendulum --good v0.3.0 --bad HEAD"))
 @click.argument("test")
-@click.option("--good", metavar="REV", help="By default what the history knows as the last good commit.")
-@click.option("--bad", metavar="REV", help="By default the first commit that the history knows as bad.")
-@click.option("--sweep", is_flag=True, help="Also measure error against run time, and look at those series.")
-@click.option("--stability", is_flag=True, help="Also find break points, and look at those.")
+@click.option("--good", metavar="REV", help="Default: the last good commit according to the history.")
+@click.option("--bad", metavar="REV", help="Default: the first bad commit according to the history.")
+@click.option(
+    "--sweep", is_flag=True, help="Also measure error against run time, and search by those series."
+)
+@click.option("--stability", is_flag=True, help="Also find break points, and search by those.")
 @kind_options
 @click.option(
     "--keep", "folder", metavar="DIR", default=KEPT, show_default=True, type=click.Path(path_type=Path),
@@ -45,8 +47,8 @@ def bisect(
 ) -> None:
     """Build and measure commits between a good and a bad one, and name the first bad one.
 
-    Nothing is recorded. A commit that does not build or does not answer is passed over. Ends with exit code 1: there
-    is a bad commit.
+    Nothing is recorded. A commit that does not build or gives no answers is skipped. Exit code 1 if a bad commit was
+    found.
     """
     import spook_tracker.tracker.past as past
     from spook_tracker.tracker.cli.console import say

@@ -26,8 +26,8 @@ if TYPE_CHECKING:
 def rank(engines: tuple[str, ...], tests: tuple[str, ...], database: str) -> None:
     """Table of engines and scenes: error at h = 1/60, run time to reach 1e-2, 1e-4 and 1e-6.
 
-    ENGINE is a name or name@version; without any, every engine that is recorded. Of a name it is the latest run, and for
-    tests that it was not asked those before it on the same machine: of the same version, or of earlier commits.
+    ENGINE is a name or name@version; by default every recorded engine. A name stands for the latest run; tests that it
+    did not include are taken from earlier runs on the same machine, of the same version or of earlier commits.
     """
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.history import history_of

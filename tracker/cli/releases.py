@@ -37,7 +37,7 @@ MEGABYTE = 1e6
 @click.option(
     "--engine",
     metavar="NAME",
-    help="An engine that is released as a package: REV are its versions, all if none is named.",
+    help="An engine that is released as a package: REV are its versions; by default all.",
 )
 @click.option("--sweep", is_flag=True, help="Of commits: also measure error against run time.")
 @click.option("--test", "tests", multiple=True, metavar="TEST", help="Only this test; may be repeated.")
@@ -46,7 +46,7 @@ MEGABYTE = 1e6
     "--budget",
     type=Seconds(min=0.0),
     metavar="MINUTES",
-    help="Begin no release after that; the next call goes on.",
+    help="Start no release after that time; the next call goes on.",
 )
 @click.option(
     "--keep",
@@ -81,14 +81,14 @@ def backfill(
 ) -> None:
     """Measure earlier commits of a repository, or released versions of another engine, and record them.
 
-    REV are commits, tags or ranges A..B of the repository one stands in; [build] of tracker.toml says how it is
-    built. Each is built in a folder of its own and asked today's questions where it can answer them, else its own;
-    which they were is said.
+    REV are commits, tags or ranges A..B of the repository in the current folder; [build] of tracker.toml says how to
+    build them. Each is built in a folder of its own and measured with today's tests if it can answer them, otherwise
+    with its own; the output says with which.
 
     With --engine, released versions are installed and measured in release order.
-    A release that is recorded already is not measured again, so an interrupted backfill is gone on with by
-    calling it again. One that cannot be installed, does not start or gives no answers is named and passed
-    over. In the end every change between two releases is named with its release.
+    A release that is recorded already is not measured again, so that an interrupted backfill goes on when it is
+    called again. One that cannot be installed, does not start or gives no answers is reported and skipped.
+    Finally, every change between two releases is listed under its release.
     """
     import spook_tracker.tracker.measure.catalogues as catalogues
     import spook_tracker.tracker.measure.releases as releases
@@ -190,7 +190,7 @@ def _recorded(database: str, engine: str, tests: Sequence[str]) -> set[str]:
     "--changelog",
     metavar="FILE",
     type=click.Path(path_type=Path, exists=True, dir_okay=False),
-    help="What its makers say they changed (TOML): found, missed, and not in it.",
+    help="Its own changelog as TOML: shows which of its changes were found, which were missed, and what is not in it.",
 )
 @click.option("--markdown", is_flag=True, help="Print a page, with every change.")
 @database_option

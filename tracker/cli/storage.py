@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     "--out",
     metavar="DIR",
     type=click.Path(path_type=Path),
-    help="A folder, for one file per run or month; default: print. The file of a table.",
+    help="Folder for a file per run or month, or the file of a table; by default print.",
 )
 @click.option(
     "--format",
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     type=click.Choice(["json", "months", "csv", "parquet"]),
     default="json",
     show_default=True,
-    help="months: a compressed file a month; csv, parquet: one table of all values.",
+    help="months: a compressed file per month; csv, parquet: one table of all values.",
 )
 @database_option
 def export(versions: tuple[str, ...], out: Path | None, form: str, database: str) -> None:
@@ -62,29 +62,34 @@ def export(versions: tuple[str, ...], out: Path | None, form: str, database: str
 
 @click.command("import", epilog=example("tracker import runs/*.json"))
 @click.argument("files", nargs=-1, required=True, metavar="FILE...", type=click.Path(path_type=Path))
-@click.option("--engine", default="", metavar="NAME", help="Of other tools' files: what is measured.")
 @click.option(
-    "--machine", default="", metavar="NAME", help="Of other tools' files: the machine they are compared on."
+    "--engine", default="", metavar="NAME", help="For files of other tools: the engine that was measured."
 )
 @click.option(
-    "--branch", default="", metavar="NAME", help="Of other tools' files: only runs of commits on this branch."
+    "--machine", default="", metavar="NAME", help="For files of other tools: the machine that measured."
+)
+@click.option(
+    "--branch",
+    default="",
+    metavar="NAME",
+    help="For files of other tools: only runs of commits on this branch.",
 )
 @click.option(
     "--column",
     "columns",
     multiple=True,
     metavar="NAME=MEANING",
-    help="Of JSON lines and CSV: commit, started, test, metric, value, unit, parameter ...; a unit (s, B, steps/s); or -. Repeatable.",
+    help="For JSON lines and CSV: MEANING is commit, started, test, metric, value, unit, parameter ...; a unit (s, B, steps/s); or - to ignore. Repeatable.",
 )
 @database_option
 def import_files(
     files: tuple[Path, ...], engine: str, machine: str, branch: str, columns: tuple[str, ...], database: str
 ) -> None:
-    """Record runs from JSON documents, whole or in short form; what is there already is left as it is.
+    """Record runs from JSON documents, whole or in short form; runs that are recorded already are skipped.
 
-    Files of pytest-benchmark, asv, Google Benchmark and github-action-benchmark are taken as run times, and asv's folder
-    of results, or the repository that holds it, as it is; so are records of any tool, as JSON lines or CSV, whose columns
-    are given a meaning. The compressed files of `tracker export --format months` come in, too.
+    Also reads files of pytest-benchmark, asv, Google Benchmark and github-action-benchmark, asv's folder of results or
+    the repository that contains it, records of any tool as JSON lines or CSV (--column), and the compressed files of
+    `tracker export --format months`.
     """
     from spook_tracker.tracker import importing
     from spook_tracker.tracker.document.errors import DocumentError
@@ -134,13 +139,13 @@ def schema(document: str) -> None:
 
 @click.group(epilog=example("tracker db check"))
 def db() -> None:
-    """Look after the database."""
+    """Maintain the database."""
 
 
 @db.command(epilog=example("tracker db upgrade --db sqlite:///tracker.db"))
 @database_option
 def upgrade(database: str) -> None:
-    """Bring the schema to the newest revision; of an older SQLite file a copy is kept."""
+    """Upgrade the schema to the newest revision; a copy of an older SQLite file is kept."""
     from spook_tracker.tracker.store.damage import told_of_damage
     from spook_tracker.tracker.store.database import head, open_database
 
@@ -152,7 +157,7 @@ def upgrade(database: str) -> None:
 @db.command(epilog=example("tracker db check"))
 @database_option
 def check(database: str) -> None:
-    """Read everything and say what is wrong; exit code 1 if anything is."""
+    """Check everything that is stored; exit code 1 if anything is wrong."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.cli.options import RED
     from spook_tracker.tracker.store.database import open_database
@@ -174,7 +179,7 @@ def check(database: str) -> None:
 @click.argument("source", metavar="FROM")
 @click.argument("target", metavar="TO")
 def copy(source: str, target: str) -> None:
-    """Copy a whole history into an empty database, of the other kind as well, without loss."""
+    """Copy a whole history into an empty database, also between SQLite and PostgreSQL, without loss."""
     from spook_tracker.tracker.store.damage import told_of_damage
     from spook_tracker.tracker.store.database_copy import copy_database
 
@@ -198,7 +203,7 @@ def partition(kind: Kind) -> None:
 @json_option
 @database_option
 def stats(as_json: bool, database: str) -> None:
-    """Say how much is stored."""
+    """Print how much is stored."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.store.damage import told_of_damage
     from spook_tracker.tracker.store.database import open_database
@@ -228,7 +233,7 @@ def stats(as_json: bool, database: str) -> None:
 @click.argument("run", metavar="RUN")
 @database_option
 def remove(run: str, database: str) -> None:
-    """Take one run out of the history for good: by its id, the start of it, or a version."""
+    """Remove a run from the history for good, named by id, start of id, or version."""
     from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.document.wording import clean, clock, version
     from spook_tracker.tracker.store.database import session_on
