@@ -54,6 +54,10 @@ Reason = Literal[  # the world's own, and no others
 ]
 
 
+class OutOfTime(Exception):
+    """The time of a first look is over: what is not known by then is left out."""
+
+
 class Estimate(float):
     """A value that a measurement gives together with what moves it, in its own unit.
 

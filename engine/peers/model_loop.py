@@ -104,7 +104,7 @@ class LoadedModel(ABC):
         self.run, self.step, self.limit = run, time_step, time_limit
         self.random = np.random.default_rng(run.seed)
         self.given = np.random.default_rng([run.model.seed, 1])
-        self.done = 0  # steps
+        self.done = self.total = 0  # steps taken, and to take
         self.chunk = CHUNK if time_limit is None else 1  # steps to the next look at the clock
         self.seconds = self.cpu = self.worst = 0.0
         self.failure = ""
@@ -162,6 +162,7 @@ class LoadedModel(ABC):
     def result(self, duration: float, load_seconds: float) -> Result:
         """Run for `duration` [s], or until all is sampled and calm, and read what is asked for."""
         run, total = self.run, round(duration / self.step)
+        self.total = total
         shapes = self.shapes() if run.shown else {}
         marks = {min(total, round(at / self.step)) for at in run.samples}
         looks = {total}
@@ -215,9 +216,9 @@ class LoadedModel(ABC):
             self.done += count
             if trouble := self.trouble():
                 self.failure = f"{trouble} before {self.done * self.step:.4g} s"
-            elif self.limit is not None and self.cpu > self.limit and self.done < to:
+            elif self.limit is not None and self.cpu > self.limit and self.done < self.total:
                 self.failure = (
-                    f"stopped after {self.limit:g} s, at {self.done * self.step:.4g} s of simulated time"
+                    f"stopped after {self.limit:.3g} s, at {self.done * self.step:.4g} s of simulated time"
                 )
 
     @property

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from spook_tracker.engine.model_file import ModelFile, ModelRun
 from spook_tracker.engine.result import Result
-from spook_tracker.scalar_tests.case import Simulate
+from spook_tracker.scalar_tests.case import OutOfTime, Simulate
 
 Array = npt.NDArray[np.float64]
 CHECKPOINTS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)  # s: they grow, as what differs does
@@ -63,6 +63,17 @@ def watched(asked: Asked, simulate: Simulate, rests: bool = True, refined: float
 def pushed(asked: Asked, simulate: Simulate, run: Result, seed: int) -> Result:
     """The same with pushes of the last bits in every step; until it has settled where `run` has."""
     return watched(asked, simulate, settles(run), push=PUSH, seed=seed)
+
+
+def in_time(runs: Iterator[Result]) -> list[Result]:
+    """As many of these as a first look has time for; OutOfTime where it is none."""
+    found: list[Result] = []
+    try:
+        found.extend(runs)
+    except OutOfTime:
+        if not found:
+            raise
+    return found
 
 
 def settles(run: Result) -> bool:

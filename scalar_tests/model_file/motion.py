@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from spook_tracker.engine.result import Result
-from spook_tracker.scalar_tests.case import Estimate, Metric, Seen, Simulate
+from spook_tracker.scalar_tests.case import Estimate, Metric, OutOfTime, Seen, Simulate
 from spook_tracker.scalar_tests.model_file.facts import (
     BEYOND,
     GRID,
@@ -19,6 +19,7 @@ from spook_tracker.scalar_tests.model_file.facts import (
     Array,
     Asked,
     apart,
+    in_time,
     pushed,
     settles,
     simulated,
@@ -79,14 +80,18 @@ def metrics(asked: Asked) -> tuple[Metric, ...]:
 
 
 def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
-    """One run, the same with pushes of the last bits in every step, and one with half the time step."""
+    """One run, the same with pushes of the last bits in every step, and one with half the time step; of these what there is
+    time for."""
     end, times = asked.checkpoints[-1], times_of(asked)
     run = watched(asked, simulate)
     if not run.completed:  # which may be later than its motion is read
         run = watched(asked, simulate, rests=False)
     place, turn, size = _read(run), _turned(run), float(run["size"])
-    others = [pushed(asked, simulate, run, seed) for seed in range(1, PUSHED + 1)]
-    halved = watched(asked, simulate, settles(run), refined=2)
+    others = in_time(pushed(asked, simulate, run, seed) for seed in range(1, PUSHED + 1))
+    try:
+        halved = watched(asked, simulate, settles(run), refined=2)
+    except OutOfTime:
+        halved = None
     grown = np.max(
         [_grown(run, other, size) for other in others], axis=0
     )  # of any watched body, at each time, m
@@ -103,15 +108,18 @@ def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
                 found[f"{body.label}.{name}@{at:g}s"] = Estimate(
                     value,
                     rounding=math.inf if at >= known and len(lost) else BEYOND * max(moved, PUSH * unit),
-                    step_error=_apart(read(halved), row, column, value),
+                    step_error=None if halved is None else _apart(read(halved), row, column, value),
                     scale=unit,
                 )
     chaotic = len(lost) > 0
-    if chaotic:  # of the end only a distribution says anything: more of it
-        others += [
-            simulated(simulate, asked, end, samples=(0.0, end), push=PUSH, seed=seed)
-            for seed in range(PUSHED + 1, DRAWN + 1)
-        ]
+    try:
+        if chaotic:  # of the end only a distribution says anything: more of it
+            others += [
+                simulated(simulate, asked, end, samples=(0.0, end), push=PUSH, seed=seed)
+                for seed in range(len(others) + 1, DRAWN + 1)
+            ]
+    except OutOfTime:
+        return found
     ends = np.array([_read(other)[-1] for other in others if other.completed])
     for column, body in enumerate(asked.model.watched):
         drawn = ends[:, column] if len(ends) else np.zeros(0)

@@ -72,6 +72,16 @@ def test_of(
         "how much.",
         source="the model's own file",
         measurements=(
+            # what tells most comes first: a first look ends after a time, and two processes share the runs of a rest
+            part(
+                "rest",
+                rest.metrics(asked, stands_free),
+                rest.measure,
+                "as the file has it, until all rests",
+                held=may_rest,
+            ),
+            part("cost", cost.COST, cost.cost, "the clock looked at after each step"),
+            part("repeated", cost.REPEATABILITY, cost.repeatability, "three times the same"),
             part("motion", motion.metrics(asked), motion.measure, "as the file has it"),
             part(
                 "books",
@@ -84,15 +94,6 @@ def test_of(
                 (ladder.RESOLVED_TIME,),
                 ladder.resolved,
                 "with Runge-Kutta, an eighth and a sixteenth of the step",
-            ),
-            part("repeated", cost.REPEATABILITY, cost.repeatability, "three times the same"),
-            part("cost", cost.COST, cost.cost, "the clock looked at after each step"),
-            part(  # after what another process does meanwhile: it reads the runs of the first
-                "rest",
-                rest.metrics(asked, stands_free),
-                rest.measure,
-                "as the file has it, until all rests",
-                held=may_rest,
             ),
         ),
         figures=figures.figures(asked),

@@ -35,7 +35,7 @@ ELSEWHERE = {  # what asks for another engine, a server, or minutes, and the tes
     "tracker ci change --history history --comment comment.md": "tests/team/test_workflow.py",
     "tracker run pendulum n_pendulum resting_stack --engine spook,mujoco --sweep": "tests/engine/peers/test_mujoco.py",
     "tracker backfill --engine mujoco --newest 3": "tests/tracker/measure/test_releases.py",
-    "tracker run --model robot.xml --engine mujoco --all": "tests/docs/test_upgrade.py",
+    "tracker run --model robot.xml --engine mujoco": "tests/docs/test_upgrade.py",
     "tracker backfill --engine mujoco 3.3.7 3.4.0 --model robot.xml": "tests/docs/test_upgrade.py",
     "tracker models gymnasium --engine mujoco": "tests/tracker/measure/test_model_packages.py",
     "tracker backfill --engine mujoco 3.3.7 3.4.0": "tests/docs/test_upgrade.py",

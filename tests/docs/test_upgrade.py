@@ -71,8 +71,10 @@ def test_the_page_goes_as_it_says_and_finds_what_the_release_changed(team: Path)
     """Then a release that does the same as the one before it, and one that is asked again, and about another model."""
     look, backfill, publish, *_ = (line for line in typed(PAGE) if line.startswith("tracker "))
 
-    seen, asked, published = invoke(look), invoke(backfill), invoke(publish)
+    short, seen, asked, published = invoke(look), invoke(f"{look} --all"), invoke(backfill), invoke(publish)
 
+    assert "can be predicted for" in short.output
+    assert "left out" not in short.output
     assert (seen.exit_code, asked.exit_code, published.exit_code) == (0, 0, 0), seen.output + asked.output
     for name in ("ball.rest_z", "arm.place@0.5s", "differing_runs", "step_time"):
         assert name in seen.output

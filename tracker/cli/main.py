@@ -27,6 +27,7 @@ from spook_tracker.tracker.cli.options import (
     example,
     executor_option,
     limit_option,
+    look,
     pages_options,
     recorded,
     refuse_unwritable,
@@ -84,7 +85,7 @@ def _print_versions() -> None:
 
 
 all_option = click.option(
-    "--all", "everything", is_flag=True, help="Print every limit and value instead of a line per test."
+    "--all", "everything", is_flag=True, help="Print every limit and value; ask everything of a --model."
 )
 
 
@@ -126,6 +127,7 @@ def run_command(
 ) -> None:
     """Run scalar tests (all, or those named) on one or more engines, print the pass tables and record the runs."""
     from spook_tracker.tracker.cli.console import say
+    from spook_tracker.tracker.cli.report_table import red as broken
     from spook_tracker.tracker.measure.questions import EngineUnavailable
     from spook_tracker.tracker.measure.request import Request
 
@@ -139,6 +141,7 @@ def run_command(
         memory_limit=memory << 20,
         time_limit=time_limit,
         executor=executor,
+        look=None if everything or sweep or stability or figures else look(),
     )
     names = engine.split(",")
     red, kept = False, True
@@ -159,7 +162,7 @@ def run_command(
             from spook_tracker.tracker.cli.report_junit import junit_of_run
 
             kept &= write(_of_engine(junit_file, name, names), junit_of_run(document))
-        red = red or _red(document)
+        red = red or bool(broken(document))
     _end(red, kept)
 
 
@@ -443,6 +446,8 @@ def _measure(
             record(session, ended.document)
             ended.recorded = True
             raise
+        if document.partial:  # a first look that is not whole is no history
+            return document
         record(session, document)
     recorded(document.id)
     return document
@@ -470,12 +475,6 @@ def _answered(document: RunDocument) -> bool:
     if why := nothing_measured(document):
         complain(why)
     return not why
-
-
-def _red(document: RunDocument) -> bool:
-    from spook_tracker.tracker.cli.report_table import red
-
-    return bool(red(document))
 
 
 def _say_published(report: Report, out: Path) -> None:

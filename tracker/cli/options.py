@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 import click
 
 import spook_tracker.tracker.cli.settings as tracker_toml
-from spook_tracker.tracker.measure.bounds import MEMORY, TIME_LIMIT
+from spook_tracker.tracker.measure.bounds import LOOK, MEMORY, TIME_LIMIT
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.website.options import SiteOptions
@@ -112,6 +112,13 @@ def _catalogue(context: click.Context, option: click.Parameter, names: str) -> s
         return names
     named = context.get_parameter_source(str(option.name)) is click.core.ParameterSource.COMMANDLINE
     return ",".join([names] * named + [*models])
+
+
+def look() -> float | None:
+    """Seconds of the processor for a first look, where models on the command line are all that is asked."""
+    context = click.get_current_context()
+    beside = context.get_parameter_source("catalogue") is click.core.ParameterSource.COMMANDLINE
+    return LOOK if context.meta.get(MODELS) and not beside else None
 
 
 def model_option(command: Command) -> Command:

@@ -12,6 +12,7 @@ import click
 from spook_tracker.tracker.cli.console import NARROW, Column, Style, cells, clean, table, width
 from spook_tracker.tracker.cli.report_sweep import sweep_table
 from spook_tracker.tracker.document.run_document import (
+    LEFT_OUT,
     MapData,
     RunDocument,
     Sample,
@@ -25,6 +26,7 @@ from spook_tracker.tracker.judge.vocabulary import CLASSES
 
 NAMED = 24  # columns that tell one metric's configurations apart; where fewer are left, the margin goes
 ROLES = {"gate": 0, "companion": 1, "reported": 2, "explaining": 3}
+OF_MODELS = ("differing_runs", "predictable_time", "real_time_factor")
 Pair = tuple[SeriesDefinition, Sample]
 
 
@@ -137,13 +139,19 @@ def pass_table(run: RunDocument, everything: bool = False, room: int | None = No
 
 
 def model_looks(run: RunDocument) -> list[str]:
-    """Of each model file a line: how it ends, how long it can be predicted, what it costs, what broke off."""
-    of_models = {one.test for one in run.series if one.metric == "predictable_time"}
+    """Of each model file a line: how it ends, how long it can be predicted, what it costs, what broke off; and what a first
+    look left out."""
+    of_models = {one.test for one in run.series if one.metric in OF_MODELS}
     found: dict[str, list[Pair]] = {}
     for pair in pairs(run):
         if pair[0].test in of_models and (pair[0].kind == "scalar" or _asked_alone(pair[0])):
             found.setdefault(pair[0].test, []).append(pair)
-    return [f"{test}: {said}" for test, of_test in found.items() if (said := _look(of_test))]
+    looks = [f"{test}: {said}" for test, of_test in found.items() if (said := _look(of_test))]
+    return looks + [
+        clean(f"{card.name}: left out of this first look: {card.lacks[LEFT_OUT]}; --all asks for it, too")
+        for card in run.tests
+        if LEFT_OUT in card.lacks
+    ]
 
 
 def _look(of_test: Sequence[Pair]) -> str:

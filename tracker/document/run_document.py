@@ -293,6 +293,9 @@ class Trajectory(Struct, frozen=True, kw_only=True):
     channels: tuple[Channel, ...] = ()
 
 
+LEFT_OUT = "look"
+
+
 class TestCard(Struct, frozen=True, kw_only=True):
     """What a page says about a test, as it was worded in this run."""
 
@@ -310,7 +313,7 @@ class TestCard(Struct, frozen=True, kw_only=True):
     seven: bool
     stages: tuple[StageChoice, ...]
     scene: SceneDrawing | None = None
-    lacks: dict[Name, Text] = {}  # why it has no "ladder", or no "stability"
+    lacks: dict[Name, Text] = {}  # why it has no "ladder" or "stability"; what a "look" left out
     saving: Saving | None = None  # None: not measured
     measured: bool = False  # its right answer was measured in the world: validation, not verification
 

@@ -24,6 +24,7 @@ from spook_tracker.scalar_tests.case import (
     Figure,
     Measurement,
     Metric,
+    OutOfTime,
     ScalarTest,
     Simulate,
     StabilityMap,
@@ -107,9 +108,11 @@ class NoAnswer(Exception):
 
 
 def ask(question: Callable[[], Any]) -> Outcome:
-    """Call a test's function; any exception becomes an outcome with one sentence."""
+    """Call a test's function; any exception but OutOfTime becomes an outcome with one sentence."""
     try:
         return Outcome(question())
+    except OutOfTime:
+        raise  # of a first look, which leaves it out
     except SimulationFailed as failure:
         status = failure.result.status
         if status == "completed" or status == "unsettled":  # both kept their values

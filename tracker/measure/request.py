@@ -26,6 +26,7 @@ class Request:
     trigger: Trigger = "manual"
     workers: int = 2  # processes, each watched; 0: in this one, where nothing can be ended
     time_limit: float = TIME_LIMIT  # s for one piece of work
+    look: float | None = None  # s of the processor that a process has for a test; what is left is left out
     memory_limit: int = MEMORY << 20  # bytes for one piece of work
     repeats: int | Repeats = 5  # of each timing
     apart: bool = (

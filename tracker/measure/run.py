@@ -23,9 +23,10 @@ import msgspec
 
 import spook_tracker.engine as ours
 import spook_tracker.tracker.measure.executors as executors
+import spook_tracker.tracker.measure.first_look as first_look
 import spook_tracker.tracker.measure.trajectory as motion
 import spook_tracker.tracker.measure.workers as crew
-from spook_tracker.scalar_tests.case import ScalarTest, Simulate
+from spook_tracker.scalar_tests.case import OutOfTime, ScalarTest, Simulate
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import (
     Asked,
@@ -71,7 +72,7 @@ from spook_tracker.tracker.measure.request import Watch as Watch
 from spook_tracker.tracker.measure.run_times import Timed, run_times
 
 Part = Measured | FigureData | MapData | Trajectory
-Parts = tuple[Part | ladders.ErrorPoints, ...]  # of a piece of work
+Parts = tuple[Part | ladders.ErrorPoints | first_look.LeftOut, ...]  # of a piece of work
 
 
 Kind = Literal["measure", "figure", "trajectory", "study", "ladder"]
@@ -127,7 +128,10 @@ def run(source: Questions, request: Request, watch: Watch = lambda progress: Non
         tasks = [task for task in tasks if task.test in finished]
         document = _document(source, request, started, version, finished, tasks, parts, workers, timed)
         raise Interrupted(msgspec.structs.replace(document, partial=True), len(tests)) from None
-    return _document(source, request, started, version, tests, tasks, parts, workers, timed)
+    document = _document(source, request, started, version, tests, tasks, parts, workers, timed)
+    if document.partial and not document.samples:
+        raise RunError(f"nothing was measured: {first_look.why_nothing(document)}")
+    return document
 
 
 def _errors(tasks: Iterable[Task], parts: Mapping[int, Parts]) -> Errors:
@@ -154,8 +158,11 @@ def _document(
     figures: list[FigureData] = []
     maps: list[MapData] = []
     trajectories: list[Trajectory] = []
+    left: list[first_look.LeftOut] = []
     for part in (part for task in tasks for part in parts[task.position]):
-        if isinstance(part, FigureData):
+        if isinstance(part, first_look.LeftOut):
+            left.append(part)
+        elif isinstance(part, FigureData):
             figures.append(fitted_figure(part))
         elif isinstance(part, MapData | Trajectory):
             if not unfit(part):  # a map that is not there is told of as lost
@@ -165,6 +172,7 @@ def _document(
     measured = [(series, fitted(sample)) for series, sample in (*measured, *timed[0])]
     _refuse_doubles(series.key for series, _ in measured)
     engine = source.module()
+    cards = (test_card(name, test, engine, timed[1].get(name)) for name, test in tests.items())
     return RunDocument(
         schema_version=1,
         id=(identity := str(uuid.uuid4())),
@@ -176,12 +184,15 @@ def _document(
         ci_address=ci_address(os.environ),
         engine=version,
         machine=machine(),
-        tests=tuple(test_card(name, test, engine, timed[1].get(name)) for name, test in tests.items()),
+        tests=tuple(
+            msgspec.structs.replace(card, lacks=card.lacks | first_look.told(card, left)) for card in cards
+        ),
         series=with_aliases((series for series, _ in measured), tests),
         samples=tuple(sample for _, sample in measured),
         figures=tuple(figures),
         maps=tuple(maps),
         trajectories=tuple(trajectories),
+        partial=bool(left),
         asked=_asked(source, request),
         workers=tuple(
             Worker(
@@ -231,19 +242,37 @@ def _test_of(task: Task) -> str:
     return task.test
 
 
-def perform(source: Questions, task: Task, shared: Path | None = None) -> Parts | crew.Lost:
+def perform(
+    source: Questions, task: Task, shared: Path | None = None, look: float | None = None
+) -> Parts | crew.Lost:
     """Do one piece of work in this process; whatever it throws costs this piece alone. `shared` is a folder of all
-    processes that are at work on these tests."""
+    processes that are at work on these tests, `look` as a request says it."""
     try:
-        return _performed(source, task, shared)
+        if look is None:
+            return _performed(source, task, source.simulate(), shared)
+        return _looked(source, task, first_look.look(task.test, source.simulate(), look), shared)
     except TrackerError:
         raise
     except Exception as error:
         return crew.Lost("crashed", sentence(f"the answer cannot be taken: {type(error).__name__}: {error}"))
 
 
-def _performed(source: Questions, task: Task, shared: Path | None) -> Parts:
-    test, simulate = source.tests()[task.test], source.simulate()
+def _looked(source: Questions, task: Task, look: first_look.Look, shared: Path | None) -> Parts:
+    """The same, or what of it was left out."""
+    measured = source.tests()[task.test].measurements
+    name = measured[task.index[0]].configuration if task.kind == "measure" else "replay"
+    try:
+        parts = _performed(source, task, look, shared)
+    except OutOfTime as over:
+        return (first_look.LeftOut(task.test, name, False, str(over)),)
+    if not look.why:
+        return parts
+    known = [tuple((s, m) for s, m in p if m.outcome != "missing") for p in parts if isinstance(p, tuple)]
+    return (*known, first_look.LeftOut(task.test, name, True, ""))
+
+
+def _performed(source: Questions, task: Task, simulate: Simulate, shared: Path | None) -> Parts:
+    test = source.tests()[task.test]
     simulate = of_test(task.test, simulate, source.module() is ours, shared)
     first = task.index[0]
     if task.kind == "measure":
@@ -280,10 +309,12 @@ def _perform_all(
     `workers` counts the answers of each machine of an executor.
     """
     left = {name: sum(task.test == name for task in tasks) for name in tests}
-    found: Iterator[tuple[Task, Parts | crew.Lost]] = ((task, perform(source, task)) for task in tasks)
+    found: Iterator[tuple[Task, Parts | crew.Lost]] = (
+        (task, perform(source, task, look=request.look)) for task in tasks
+    )
     if request.executor != executors.PROCESS:
         at_work = (
-            partial(perform, source),
+            partial(perform, source, look=request.look),
             tasks,
             partial(_place, source),
             lambda machine: workers.update([machine]),
@@ -291,7 +322,7 @@ def _perform_all(
         found = executors.answers(request.executor, *at_work)
     elif request.workers:
         limits = crew.Limits(seconds=request.time_limit, memory=request.memory_limit)
-        found = _answers(source, tasks, request.workers, limits)
+        found = _answers(source, tasks, request, limits)
     for done, (task, parts) in enumerate(found, start=1):
         if isinstance(parts, crew.Lost):
             parts = _lost(task, tests[task.test], parts)
@@ -308,12 +339,11 @@ def _perform_all(
 
 
 def _answers(
-    source: Questions, tasks: Sequence[Task], workers: int, limits: crew.Limits
+    source: Questions, tasks: Sequence[Task], request: Request, limits: crew.Limits
 ) -> Iterator[tuple[Task, Parts | crew.Lost]]:
     with TemporaryDirectory(prefix="tracker-runs-") as shared:
-        yield from crew.answers(
-            partial(perform, source, shared=Path(shared)), tasks, workers, limits, _test_of
-        )
+        work = partial(perform, source, shared=Path(shared), look=request.look)
+        yield from crew.answers(work, tasks, request.workers, limits, _test_of)
 
 
 def _place(source: Questions) -> executors.Place:
