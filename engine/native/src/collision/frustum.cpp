@@ -39,7 +39,10 @@ double circle_angle(int k, int parts) noexcept { return std::numbers::pi * (2.0 
 struct Around {
     double a, b, r, p, m, w;
 
-    double slope(SineCosine turn, double& bend) const noexcept {
+    struct Look {
+        double value, slope, bend;
+    };
+    Look at(SineCosine turn) const noexcept {
         const double s = turn.sine, c = turn.cosine, v = p * m * s - w;
         const double q = p * p * c * c + v * v, root = std::sqrt(q);
         double first = b * c - a * s, second = -a * c - b * s;
@@ -49,32 +52,44 @@ struct Around {
             const double turned = p * p * (s * s - c * c + m * m * c * c) - p * m * s * v;  // q″/2
             second -= r * (turned - half * half / q) / root;
         }
-        bend = second;
-        return first;
+        return {a * c + b * s - r * root, first, second};
     }
 
-    /// Calls visit(cos φ, sin φ) at every local maximum on the whole circle.
-    template <class Visit> void peaks(Visit visit) const noexcept {
+    /// Calls visit(cos φ, sin φ) at every local maximum on the whole circle but those that `below` excludes: it is told what two
+    /// looks see, where, and the turn from one to the other.
+    template <class Below, class Visit> void peaks(Below below, Visit visit) const noexcept {
         if (r == 0.0) return apex(visit);
         constexpr int parts = 16;
-        double bend, before = slope(circle().turns[0], bend);
-        const double first = before;  // and last: rounding may not part the circle from itself
+        const SineCosine* turn = circle().turns;
+        const SineCosine part = turn[Circle::count / 2 + Circle::count / parts];
+        Look before = at(turn[0]);
+        const Look first = before;  // and last: rounding may not part the circle from itself
         for (int k = 1; k <= parts; ++k) {
-            const double start = before;
-            before = k < parts ? slope(circle().turns[k * Circle::count / parts], bend) : first;
-            if (start > 0.0 && before <= 0.0) peak(circle_angle(k - 1, parts), circle_angle(k, parts), visit);
+            const Look start = before;
+            const SineCosine from = *turn;
+            turn += Circle::count / parts;
+            before = k < parts ? at(*turn) : first;
+            if (start.slope > 0.0 && before.slope <= 0.0 && !below(start, from, before, *turn, part))
+                peak(circle_angle(k - 1, parts), circle_angle(k, parts), visit);
         }
     }
     /// The same from one angle to another.
-    template <class Visit> void peaks(double from, double to, Visit visit) const noexcept {
+    template <class Below, class Visit>
+    void peaks(double from, double to, Below below, Visit visit) const noexcept {
         if (r == 0.0) return apex(visit);
         const int parts = 1 + static_cast<int>(8.0 * (to - from) / std::numbers::pi);
         const double part = (to - from) / parts;
-        double bend, before = slope(sine_cosine(from), bend);
+        SineCosine next = sine_cosine(from);
+        const SineCosine width = sine_cosine(part);
+        Look before = at(next);
         for (int k = 0; k < parts; ++k) {
-            const double start = before, low = from + k * part;
-            before = slope(sine_cosine(low + part), bend);
-            if (start > 0.0 && before <= 0.0) peak(low, low + part, visit);
+            const Look start = before;
+            const SineCosine turn = next;
+            const double low = from + k * part;
+            next = sine_cosine(low + part);
+            before = at(next);
+            if (start.slope > 0.0 && before.slope <= 0.0 && !below(start, turn, before, next, width))
+                peak(low, low + part, visit);
         }
     }
 
@@ -84,11 +99,11 @@ private:
         if (most > 0.0) visit(a / most, b / most);
     }
     template <class Visit> void peak(double low, double high, Visit visit) const noexcept {
-        double bend, angle = 0.5 * (low + high);
+        double angle = 0.5 * (low + high);
         for (int round = 0; round < 80; ++round) {
-            const double here = slope(sine_cosine(angle), bend);
-            (here > 0.0 ? low : high) = angle;
-            double next = angle - here / bend;
+            const Look here = at(sine_cosine(angle));
+            (here.slope > 0.0 ? low : high) = angle;
+            double next = angle - here.slope / here.bend;
             // Steps round a kink can go to and fro for ever: after a few every second one halves.
             const bool halves = round > 8 && round % 2 != 0;
             if (halves || !(next > low && next < high)) next = 0.5 * (low + high);
@@ -101,6 +116,14 @@ private:
     }
 };
 
+/// The most of value cos Δ + slope sin Δ over a turn Δ of less than a right angle. The gap of convex shapes, a concave function of
+/// the direction's length and turn, is nowhere more, if this is what it is and how it changes at Δ = 0.
+double most_along(double value, double slope, SineCosine turn) noexcept {
+    const double there = value * turn.cosine + slope * turn.sine;
+    return slope > 0.0 && slope * turn.cosine < value * turn.sine ? length(value, slope)
+                                                                  : std::max(value, there);
+}
+
 /// Collects axes; `gap` gives the gap along a direction.
 template <class Gap> struct Search {
     Gap gap;
@@ -109,6 +132,8 @@ template <class Gap> struct Search {
 
     void flat(Vec3 n) noexcept { improve(found.flat, n, -1); }
     void curved(Vec3 n, int edge = -1) noexcept { improve(found.curved, n, edge); }
+    /// What is below it is neither the best axis of all nor, where a flat one is better, of its kind.
+    double least() const noexcept { return std::max(found.flat.gap, found.curved.gap); }
 
 private:
     void improve(PartingAxis& best, Vec3 n, int edge) noexcept {
@@ -138,9 +163,10 @@ template <class Gap> void meet_corner(Search<Gap>& search, const Frustum& frustu
     }
 }
 
-/// `left` and `right` are the normals of the faces the edge parts: directions between them alone have it nearest.
+/// `left` and `right` are the normals of the faces the edge parts: directions between them alone have it nearest. `beside`, a point
+/// of the other as well, may be nearer than the edge.
 template <class Gap>
-void meet_edge(Search<Gap>& search, const Frustum& frustum, Vec3 from, Vec3 to, const Vec3* left,
+void meet_edge(Search<Gap>& search, const Frustum& frustum, Vec3 from, Vec3 to, Vec3 beside, const Vec3* left,
                const Vec3* right, int edge) noexcept {
     const Vec3 along = to - from;
     const double length = norm(along);
@@ -164,12 +190,26 @@ void meet_edge(Search<Gap>& search, const Frustum& frustum, Vec3 from, Vec3 to, 
         if (low > high) std::swap(low, high);
         if (high - low > std::numbers::pi) low += 2.0 * std::numbers::pi, std::swap(low, high);
     }
+    const double aside = dot(u, beside - from), above = dot(v, beside - from);
     for (int i = 0; i < 2; ++i) {
         const Vec3 between = from - frustum.centre[i];
         const Around around{dot(u, between), dot(v, between), frustum.radius[i], 1.0, m, 0.0};
+        const double rounding = surely * (norm(from) + norm(between) + frustum.radius[i] + length);
+        const auto below = [&](const Around::Look& one, SineCosine at_one, const Around::Look& two,
+                               SineCosine at_two, SineCosine turn) {
+            const double least = search.least() - rounding;
+            if (most_along(one.value, one.slope, turn) < least ||
+                most_along(two.value, -two.slope, turn) < least)
+                return true;
+            const double near = one.value + aside * at_one.cosine + above * at_one.sine,
+                         far = two.value + aside * at_two.cosine + above * at_two.sine;
+            const double near_slope = one.slope - aside * at_one.sine + above * at_one.cosine,
+                         far_slope = two.slope - aside * at_two.sine + above * at_two.cosine;
+            return most_along(near, near_slope, turn) < least || most_along(far, -far_slope, turn) < least;
+        };
         const auto visit = [&](double c, double s) { search.curved(c * u + s * v, edge); };
-        if (whole) around.peaks(visit);
-        else around.peaks(low, high, visit);
+        if (whole) around.peaks(below, visit);
+        else around.peaks(low, high, below, visit);
     }
 }
 
@@ -184,7 +224,8 @@ void side_and_rims(Search<Gap>& search, const Frustum& one, const Frustum& other
         const Vec3 between = other.centre[i] - one.centre[0];
         const Around around{
             width * dot(u, between), width * dot(v, between), other.radius[i], width, m, one.sine * k};
-        around.peaks([&](double c, double s) {
+        const auto never = [](auto&&...) { return false; };
+        around.peaks(never, [&](double c, double s) {
             search.curved(sign * (width * (c * u + s * v) + one.sine * one.axis));
         });
     }
@@ -372,14 +413,14 @@ PartingAxes parting_axes(const Frustum& frustum, const Facets& other, double mar
     search.flat(frustum.axis);
     search.flat(-frustum.axis);
     for (int k = 0; k < other.face_count; ++k) search.flat(-other.normals[k]);
-    if (search.found.all.gap > margin) return search.found;
-    for (int k = 0; k < other.corner_count; ++k) meet_corner(search, frustum, other.corners[k]);
-    for (int k = 0; k < other.edge_count; ++k) {
+    const auto parted = [&] { return search.found.all.gap > margin; };
+    for (int k = 0; k < other.corner_count && !parted(); ++k) meet_corner(search, frustum, other.corners[k]);
+    for (int k = 0; k < other.edge_count && !parted(); ++k) {
         const Polytope::Edge& edge = other.edges[k];
         const bool faces = other.shape != nullptr;
         meet_edge(search, frustum, other.corners[edge.from], other.corners[edge.to],
-                  faces ? &other.normals[edge.left] : nullptr, faces ? &other.normals[edge.right] : nullptr,
-                  k);
+                  other.corners[(k + 2) % other.corner_count], faces ? &other.normals[edge.left] : nullptr,
+                  faces ? &other.normals[edge.right] : nullptr, k);
     }
     return search.found;
 }

@@ -7,7 +7,7 @@ namespace spook {
 
 /// A lower bound of the distance of two shapes along a fixed direction: no point of the first lies nearer to the
 /// second along `normal` (unit, from second to first) than `gap` [m]. Positive exactly if they are apart; minus
-/// the least overlap among the directions tried if not. Of two solids that a face parts by more than `far`, no more is sought.
+/// the least overlap among the directions tried if not. What some direction parts by more than `far` may be farther apart.
 struct Separation {
     double gap = 0.0;
     Vec3 normal;

@@ -27,7 +27,8 @@ inline constexpr std::size_t most_grown = 256;  // bodies looked for one by one:
 // frustum.cpp
 namespace tolerances::frustum {
 inline constexpr double parallel = 1e-9;  // sine of an angle that is none
-}
+inline constexpr double surely = 1e-11;   // of the size: what is less than the best by more is so exactly
+}  // namespace tolerances::frustum
 
 // overlay.cpp
 namespace tolerances::overlay {

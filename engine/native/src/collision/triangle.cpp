@@ -73,7 +73,7 @@ unsigned Triangle::hidden(Vec3 n) const noexcept {
     return found;
 }
 
-TriangleAxes parting_axes(const Triangle& triangle, const Facets& other) noexcept {
+TriangleAxes parting_axes(const Triangle& triangle, const Facets& other, double margin) noexcept {
     const Facets& own = triangle.facets;
     TriangleAxes axes;
     const auto consider = [&](Vec3 n, PartingAxis& best, int edge = -1) noexcept {
@@ -88,7 +88,7 @@ TriangleAxes parting_axes(const Triangle& triangle, const Facets& other) noexcep
     consider(triangle.normal, axes.flat);
     consider(-triangle.normal, axes.flat);
     for (int k = 0; k < other.face_count; ++k) consider(-other.normals[k], axes.flat);
-    for (int i = 0; i < 3; ++i) {
+    for (int i = 0; i < 3 && !(axes.all.gap > margin); ++i) {
         const Vec3 from = own.corners[i], way = own.corners[(i + 1) % 3] - from;
         for (int j = 0; j < other.edge_count; ++j) {
             const Vec3 start = other.corners[other.edges[j].from],
@@ -112,8 +112,8 @@ TriangleAxes parting_axes(const Triangle& triangle, const Facets& other) noexcep
     return axes;
 }
 
-TriangleAxes parting_axes(const Triangle& triangle, const Frustum& other) noexcept {
-    const PartingAxes found = parting_axes(other, triangle.facets, 1e300, &triangle);
+TriangleAxes parting_axes(const Triangle& triangle, const Frustum& other, double margin) noexcept {
+    const PartingAxes found = parting_axes(other, triangle.facets, margin, &triangle);
     const auto turned = [](PartingAxis axis) noexcept {
         axis.normal = -axis.normal;
         return axis;

@@ -25,11 +25,12 @@ private:
     bool below(int corner, int from, Vec3 n) const noexcept;
 };
 
-/// Axes from a triangle to the other. `all` holds the best of any kind, the others genuine ones only.
+/// Axes from a triangle to the other. `all` holds the best of any kind, the others genuine ones only. Stops where one exceeds
+/// `margin` [m].
 struct TriangleAxes {
     PartingAxis all, flat, curved;
 };
-TriangleAxes parting_axes(const Triangle& triangle, const Facets& other) noexcept;
-TriangleAxes parting_axes(const Triangle& triangle, const Frustum& other) noexcept;
+TriangleAxes parting_axes(const Triangle& triangle, const Facets& other, double margin) noexcept;
+TriangleAxes parting_axes(const Triangle& triangle, const Frustum& other, double margin) noexcept;
 
 }  // namespace spook

@@ -25,7 +25,7 @@ template <class Other, class Facing, class Line>
 Manifold meet(const Triangle& triangle, const Other& other, Vec3 centre, double radius, double thickness,
               double margin, Facing facing_of, Line line_of) noexcept {
     if (!(dot(triangle.normal, centre - triangle.facets.corners[0]) > 0.0)) return {};
-    const TriangleAxes axes = parting_axes(triangle, other);
+    const TriangleAxes axes = parting_axes(triangle, other, margin);
     if (axes.all.gap > margin) return {};
     const double slop = overlay_slop * thickness;
     // Apart, only what is nearest counts: else another point of the two would arrive before those named here.

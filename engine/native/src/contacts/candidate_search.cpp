@@ -113,11 +113,11 @@ void CandidateSearch::look_at(const IndexPair& pair, const StepMotion& motion, C
     const double reach = margins_.search()[first.body] + margins_.search()[second.body];
     const OpenPair open = opened(pair, separation(first.shape, detection.pose(pair.first), second.shape,
                                                   detection.pose(pair.second), reach));
+    if (open.apart.gap > reach) return;
     const bool solids = first.shape.faceted() && second.shape.faceted();
-    if (open.apart.gap > reach && solids) return;
     const double size = std::max(bodies.radius[first.body], bodies.radius[second.body]);
     if (!first.shape.faceted() && !second.shape.faceted() && open.apart.gap > 1e-6 * size) {
-        if (open.apart.gap <= reach) open_.pairs.push_back(open);  // clearly apart: no need for its points
+        open_.pairs.push_back(open);  // clearly apart: no need for its points
         return;
     }
     scratch_.clear();
