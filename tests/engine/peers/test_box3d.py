@@ -34,7 +34,6 @@ from spook_tracker.engine.find import EngineMissing, find
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.scalar_tests import resting_stack
 from spook_tracker.scalar_tests.inclined_plane.scene import scene as inclined
-from tests.scenes import peer as peer_scenes
 
 try:
     BOX3D = find("box3d")
@@ -46,11 +45,6 @@ GRAVITY = (0.0, 0.0, -9.81)
 GROUND = RigidBody(
     name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=Material(friction=0.5)
 )
-
-
-def test_a_fall_is_symplectic_euler_of_its_substeps() -> None:
-    """g T h / 2 too far for one step of h; twenty in it, and it is a twentieth."""
-    assert peer_scenes.fall_error(BOX3D.simulate, STEP) == pytest.approx(9.81 * STEP / 20.0, abs=2e-3)
 
 
 def test_contacts_of_a_stack_carry_what_lies_above() -> None:
@@ -108,14 +102,6 @@ def test_a_ball_bounces_by_its_restitution_and_the_larger_counts() -> None:
     run = BOX3D.simulate(Scene(bodies=(GROUND, ball)), time_step=STEP, duration=0.2, observe=seen)
 
     assert float(run["v"][2]) == pytest.approx(2.0, rel=1e-3)
-
-
-def test_bodies_that_must_not_touch_do_not() -> None:
-    body = RigidBody(name="body", mass=1.0, shape=Sphere(0.5), position=(0.0, 0.0, 0.5))
-    scene = Scene(bodies=(GROUND, body), gravity=GRAVITY, no_contact=(("body", "ground"),))
-    run = BOX3D.simulate(scene, time_step=STEP, duration=1.0, observe={"x": Final(quantity=Position("body"))})
-
-    assert float(run["x"][2]) < -4.0
 
 
 @pytest.mark.parametrize(("kind", "place"), [(Hinge, 5), (Prismatic, 2)])

@@ -8,13 +8,9 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import (
-    Ball,
     Box,
     ConstraintForce,
     Distance,
-    Final,
-    Hinge,
-    Lock,
     Material,
     MaximumAbsolute,
     Particle,
@@ -23,7 +19,6 @@ from spook_tracker.engine import (
     RigidBody,
     Scene,
     Trace,
-    Velocity,
     Violation,
     simulate,
 )
@@ -85,47 +80,6 @@ def test_the_tension_of_a_rod_is_that_of_the_method() -> None:
     assert np.abs(ours - theirs).max() < 1e-8
 
 
-def test_a_fall_has_the_error_of_the_symplectic_step() -> None:
-    ball = Particle(name="ball", mass=2.0, position=(0.0, 0.0, 0.0), velocity=(1.0, 0.0, 0.0))
-    scene = Scene(bodies=(ball,), gravity=GRAVITY)
-    observe = {"place": Final(quantity=Position("ball")), "speed": Final(quantity=Velocity("ball"))}
-    run = CANNON.simulate(scene, time_step=STEP, steps=120, observe=observe)
-
-    assert run["place"][2] == pytest.approx(-0.5 * 9.81 * 2.0 * (2.0 + STEP), rel=1e-12)
-    assert run["place"][0] == pytest.approx(2.0, rel=1e-12)
-    assert run["speed"][2] == pytest.approx(-9.81 * 2.0, rel=1e-12)
-
-
-@pytest.mark.parametrize("kind", [Ball, Hinge, Lock])
-def test_a_joint_holds_a_hanging_box(kind: Any) -> None:
-    box = RigidBody(name="box", mass=2.0, shape=Box((0.2, 0.2, 0.2)), position=(0.0, 0.0, -1.0))
-    more = {"axis": (0.0, 1.0, 0.0)} if kind is Hinge else {}
-    joint = kind(name="joint", between=("world", "box"), at=(0.0, 0.0, 0.0), **more)
-    scene = Scene(bodies=(box,), constraints=(joint,), gravity=GRAVITY)
-    run = CANNON.simulate(
-        scene, time_step=STEP, duration=2.0, observe={"path": Trace(quantity=Position("box"))}
-    )
-
-    assert np.abs(run["path"] - [0.0, 0.0, -1.0]).max() < 1e-6
-
-
-def test_a_box_rests_on_a_plane_and_equal_runs_are_equal() -> None:
-    rough = Material(friction=0.5)
-    ground = RigidBody(
-        name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough
-    )
-    box = RigidBody(
-        name="box", mass=1.0, shape=Box((1.0, 1.0, 1.0)), position=(0.0, 0.0, 0.5), material=rough
-    )
-    scene = Scene(bodies=(ground, box), gravity=(1.0, 0.0, -9.81))
-    observe = {"place": Final(quantity=Position("box"))}
-    one, two = (CANNON.simulate(scene, time_step=STEP, duration=2.0, observe=observe) for _ in range(2))
-
-    assert one["place"][2] == pytest.approx(0.5, abs=1e-2)
-    assert abs(one["place"][0]) < 1e-2, "friction holds a pull of a tenth of the weight"
-    assert one.state_hash == two.state_hash
-
-
 def test_what_it_lacks_is_not_supported_by_name_before_anything_runs() -> None:
     box = RigidBody(
         name="box",
@@ -142,16 +96,3 @@ def test_what_it_lacks_is_not_supported_by_name_before_anything_runs() -> None:
     )
     with pytest.raises(NotSupported, match="beside a centre of mass"):
         CANNON.simulate(Scene(bodies=(box,), constraints=(rod,), gravity=GRAVITY), time_step=STEP, steps=1)
-
-
-@pytest.mark.parametrize(("kept_apart", "moves"), [((), True), ((("b", "a"),), False)])
-def test_pairs_that_must_not_touch_do_not(kept_apart: Any, moves: bool) -> None:
-    """Two boxes that overlap by half: pushed apart, unless they must not touch, whichever is named first."""
-    boxes = [
-        RigidBody(name=name, mass=1.0, shape=Box((1.0, 1.0, 1.0)), position=(0.5 * k, 0.0, 0.0))
-        for k, name in enumerate("ab")
-    ]
-    scene = Scene(bodies=tuple(boxes), no_contact=kept_apart)
-    run = CANNON.simulate(scene, time_step=STEP, steps=5, observe={"end": Final(quantity=Position("a"))})
-
-    assert (abs(float(run["end"][0])) > 1e-3) is moves

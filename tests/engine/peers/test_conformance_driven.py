@@ -43,6 +43,7 @@ from tests.engine.peers.test_conformance import (
     MUJOCO,
     MUJOCO_AS_IT_COMES,
     MUJOCO_IMPLICIT,
+    P2_AS_IT_COMES,
     RAPIER,
     RAPIER_JS,
     RAPIER_JS_AS_IT_COMES,
@@ -53,6 +54,7 @@ from tests.engine.peers.test_conformance import (
     engine,
     rows,
 )
+from tests.scenes import peer as peer_scenes
 
 G = 9.81  # m/s²
 Z = (0.0, 0.0, 1.0)
@@ -265,3 +267,22 @@ def test_pairs_kept_apart_pass_through_each_other(asked: Asked, owed: float) -> 
 
     assert found[:2] == pytest.approx([0.5, 0.5], abs=owed)
     assert found[2] == pytest.approx(0.5 - 0.5 * G, abs=1.5 * G * STEP)
+
+
+@rows(dict.fromkeys((JOLT, P2_AS_IT_COMES, RAPIER_JS_AS_IT_COMES), 4.0))
+def test_a_smaller_step_stops_helping_where_single_precision_does(asked: Asked, owed: float) -> None:
+    """A first-order step in double precision is g T h / 2 away: 0.02 m at 1/4000 s, and it always shrinks with h."""
+    assert abs(peer_scenes.fall_error(engine(asked), 1 / 4000, seconds=20.0)) > owed * 0.5 * G * 20.0 / 4000.0
+
+
+@rows(dict.fromkeys((CANNON, MUJOCO, JOLT, BOX, RAPIER_JS), 1e-2))
+def test_equal_runs_are_equal(asked: Asked, owed: float) -> None:
+    """To the bit, of a box that friction holds against a tenth of its weight."""
+    seen = {"place": Final(quantity=Position("box"))}
+    one, two = (
+        engine(asked)(peer_scenes.box_on_ground(0.1), time_step=STEP, duration=2.0, observe=seen)
+        for _ in range(2)
+    )
+
+    assert abs(one["place"][0]) < owed
+    assert one.state_hash == two.state_hash

@@ -15,12 +15,15 @@ from tests.engine.peers.test_conformance import (
     DART_LOOSE,
     DRAKE_LOOSE,
     JOLT,
+    JOLT_AS_IT_COMES,
     MERSON,
     MOTRIX,
     MOTRIX_LOOSE,
     MOTRIX_MANY,
     MUJOCO,
     MUJOCO_AS_IT_COMES,
+    MUJOCO_LOOSE,
+    P2_AS_IT_COMES,
     PGS,
     RAPIER,
     RAPIER_JS,
@@ -31,6 +34,7 @@ from tests.engine.peers.test_conformance import (
     engine,
     rows,
 )
+from tests.scenes import peer as peer_scenes
 from tests.scenes import peer_joints
 
 
@@ -116,3 +120,16 @@ def test_joints_hold_and_drive_at_every_scale(asked: Asked, owed: float, scale: 
     assert fallen == pytest.approx(exact, abs=owed)
     if asked not in (SAP, MERSON):  # no motors
         assert peer_joints.driven_wheel(engine(asked), scale) == pytest.approx(1.0, rel=owed)
+
+
+@rows(
+    {
+        **dict.fromkeys((DART, BULLET, SAP, MERSON, MUJOCO), (-1e-12, 1e-12)),  # merged into one body
+        **dict.fromkeys((BULLET_LOOSE, JOLT_AS_IT_COMES, MUJOCO_LOOSE), (1.1, 1.3)),  # ½ g t² is 1.23 m
+        **dict.fromkeys((DRAKE_LOOSE, P2_AS_IT_COMES), (1.0, 1.3)),
+    }
+)
+def test_locks_that_are_merged_hold_a_long_beam_and_those_that_are_iterated_let_it_fall(
+    asked: Asked, owed: tuple[float, float]
+) -> None:
+    assert owed[0] < peer_scenes.sag(engine(asked)) < owed[1]

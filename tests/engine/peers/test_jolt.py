@@ -37,14 +37,6 @@ def defaults(scene: Scene, **options: Any) -> Any:
     return JOLT.simulate(scene, configuration="defaults", **options)
 
 
-def test_a_smaller_step_stops_helping_where_single_precision_does() -> None:
-    """A first-order step in double precision is g T h / 2 away: 0.02 m at 1/4000 s, and it always shrinks with h."""
-    in_double = 0.5 * 9.81 * 20.0 / 4000.0
-
-    assert peer_scenes.fall_error(JOLT.simulate, STEP) == pytest.approx(9.81 * STEP, abs=1e-4)
-    assert abs(peer_scenes.fall_error(JOLT.simulate, 1 / 4000, seconds=20.0)) > 4.0 * in_double
-
-
 def test_a_rod_loses_energy_however_often_it_is_iterated() -> None:
     """Two to four fifths of m g l in 22 s at 1/60 s: known of its distance constraint, and not a lack of iterations."""
     few, many = (peer_scenes.swung(run, STEP) for run in (defaults, JOLT.simulate))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -33,10 +32,8 @@ from spook_tracker.engine import (
 )
 from spook_tracker.engine.find import find
 from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.scalar_tests import falling_object, resting_stack, rolling_friction
+from spook_tracker.scalar_tests import resting_stack, rolling_friction
 from spook_tracker.scalar_tests.inclined_plane.scene import scene as inclined
-from tests.scenes import peer as peer_scenes
-from tests.scenes import rigid as rigid_scenes
 
 pytest.importorskip("mujoco", reason="the extra mujoco is not installed: pip install 'spook-tracker[mujoco]'")
 GRAVITY = (0.0, 0.0, -9.81)
@@ -50,17 +47,6 @@ def pendulum() -> Scene:
     weight = Particle(name="weight", mass=1.0, position=(1.0, 0.0, 0.0))
     rod = Distance(name="rod", between=((0.0, 0.0, 0.0), "weight"), compliance=0.0)
     return Scene(bodies=(weight,), constraints=(rod,), gravity=GRAVITY)
-
-
-def test_a_fall_has_the_error_of_its_integrator() -> None:
-    def error(configuration: str) -> float:
-        def bound(scene: Scene, **options: Any) -> Any:
-            return simulate(scene, configuration, **options)
-
-        return falling_object.errors(bound)["position_error"]  # type: ignore[arg-type]
-
-    assert error("defaults") == pytest.approx(falling_object.EXPECTED, abs=1e-9)
-    assert abs(error("rk4")) < 1e-9
 
 
 def test_boxes_at_rest_are_sunk_into_each_other_by_as_much_as_soft_contacts_let_them() -> None:
@@ -94,17 +80,6 @@ def test_a_rod_is_a_hinge_in_joint_coordinates_and_soft_as_an_equality() -> None
     assert 0.008 < float(rows["length"]) < 0.012
 
 
-def test_the_tension_of_a_rod_at_rest_is_the_weight() -> None:
-    weight = Particle(name="weight", mass=2.0, position=(0.0, 0.0, -1.0))
-    rod = Distance(name="rod", between=((0.0, 0.0, 0.0), "weight"), compliance=0.0)
-    still = Scene(bodies=(weight,), constraints=(rod,), gravity=GRAVITY)
-    observe = {"pull": Final(quantity=ConstraintForce("rod"))}
-
-    for configuration in ("rk4", "defaults", "equalities"):
-        result = simulate(still, configuration, time_step=0.01, duration=5.0, observe=observe)
-        assert float(result["pull"]) == pytest.approx(19.62, rel=1e-6)
-
-
 @pytest.mark.parametrize("holder", ["world", "post"])
 @pytest.mark.parametrize("backwards", [False, True])
 @pytest.mark.parametrize("kind", [Ball, Hinge])
@@ -123,36 +98,6 @@ def test_the_force_of_a_joint_is_on_its_second_end(kind: Any, backwards: bool, h
         result = simulate(scene, configuration, time_step=0.01, duration=5.0, observe=observe)
         assert result["force"][:3] == pytest.approx(weight, abs=1e-3), configuration
         assert result["force"][3:] == pytest.approx(np.zeros(3), abs=1e-3), configuration
-
-
-@pytest.mark.parametrize("kind", sorted(set(rigid_scenes.JOINTS) - {"distance"}))
-def test_joint_coordinates_move_as_our_engine_does(kind: str) -> None:
-    """Every joint between tumbling bodies, the start speeds made to fit it: both converge to one motion."""
-    from spook_tracker.engine import simulate as ours
-
-    free = rigid_scenes.one_joint(np.random.default_rng(7), kind, bodies=1)
-    still = [  # speeds that a joint allows: none
-        RigidBody(name=b.name, mass=b.mass, inertia=b.inertia, position=b.position, orientation=b.orientation)
-        for b in free.bodies
-        if isinstance(b, RigidBody)
-    ]
-    joint = free.constraints[0]
-    scene = Scene(bodies=tuple(still), constraints=(joint,), gravity=rigid_scenes.GRAVITY)
-    rigid = type(joint)(**{**{f: getattr(joint, f) for f in _fields(joint)}, "compliance": 0.0})
-    scene = Scene(bodies=scene.bodies, constraints=(rigid,), gravity=scene.gravity)
-    observe = {"path": Trace(quantity=Position(), every=500)}
-
-    theirs = simulate(scene, "rk4", time_step=1e-3, duration=0.5, observe=observe)
-    mine = ours(scene, time_step=1e-3, duration=0.5, observe=observe)
-
-    moved = float(np.abs(mine["path"][-1] - mine["path"][0]).max())
-    assert theirs["path"][-1] == pytest.approx(mine["path"][-1], abs=0.01 * moved + 1e-12)
-    assert moved > 5e-4 or kind == "lock"
-
-
-def _fields(joint: Any) -> tuple[str, ...]:
-    names = ("name", "between", "at", "axis", "cross_axis")
-    return tuple(name for name in names if hasattr(joint, name))
 
 
 def test_a_box_on_a_slope_is_held_by_what_holds_it() -> None:
@@ -246,17 +191,6 @@ def test_a_coin_on_its_face_rests_and_stands_on_half_its_length() -> None:
     )["x"]
 
     assert place == pytest.approx([0.0, 0.0, 0.05], abs=1e-4)
-
-
-def test_welds_as_equalities_let_a_long_beam_fall_and_merged_bodies_do_not() -> None:
-    """Eighty boxes fixed at one end for a second: springs in a row, against one body."""
-    welded, merged = (
-        peer_scenes.sag(partial(find("mujoco").simulate, configuration=name), seconds=1.0)
-        for name in ("equalities", "rk4")
-    )
-
-    assert welded > 1.0
-    assert abs(merged) < 1e-12
 
 
 def test_a_slow_run_is_ended_near_its_limit_though_nothing_is_recorded_between() -> None:

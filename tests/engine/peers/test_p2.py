@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
 import pytest
 
 from spook_tracker.engine import (
-    CentralGravity,
     ConstraintForce,
     Distance,
-    Final,
-    Hinge,
-    Load,
-    Lock,
     Particle,
     Position,
-    RigidBody,
     Scene,
     Trace,
-    Velocity,
     simulate,
 )
 from spook_tracker.engine.find import EngineMissing, find
@@ -70,40 +62,6 @@ def test_a_chain_is_the_same_in_two_implementations_of_the_method(
 
     assert np.abs(ours["path"] - theirs["path"]).max() < apart
     assert np.abs(ours["pull"] - theirs["pull"]).max() < 1e3 * apart
-
-
-def test_single_precision_is_what_one_gets_without_asking() -> None:
-    """A first-order step in double precision is g T h / 2 away: 0.02 m at 1/4000 s, and it always shrinks with h."""
-    in_double = 0.5 * 9.81 * 20.0 / 4000.0
-
-    assert peer_scenes.fall_error(P2.simulate, 1 / 4000, seconds=20.0) == pytest.approx(in_double, rel=1e-6)
-    assert abs(peer_scenes.fall_error(defaults, 1 / 4000, seconds=20.0)) > 4.0 * in_double
-
-
-@pytest.mark.parametrize("kind", [Hinge, Lock])
-def test_a_joint_holds_its_body(kind: Any) -> None:
-    body = RigidBody(name="arm", mass=2.0, inertia=(1.0, 1.2, 0.8), position=(0.0, 0.0, -1.0))
-    axis = {"axis": (0.0, 1.0, 0.0)} if kind is Hinge else {}
-    joint = kind(name="joint", between=("world", "arm"), at=(0.0, 0.0, 0.0), compliance=0.0, **axis)
-    scene = Scene(bodies=(body,), constraints=(joint,), gravity=peer_scenes.GRAVITY)
-    end = {"end": Final(quantity=Position("arm"))}
-    run = P2.simulate(scene, time_step=STEP, duration=2.0, observe=end)
-
-    assert run["end"] == pytest.approx([0.0, 0.0, -1.0], abs=1e-9)
-
-
-def test_forces_act_at_every_step() -> None:
-    moon = Particle(name="moon", mass=3.0, position=(2.0, 0.0, 1.0), velocity=(0.0, math.sqrt(0.5), 0.0))
-    orbit = Scene(bodies=(moon,), forces=(CentralGravity(name="pull", strength=1.0, centre=(0.0, 0.0, 1.0)),))
-    path = {"path": Trace(quantity=Position("moon"))}
-    found = P2.simulate(orbit, time_step=0.001, duration=5.0, observe=path)["path"]
-    assert np.abs(np.linalg.norm(found - [0.0, 0.0, 1.0], axis=1) - 2.0).max() < 1e-3
-
-    box = RigidBody(name="box", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
-    lift = Load(name="lift", body="box", force=(0.0, 0.0, 4.0 * 9.81))
-    speed = {"speed": Final(quantity=Velocity("box"))}
-    lifted = Scene(bodies=(box,), forces=(lift,), gravity=peer_scenes.GRAVITY)
-    assert P2.simulate(lifted, time_step=0.01, steps=100, observe=speed)["speed"][2] == pytest.approx(9.81)
 
 
 def test_what_leaves_a_plane_is_not_supported_by_name() -> None:
