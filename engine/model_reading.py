@@ -10,6 +10,7 @@ from __future__ import annotations
 import hashlib
 import math
 import os
+import re
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
@@ -27,6 +28,7 @@ from spook_tracker.engine.model_bodies import (
     urdf_bodies,
 )
 from spook_tracker.engine.model_file import Format, Watched
+from spook_tracker.engine.model_masses import wrong_mass
 from spook_tracker.engine.model_meshes import ENTITIES, harm_in
 from spook_tracker.engine.model_parts import attach, settle_joint_types
 
@@ -52,6 +54,7 @@ POINTER = b"version https://git-lfs"  # what a clone without Git LFS has in plac
 MOST_WATCHED = 8
 TIME_STEP = 0.002  # s, of MJCF that names none; also what MuJoCo gives a URDF
 GRAVITY = (0.0, 0.0, -9.81)  # m/s², of a file that names none
+STRONGEST = 1e9  # m/s²
 ROOTS = (".git", "tracker.toml", "pyproject.toml", "package.xml")  # whose folder is a whole
 INSTALLED = ("site-packages", "dist-packages")  # whose folders are wholes
 FILES_OF = {  # element: attributes that name files
@@ -180,6 +183,10 @@ class _Reader:
                 f"{path} is a xacro, of which a model is made first: xacro {path.name} > expanded.urdf"
             )
         self.bounded(root, path)
+        if wrong := wrong_mass(root):
+            place = re.search(wrong[0], text)
+            line = f", line {text.count(chr(10), 0, place.end()) + 1}," if place else ""
+            raise ModelError(f"{path}{line} gives {wrong[1]}")
         return root
 
     def bounded(self, root: ElementTree.Element, path: Path) -> None:
@@ -476,6 +483,8 @@ def _gravity(texts: list[str | None], path: Path) -> tuple[float, float, float]:
         x, y, z = map(float, named[-1].split()) if named else GRAVITY
     except ValueError:
         raise ModelError(f"{path}: its gravity is {named[-1][:60]!r}, which is no three numbers") from None
+    if not math.hypot(x, y, z) <= STRONGEST:
+        raise ModelError(f"{path}: its gravity is {named[-1][:60]!r}; it may be {STRONGEST:g} m/s² at most")
     return x, y, z
 
 

@@ -138,6 +138,16 @@ BOMB = '<!DOCTYPE m [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;">]><mujoco><worldbody
         ('<mujoco><worldbody><geom type="plane"/></worldbody></mujoco>', "nothing in"),
         ('<mujoco><option timestep="fast"/><worldbody><body><joint/></body></worldbody></mujoco>', "no number"),
         ('<mujoco><option timestep="nan"/><worldbody><body><joint/></body></worldbody></mujoco>', "time step is nan"),
+        ('<mujoco><option gravity="0 0 -inf"/><worldbody><body><joint/></body></worldbody></mujoco>', "may be 1e\\+09 m/s² at most"),
+        (CART.replace("<mujoco", '\n<mujoco', 1).replace("<worldbody>", '<default><geom mass="nan"/></default><worldbody>'), r"robot.xml, line \d, gives a mass of nan"),
+        ('<mujoco><default><geom density="-1"/></default><worldbody><body><joint/></body></worldbody></mujoco>', "density of -1, which is negative"),
+        ('<mujoco><worldbody><body><joint/><inertial mass="1" diaginertia="1 1e308 1"/></body></worldbody></mujoco>', "moment of inertia of 1e\\+308; it may be 1e\\+100 at most"),
+        ('<mujoco><worldbody><body><joint/><inertial mass="1" fullinertia="1 1 -1 0 0 0"/></body></worldbody></mujoco>', "inertia of -1"),
+        ('<robot><joint>\n<axis xyz="-1"/></joint><link name="a">\n<inertial><mass value="-1"/></inertial></link></robot>', "line 3, gives a mass of -1, which is negative"),
+        ('<robot><link name="a"><inertial>\n<mass\nvalue="1e308"/></inertial></link></robot>', "line 3, gives a mass of 1e\\+308"),
+        ('<robot><link name="a"><inertial><inertia ixx="1" iyy="inf" izz="1"/></inertial></link></robot>', "moment of inertia of inf"),
+        ('<sdf><model><link><inertial><mass>nan</mass></inertial></link></model></sdf>', "mass of nan, which is not finite"),
+        ('<sdf><model><link><inertial><inertia><izz>-2</izz></inertia></inertial></link></model></sdf>', "moment of inertia of -2"),
         ('<mujoco><worldbody><include file="gone.xml"/></worldbody></mujoco>', "gone.xml, which is no file"),
         ('<mujoco><worldbody><include file="robot.xml"/></worldbody></mujoco>', "which includes it"),
         ('<mujoco><worldbody><include/></worldbody></mujoco>', "does not name"),
@@ -373,3 +383,15 @@ def test_a_file_of_100_mb_is_refused_at_once(cart: Path, name: str) -> None:
         read(cart)
 
     assert time.process_time() - began < 0.5  # s: it is not read
+
+
+def test_products_of_inertia_may_be_negative_and_moments_by_rounding(cart: Path) -> None:
+    cart.write_text(
+        '<mujoco><worldbody><body name="a"><joint/><inertial pos="0 0 0" mass="1" fullinertia="1 1 1 -.1 -.1 -.1"/></body></worldbody></mujoco>'
+    )
+    assert [one.name for one in read(cart).watched] == ["a"]
+    cart.write_text(
+        '<robot name="r"><link name="b"/><link name="a"><inertial><mass value="0"/><inertia ixx="-5e-20" iyy="1" izz="1" ixy="-.1"/></inertial></link>'
+        '<joint name="j" type="continuous"><parent link="b"/><child link="a"/></joint></robot>'
+    )
+    assert [one.name for one in read(cart).watched] == ["a"]
