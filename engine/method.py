@@ -6,10 +6,13 @@ import math
 import sys
 import warnings
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from spook_tracker.engine.check import entries, one_of
 from spook_tracker.engine.errors import MethodError
+
+if TYPE_CHECKING:
+    from spook_tracker.engine.scene import Scene
 
 STAGES_THAT_CAN_BE_FORCED = {  # as it is asked for: the stage that comes
     "collision": "collision",
@@ -30,6 +33,10 @@ _NUMBERS = (
     "sleep_after",
     "floor",
 )
+_OF_THE_SCENE = {
+    "residual_tolerance": 5e-11,
+    "unsettled_residual": 0.05,
+}  # of its typical speed, where not given
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -63,8 +70,9 @@ class Method:
                        among up to 24 contacts that iterations do not settle is solved directly, since what it leaves stays;
                        so are up to 24 joints (and their contacts) that they do not settle, and up to 64 that
                        they leave unsettled, from then on
-    iterations, residual_tolerance   when an iterative solve stops; where rows are still off by more than
-                       unsettled_residual, iterations go on there and nearby, for up to sixteen times the work (joints: four)
+    iterations, residual_tolerance   when an iterative solve stops [m/s], by default 5e-11 of `Scene.typical_speed`, √(g r): 1e-10 m/s
+                       for a cube of a metre on Earth; where rows are still off by more than unsettled_residual,
+                       iterations go on there and nearby, for up to sixteen times the work (joints: four)
     friction           cone (isotropic), box (bound from the step before), scaled_box (current normal force)
     impacts            simultaneous: all that touch take part in one impact (a ball on four gives −.6 and four times .4);
                        free balls of which one pair meets at a time do so one after the other, as often as they meet; any
@@ -74,9 +82,10 @@ class Method:
                        successive: one pair after the other until none approaches, as if there were small gaps (the
                        last ball leaves, no energy is lost at restitution 1); those that are open as a step begins in
                        the order in which they close, free balls moved from one impact to the next
-    unsettled_residual a solve that leaves more than this [m/s] makes the run "unsettled": the row furthest from its
-                       law, its impulse against where a step of projection would put it; so does one that stopped early
-                       and left bodies sunk into each other by a fiftieth of the smaller one's radius
+    unsettled_residual a solve that leaves more than this [m/s], by default .05 of `Scene.typical_speed`, makes the run
+                       "unsettled": the row furthest from its law, its impulse against where a step of projection would
+                       put it; so does one that stopped early and left bodies sunk into each other by a fiftieth of the
+                       smaller one's radius
     sleep_speed        bodies slower than this [m/s], |v| + |w| r, for `sleep_after` seconds sleep; 0: none does. They do so
                        by islands, all that are connected by contacts, joints and springs, and wake at once, in the same
                        step, when a body meets one of them, a kinematic one that touches or holds one moves, or a load,
@@ -103,10 +112,10 @@ class Method:
     tolerance: float = 0.0
     solver: Literal["direct", "iterative"] = "direct"
     iterations: int = 50
-    residual_tolerance: float = 1e-10
+    residual_tolerance: float | None = None
     friction: Literal["cone", "box", "scaled_box"] = "cone"
     impacts: Literal["simultaneous", "successive"] = "simultaneous"
-    unsettled_residual: float = 0.1
+    unsettled_residual: float | None = None
     sleep_speed: float = 0.0
     sleep_after: float = 0.5
     refinements: int = 1
@@ -120,6 +129,8 @@ class Method:
 
         for field in _NUMBERS:
             value = getattr(self, field)
+            if value is None and field in _OF_THE_SCENE:
+                continue
             if isinstance(value, bool) or not isinstance(value, int | float):
                 refuse(field, "a number")
             if isinstance(value, int) and abs(value) > sys.float_info.max:
@@ -155,7 +166,7 @@ class Method:
             refuse("solver", "direct or iterative")
         if not one_of(self.impacts, ("simultaneous", "successive")):
             refuse("impacts", "simultaneous or successive")
-        if not self.unsettled_residual > 0.0:
+        if self.unsettled_residual is not None and not self.unsettled_residual > 0.0:
             refuse("unsettled_residual", "above 0")
         if not 0.0 <= self.sleep_speed < math.inf:
             refuse("sleep_speed", "a speed from 0, which lets no body sleep")
@@ -165,7 +176,7 @@ class Method:
             self._refuse_beside_sleep()
         if not isinstance(self.iterations, int) or not 1 <= self.iterations <= 1_000_000_000:
             refuse("iterations", "a whole number from 1 to a thousand million")
-        if not self.residual_tolerance >= 0.0:
+        if self.residual_tolerance is not None and not self.residual_tolerance >= 0.0:
             refuse("residual_tolerance", "zero or above")
         if not one_of(self.friction, ("cone", "box", "scaled_box")):
             refuse("friction", "cone, box or scaled_box")
@@ -187,6 +198,11 @@ class Method:
                 raise MethodError(
                     f"method: {stage!r} cannot be forced; try one of {', '.join(STAGES_THAT_CAN_BE_FORCED)}"
                 )
+
+    def residual_of(self, field: Literal["residual_tolerance", "unsettled_residual"], scene: Scene) -> float:
+        """What is given for `field`, m/s, or its share of the scene's typical speed."""
+        given: float | None = getattr(self, field)
+        return _OF_THE_SCENE[field] * scene.typical_speed if given is None else given
 
     def _refuse_beside_sleep(self) -> None:
         """What looks further than the step at hand, or bends its rows, would not see what sleeps."""

@@ -97,7 +97,7 @@ def _pack(scene: Scene, time_step: float, method: Method, bodies: Mapping[str, i
             "iterative": method.solver == "iterative",
             "force_block": "solve_block" in method.force_stages,
             "iterations": method.iterations,
-            "residual_tolerance": method.residual_tolerance,
+            "residual_tolerance": method.residual_of("residual_tolerance", scene),
             "refinements": method.refinements,
             "floor": method.floor,
             "composition": method.composition,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -25,6 +26,11 @@ def _unique(kind: str, names: Iterable[str]) -> None:
         if name in seen:
             raise SceneError(f"two {kind} are named {name!r}; give each its own name")
         seen.add(name)
+
+
+def _gyration(body: RigidBody) -> float:
+    assert body.mass is not None  # it is dynamic
+    return math.sqrt(sum(body.inertia) / (2.0 * body.mass))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -84,6 +90,30 @@ class Scene:
         object.__setattr__(self, "no_contact", tuple(self._pair(pair, known) for pair in self.no_contact))
         self._check_pair_frictions(known)
         self._check_directions()
+
+    @property
+    def typical_speed(self) -> float:
+        """√(g r) [m/s], what the defaults of `Method`'s residuals are shares of; units of length, mass and time scale it.
+
+        g is the scene's gravity, r the median radius of gyration √(tr I / 2 m) of the bodies that move; of particles alone, the
+        median length of what ties them. Without gravity the largest speed that a body starts with, |v| + |ω| r, and 1
+        where nothing moves.
+        """
+        moving = [body for body in self.bodies if isinstance(body, Particle) or body.motion == "dynamic"]
+        radii = {body.name: _gyration(body) for body in moving if isinstance(body, RigidBody)}
+        lengths = list(radii.values())
+        if not lengths:
+            places = {body.name: body.position for body in self.bodies}
+            ties = (tie for tie in (*self.constraints, *self.forces) if isinstance(tie, Distance | Spring))
+            lengths = [
+                math.dist(*(places[end] if isinstance(end, str) else end for end in tie.between))
+                for tie in ties
+            ]
+        speed = math.sqrt(math.hypot(*self.gravity) * statistics.median_low(lengths or [0.0]))
+        for body in self.bodies if not speed > 0.0 else ():
+            turning = math.hypot(*body.angular_velocity) if isinstance(body, RigidBody) else 0.0
+            speed = max(speed, math.hypot(*body.velocity) + turning * radii.get(body.name, 0.0))
+        return speed or 1.0
 
     def _repr_html_(self) -> str | None:
         """The scene at its start, to be turned, for notebooks; None, so its text, where nothing draws it."""
