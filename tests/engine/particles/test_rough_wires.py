@@ -239,7 +239,7 @@ def test_hostile_input_is_refused_with_one_sentence(name: str) -> None:
 
 def test_what_a_scene_or_a_method_cannot_do_with_it_is_refused() -> None:
     scene = winch()
-    with pytest.raises(SceneError, match="no hinge named 'wire' to wind it"):
+    with pytest.raises(SceneError, match="there is no hinge named 'wire'; there is 'axle'"):
         replace(
             scene, constraints=(scene.constraints[0], replace(scene.constraints[1], wound=(("wire", 1.0),)))
         )
