@@ -55,6 +55,18 @@ def machine(**changes: Any) -> Machine:
     return Machine(**fields | changes)
 
 
+def gate(key: str = "t/c/m", **changes: Any) -> SeriesDefinition:
+    """A gate of errors that says nothing else."""
+    test, configuration, metric = key.split("/")[:3]
+    fields = {
+        "key": key, "test": test, "title": "T", "configuration": configuration, "metric": metric, "description": "d",
+        "unit": "m", "role": "gate", "better": "smaller_magnitude", "kind": "scalar", "time_step": None,
+        "parameters": {}, "limit": None, "limit_source": "", "set_point": None, "set_point_source": "",
+        "reference": None, "tolerance": 0.0, "relative_tolerance": 1e-9, "test_version": "1",
+    }  # fmt: skip
+    return SeriesDefinition(**fields | changes)
+
+
 def definition(key: str = KEY, **changes: Any) -> SeriesDefinition:
     fields = {
         "key": key,

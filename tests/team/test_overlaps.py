@@ -218,7 +218,7 @@ def test_a_database_of_no_use_stops_no_night_whose_history_is_whole(
     done = ci(tmp_path, monkeypatch)
 
     assert done.exit_code == 0, done.output
-    assert "it is set aside as tracker.db.set-aside-1 and made again from history" in done.stderr
+    assert "it was moved to tracker.db.set-aside-1 and is built again from history" in done.stderr
     aside = (tmp_path / "tracker.db.set-aside-1").read_bytes()
     assert aside[100:] == before[100:], "nothing is lost"  # the header says how it was opened last
     with History.open("sqlite:///tracker.db") as history:

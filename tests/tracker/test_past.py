@@ -308,7 +308,7 @@ def test_what_a_changed_definition_hides_is_told_by_the_old_one(tmp_path: Path) 
     def refuse(*asked: Any) -> RunDocument:
         raise commits.CommitError("it does not answer")
 
-    assert old_answer_lines(told(1e-3, refuse))[0].endswith("cannot be told; it does not answer")
+    assert old_answer_lines(told(1e-3, refuse))[0].endswith("cannot be compared; it does not answer")
     elsewhere = replace(then, engine=replace(then.engine, git_hash="f" * 40))
     assert "not that of the run" in told(1.0, lambda *asked: elsewhere).why_not
     shutil.rmtree(place / "scalar_tests")

@@ -8,7 +8,8 @@ import pytest
 
 from spook_tracker.tracker.document.run_document import Point
 from spook_tracker.tracker.website.model_history import model_history
-from tests.tracker.judge.test_verdict import sample, series
+from tests.histories.documents import gate
+from tests.tracker.judge.test_verdict import sample
 from tests.tracker.measure.test_model_files import KNOWN
 
 
@@ -20,7 +21,7 @@ def _night(version: str, value: float, edit: str = "1", arithmetic: str = "f") -
 
 
 def _trend(*nights: Point, known=KNOWN) -> SimpleNamespace:
-    definition = series(metric="ball.rest_z", better="inside", role="reported", sensitivity=known)
+    definition = gate(metric="ball.rest_z", better="inside", role="reported", sensitivity=known)
     return SimpleNamespace(definition=definition, told=SimpleNamespace(points=nights))
 
 

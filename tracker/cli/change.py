@@ -35,7 +35,7 @@ def beside_its_base(
 
     head = full_hash(team.repository, "HEAD")
     if team.has_local_changes():
-        complain("what is not committed here is not measured: a change is built from its commit")
+        complain("uncommitted changes are not measured: a change is built from its commit")
     start = _base_of(team, base, head, database)
     if start == head:
         raise TrackerError(f"{head[:12]} is its own base; name another with --base")

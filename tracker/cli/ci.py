@@ -246,7 +246,7 @@ def _bring_in(folder: Path, database: str) -> int:
     except DatabaseUnusable as error:
         if (aside := set_aside(database)) is None:
             raise
-        complain(f"{error}; it is set aside as {aside.name} and made again from {folder}")
+        complain(f"{error}; it was moved to {aside.name} and is built again from {folder}")
         stored, present = bring()
     click.echo(f"history: {stored} runs recorded, {present} were there already")
     return stored + present

@@ -122,9 +122,7 @@ def backfill(
         say(line)
     if folder.exists():
         taken = releases.size(folder) / MEGABYTE
-        say(
-            f"the releases in {folder} take {taken:.0f} MB; delete the folder when nothing is to be measured again"
-        )
+        say(f"the releases in {folder} take {taken:.0f} MB; delete the folder when you are done measuring")
     _tell(engine, database, None, False)
     if out is not None:
         from spook_tracker.tracker.cli.history import accepted_levels
@@ -158,12 +156,12 @@ def progress(
             continue
         began = time.monotonic()
         if ends is not None and began >= ends:
-            yield f"{heading}: the time is up; the same command goes on from here"
+            yield f"{heading}: time is up; run the same command again to go on"
             return
         try:
             document = measure(version)
             if document.engine.version != version:
-                raise ReleaseError(f"it says it is {document.engine.version!r}, so nothing is recorded")
+                raise ReleaseError(f"it reports version {document.engine.version!r}, so nothing is recorded")
         except ReleaseError as error:
             yield f"{heading}: {error}"
             continue

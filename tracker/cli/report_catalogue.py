@@ -162,7 +162,9 @@ def stage_table(
             f"A step takes {seconds(costs.whole)} while its stages are timed: {seconds(sum(costs.stages.values()))} in them, "
             f"{seconds(costs.beside)} between them.",
         ]
-        after += [f"With all that can be forced in: {told_saving(out.told())}."] if out is not None else []
+        after += (
+            [f"With every stage that can be forced in: {told_saving(out.told())}."] if out is not None else []
+        )
         after += textwrap.wrap(f"Also left out: {', '.join(folded)}.", width()) if folded else []
         told = [
             _taken(c.stage, getattr(c, "within", ""), costs.stages)

@@ -292,19 +292,19 @@ def finding_lines(findings: Sequence[Finding], site: str = "") -> list[str]:
 def old_answer_lines(old: OldAnswers) -> list[str]:
     """What became of tests by their old definition (tracker.past.OldAnswers), and what could not be told."""
     tests = ", ".join(map(clean, old.tests))
-    asked = f"{tests} as asked at {old.commit[:12] or 'no commit'}"
+    asked = f"{tests} by the definition at {old.commit[:12] or 'no commit'}"
     if old.why_not:
-        return [f"? {asked}: cannot be told; {clean(old.why_not)}"]
+        return [f"? {asked}: cannot be compared; {clean(old.why_not)}"]
     red, told = [change for change in old.changes if change.red], old.told
     why: dict[str, list[Change]] = {}
     for change in old.untold:
         why.setdefault(change.sentence, []).append(change)
     left = [
-        f"? of these, {len(changes)} cannot be told, {kinds_of(changes)}: {clean(sentence)}"
+        f"? of these, {len(changes)} cannot be compared, {kinds_of(changes)}: {clean(sentence)}"
         for sentence, changes in why.items()
     ]
     if not told:
-        return [f"? {asked}: none of {len(old.changes)} series can be told", *left]
+        return [f"? {asked}: none of {len(old.changes)} series can be compared", *left]
     if not red:
         return [f"{'?' if old.open else '✓'} {asked}: {len(told)} series, none worse", *left]
     return [

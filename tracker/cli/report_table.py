@@ -303,7 +303,7 @@ def verdict(run: RunDocument) -> str:
             return "nothing was measured against a limit"
         asked = len(shown) - shown.count("none")
         return (
-            f"· {clean(run.engine.name)} decides nothing here: it keeps {shown.count('pass')} of the {asked} limits it "
+            f"· {clean(run.engine.name)} does not decide the exit code: it keeps {shown.count('pass')} of the {asked} limits it "
             f"can be asked; {shown.count('none')} are not supported"
         )
     if not found.red:

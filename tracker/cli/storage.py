@@ -112,16 +112,14 @@ def import_files(
         raise DocumentError(f"no run{of_branch} is in {files[0]}{more}")
     click.echo(f"{stored} runs recorded, {present} were there already")
     if found.empty:
-        click.echo(f"left out, as there is no value in them: {found.empty} of the files' runs")
+        click.echo(f"skipped, as they contain no value: {found.empty} of the files' runs")
     if found.unknown:
         names = ", ".join(found.unknown)
         click.echo(
-            f"no unit, so only kept as what may explain a change: {names}; say it with --column {found.unknown[0]}=UNIT"
+            f"kept only as an explanation of changes, for lack of a unit: {names}; give one with --column {found.unknown[0]}=UNIT"
         )
     if found.absent:
-        click.echo(
-            f"no record has a column {', '.join(found.absent)}: what --column says of it changes nothing"
-        )
+        click.echo(f"no record has a column {', '.join(found.absent)}: --column has no effect on it")
 
 
 @click.command(epilog=example("tracker schema > run.schema.json"))

@@ -100,7 +100,7 @@ def blame_of(judged: Judged) -> str:
     if judged.accused is None or judged.probability is None or judged.probability >= SURE:
         return words
     good, bad = (commit_of(night.run) for night in judged.accused)
-    return f"{words} ({100.0 * judged.probability:.0f} % sure; surely after {good}, up to {bad})"
+    return f"{words} ({100.0 * judged.probability:.0f} % sure; certainly after {good}, up to {bad})"
 
 
 def blame(bad: Run, good: Run | None) -> str:

@@ -25,8 +25,8 @@ from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, WORSE_THAN_EXPECT
 
 MOST_NAMED = 8  # tests in one sentence
 HOW_TO_COMPARE = (
-    "; to compare, put today's to the old commit: tracker backfill COMMIT, or the old ones to today's engine: "
-    "tracker judge RUN --old-questions"
+    "; to compare, measure the old commit with today's tests: tracker backfill COMMIT, or this engine with the old "
+    "ones: tracker judge RUN --old-questions"
 )
 
 

@@ -87,7 +87,7 @@ def timed_again(
         return again.timed_again(source, request, document, names, watch)
     found = _asked("timed_again", source, request, (encode(document), sorted(set(names))), watch)
     if [s.series for s in found.samples] != [s.series for s in document.samples]:
-        raise RunError("what was timed again is not what was measured; nothing of it is taken")
+        raise RunError("the repeated timings are not of what was measured; none of them is used")
     return found
 
 
@@ -162,7 +162,7 @@ def _next(lines: _Lines) -> News | None:
     try:
         return None if line is None else decode(line, News)  # type: ignore[arg-type]
     except (msgspec.DecodeError, UnicodeDecodeError, RecursionError) as error:
-        return Refused(f"nothing was measured: what the process that measures told is no run: {error!s:.200}")
+        return Refused(f"nothing was measured: the measuring process returned no run: {error!s:.200}")
 
 
 class _Lines:

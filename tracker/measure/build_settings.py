@@ -61,5 +61,5 @@ def build_of(said: Toml, file: Path) -> Build:
             questions += map(str, parts)
     for path in questions:
         if Path(path).is_absolute() or ".." in Path(path).parts:
-            raise TrackerError(f"{file}: questions of [{TABLE}] must lie beside it, unlike {path!r}")
+            raise TrackerError(f"{file}: questions of [{TABLE}] must be inside its folder, unlike {path!r}")
     return Build(**texts, environment=environment, questions=tuple(questions))

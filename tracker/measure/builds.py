@@ -172,7 +172,7 @@ def team_repository(home: Path | None, today: Build | None, always: str = "") ->
     said = today or Build()
     for name in said.questions:
         if not (home / name).exists():
-            raise TrackerError(f"{home / FILE}: there are no questions {name!r} to lay over earlier commits")
+            raise TrackerError(f"{home / FILE}: there are no questions {name!r} to copy over earlier commits")
     return TeamRepository(
         repository=Path(found.stdout.strip()), home=home.resolve(), today=said, always=always
     )
@@ -207,7 +207,7 @@ def _document(content: bytes, file: Path) -> RunDocument:
     try:
         if (runs := of_other_tools(content, file.name)) is not None:
             if len(runs) != 1:
-                raise CommitError(f"what it answers holds {len(runs)} runs and not one")
+                raise CommitError(f"its answer holds {len(runs)} runs instead of one")
             return runs[0]
         return whole(content, file.name) if is_short(content) else decode(content, RunDocument)
     except (TrackerError, msgspec.DecodeError) as error:

@@ -339,4 +339,4 @@ def _moment(value: Json) -> str:
     try:
         return datetime.fromtimestamp(seconds / 1e3 if seconds > MILLISECONDS else seconds, UTC).isoformat()
     except (ValueError, OverflowError, OSError):
-        raise DocumentError(f"{value} is no moment that a calendar has") from None
+        raise DocumentError(f"{value} is no valid time") from None

@@ -150,7 +150,7 @@ def _pair(result: ShortResult, origin: str) -> tuple[SeriesDefinition, Sample]:
         told = Number(min(result.seconds)) if result.value is None else result.value
         result = msgspec.structs.replace(result, value=told, unit="s", better="smaller", noisy=True)
     if result.value is None and result.outcome in ("value", "unsettled", "out_of_limit"):
-        raise DocumentError(f"{origin}: {key} has no value; say in its outcome what became of it")
+        raise DocumentError(f"{origin}: {key} has no value; its outcome must say why")
     if isinstance(result.limit, tuple) != (result.better == "inside") and result.limit is not None:
         raise DocumentError(f'{origin}: {key}: a limit of two numbers and better "inside" belong together')
     if result.explaining and result.limit is not None:

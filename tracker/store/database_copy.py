@@ -58,7 +58,7 @@ def _copy(source: Engine, target: Engine) -> dict[str, Digest]:
             there = digest_of(_copied(old, new, table))
             digests[table.name] = digest(new, table)
             if digests[table.name] != there:
-                raise DatabaseError(f"the table {table.name} arrived changed; nothing was copied")
+                raise DatabaseError(f"the copy of table {table.name} differs; nothing was copied")
     return digests
 
 

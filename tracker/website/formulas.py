@@ -289,7 +289,7 @@ class _Reader:
             self.at += 1
             self.open += 1
             if self.open > DEEPEST:
-                raise ValueError("too many brackets in each other")
+                raise ValueError("brackets are nested too deeply")
             inside = self.row(OPENING[sign])
             self.open -= 1
             tall = "" if "<mfrac>" in inside else ' stretchy="false"'

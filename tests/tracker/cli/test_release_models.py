@@ -8,8 +8,9 @@ from types import SimpleNamespace
 from spook_tracker.tracker.cli.release_models import model_page, only_models, without_models
 from spook_tracker.tracker.judge.compare import ComparedRun, compare
 from spook_tracker.tracker.judge.release_notes import Step, alike, read_changelog, visible
+from tests.histories.documents import gate
 from tests.places import ROOT
-from tests.tracker.judge.test_verdict import sample, series
+from tests.tracker.judge.test_verdict import sample
 from tests.tracker.measure.test_model_files import KNOWN, _side
 
 
@@ -20,7 +21,7 @@ def _step(values: dict[str, tuple[float, float]]) -> Step:
         samples = {}
         for model, pair in values.items():
             key = f"{model}/motion/ball.place@1s/h=0.002"
-            definition = series(
+            definition = gate(
                 key=key,
                 test=model,
                 metric="ball.place@1s",
@@ -53,7 +54,7 @@ def test_each_model_is_said_to_have_changed_rounded_or_stayed() -> None:
 def test_an_edited_model_is_another_one_and_did_not_change() -> None:
     runs = []
     for side, value in enumerate((0.1, 0.5)):
-        definition = series(better="inside", role="reported", sensitivity=KNOWN, test_version=f"edit {side}")
+        definition = gate(better="inside", role="reported", sensitivity=KNOWN, test_version=f"edit {side}")
         runs.append(ComparedRun(side=_side(str(side)), samples={"t/c/m": (definition, sample(value))}))
     changes = compare(*runs).changes
 
@@ -64,7 +65,7 @@ def test_an_edited_model_is_another_one_and_did_not_change() -> None:
 
 def test_a_model_that_one_of_both_was_not_asked_about_is_not_called_the_same() -> None:
     """It was told as rounding in all of its values."""
-    asked = {"t/c/m": (series(better="inside", role="reported", sensitivity=KNOWN), sample(0.1))}
+    asked = {"t/c/m": (gate(better="inside", role="reported", sensitivity=KNOWN), sample(0.1))}
     sides = [ComparedRun(side=_side(str(side)), samples=asked if side else {}) for side in (0, 1)]
 
     for runs in (sides, sides[::-1]):

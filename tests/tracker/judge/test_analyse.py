@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import random
 from dataclasses import dataclass
@@ -14,7 +13,6 @@ from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import (
     EngineVersion,
     Machine,
-    MapData,
     Point,
     Sample,
     SeriesDefinition,
@@ -24,33 +22,11 @@ from spook_tracker.tracker.document.run_document import (
 from spook_tracker.tracker.judge import exact_values
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.lane import run_times
-from spook_tracker.tracker.judge.maps import map_key
 from spook_tracker.tracker.judge.series_history import judge_all, judge_history
 from spook_tracker.tracker.judge.tonight import of_run
-from spook_tracker.tracker.judge.verdict import judge_map
+from tests.histories.documents import gate
 
-SERIES = SeriesDefinition(
-    key="t/c/m",
-    test="t",
-    title="T",
-    configuration="c",
-    metric="m",
-    description="d",
-    unit="m",
-    role="gate",
-    better="smaller_magnitude",
-    kind="scalar",
-    time_step=None,
-    parameters={},
-    limit=0.1,
-    limit_source="",
-    set_point=None,
-    set_point_source="",
-    reference=None,
-    tolerance=0.0,
-    relative_tolerance=1e-9,
-    test_version="1",
-)
+SERIES = gate(limit=0.1)
 
 
 @dataclass(frozen=True)
@@ -292,79 +268,3 @@ def test_nights_between_equal_nights_are_judged_without_a_look_and_alike(monkeyp
     monkeypatch.setattr(exact_values, "_repeats", lambda before, after: False)
 
     assert list(judge_history("t/c/m", SERIES, nights)) == list(short)
-
-
-def test_maps_are_judged_cell_by_cell():
-    facts = {"test": "t", "name": "n", "title": "", "configuration": "c", "definition": "", "note": ""}
-    before = MapData(
-        **facts, x_label="x", y_label="y", x=(1.0,), y=(1.0,), cells=(("settled",),), prediction=None
-    )
-    after = msgspec.structs.replace(before, cells=(("growing",),))
-
-    assert judge_map(before, after).red
-    assert map_key(after) == "t/c/map:n"
-
-
-def test_a_stability_map_that_is_not_there_any_more_is_missing_until_it_is_back_or_given_up():
-    from spook_tracker.tracker.judge.accepted import Accepted
-    from spook_tracker.tracker.judge.tonight import tonight
-    from spook_tracker.tracker.website.causes import causes_of
-    from spook_tracker.tracker.website.nights import book
-    from tests.histories.synthetic import DocumentHistory, document
-
-    runs = [document(n) for n in range(5)]
-    runs[3:] = [msgspec.structs.replace(run, maps=()) for run in runs[3:]]
-    key = "pendulum/plain/map:damping-compliance"
-    for last in (4, 5):  # the first night without it, and the second
-        told = DocumentHistory(runs[:last])
-        (found,) = [f for f in tonight(told, runs[last - 1]) if f.series == key]
-        assert (found.red, found.verdict.word) == (True, "missing")
-        assert (found.good.id, found.bad.id) == (runs[2].id, runs[3].id)
-        assert found.news == (last == 4)
-        assert [h.sentence for c in causes_of(book(told)) for h in c.hits if h.series == key]
-
-    given_up = [Accepted(series=key, low=math.inf, high=math.inf, who="A", why="w", removed=True)]
-    assert not [f for f in tonight(DocumentHistory(runs), runs[-1], given_up) if f.red]
-    assert not causes_of(book(DocumentHistory(runs), given_up))
-
-    runs.append(document(5))
-    assert not [f for f in tonight(DocumentHistory(runs), runs[-1]) if f.red]
-
-
-def test_a_stability_map_that_was_not_asked_for_is_not_missed():
-    from spook_tracker.tracker.document.run_document import Asked
-    from spook_tracker.tracker.judge.tonight import tonight
-    from tests.histories.synthetic import DocumentHistory, document
-
-    runs = [document(n) for n in range(3)]
-    asked = Asked(tests=tuple(card.name for card in runs[0].tests), families=("values", "sweep"), whole=True)
-    runs[2] = msgspec.structs.replace(runs[2], maps=(), asked=asked)
-
-    assert not [f for f in tonight(DocumentHistory(runs), runs[2]) if ":damping" in f.series]
-
-
-def test_maps_that_were_dropped_for_newer_ones_are_not_missed(tmp_path):
-    """Only the newest run keeps its maps; an older one set beside it has lost nothing."""
-    from spook_tracker.tracker.judge.tonight import tonight
-    from spook_tracker.tracker.website.comparisons import comparisons
-    from spook_tracker.tracker.website.nights import book
-    from tests.histories.synthetic import DocumentHistory, document
-
-    runs = [document(n) for n in range(4)]
-    runs[:3] = [msgspec.structs.replace(run, maps=()) for run in runs[:3]]
-    told = DocumentHistory(runs)
-    assert not [f for f in tonight(told, runs[1]) if ":damping" in f.series]
-    assert '"missing"' not in json.dumps(comparisons(told, book(told), (), {}).pairs)
-
-
-def test_the_first_page_does_not_stay_green_where_a_map_is_gone():
-    from spook_tracker.tracker.website.nights import book
-    from spook_tracker.tracker.website.page_index import health
-    from tests.histories.synthetic import DocumentHistory, document
-
-    runs = [document(n) for n in range(4)]
-    assert health(book(DocumentHistory(runs)))[0] != "fail"
-    runs[3] = msgspec.structs.replace(runs[3], maps=())
-    lost = book(DocumentHistory(runs))
-    assert health(lost)[0] == "fail"
-    assert "fail" in [test.state for test in lost.tests if test.lost_maps]

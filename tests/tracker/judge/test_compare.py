@@ -9,39 +9,13 @@ import msgspec
 import pytest
 
 from spook_tracker.tracker.document.json_form import Number, decode, encode
-from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesDefinition, Timing
+from spook_tracker.tracker.document.run_document import Sample, Timing
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.compare import ComparedRun, Known, compare
 from spook_tracker.tracker.judge.comparison_document import CompareDocument, Side
+from tests.histories.documents import gate, stability_map
 
 STEPS = (0.1, 0.05, 0.025, 0.0125, 0.00625)
-
-
-def series(key: str, **facts) -> SeriesDefinition:
-    test, configuration, metric = key.split("/")[:3]
-    common = {
-        "key": key,
-        "test": test,
-        "title": "T",
-        "configuration": configuration,
-        "metric": metric,
-        "description": "d",
-        "unit": "m",
-        "role": "gate",
-        "better": "smaller_magnitude",
-        "kind": "scalar",
-        "time_step": None,
-        "parameters": {},
-        "limit": None,
-        "limit_source": "",
-        "set_point": None,
-        "set_point_source": "",
-        "reference": None,
-        "tolerance": 0.0,
-        "relative_tolerance": 1e-9,
-        "test_version": "1",
-    }
-    return SeriesDefinition(**{**common, **facts})
 
 
 def pair(key: str, value: float, timing: Timing | None = None, steps: int = 0, **facts):
@@ -55,7 +29,7 @@ def pair(key: str, value: float, timing: Timing | None = None, steps: int = 0, *
         counters={"steps": steps} if steps else {},
         timing=timing,
     )
-    return key, (series(key, **facts), sample)
+    return key, (gate(key, **facts), sample)
 
 
 def side(name: str, **facts) -> Side:
@@ -156,11 +130,8 @@ def test_the_first_bad_commit_is_told_where_it_is_known():
 
 
 def test_a_map_cell_that_got_worse_is_a_regression():
-    facts = {"test": "t", "name": "n", "title": "", "configuration": "c", "definition": "", "note": ""}
-    before = MapData(
-        **facts, x_label="x", y_label="y", x=(1.0,), y=(1.0,), cells=(("settled",),), prediction=None
-    )
-    after = msgspec.structs.replace(before, cells=(("diverged",),))
+    before = stability_map("n", test="t", configuration="c")
+    after = msgspec.structs.replace(before, cells=(("diverged", "settled"),))
     document = compare(
         run("a", pair("t/c/m", 1.0), maps=[before]), run("b", pair("t/c/m", 1.0), maps=[after])
     )
@@ -169,10 +140,7 @@ def test_a_map_cell_that_got_worse_is_a_regression():
 
 
 def test_a_map_that_was_asked_for_and_is_not_there_is_missing_and_red():
-    facts = {"test": "t", "name": "n", "title": "", "configuration": "c", "definition": "", "note": ""}
-    cells = MapData(
-        **facts, x_label="x", y_label="y", x=(1.0,), y=(1.0,), cells=(("settled",),), prediction=None
-    )
+    cells = stability_map("n", test="t", configuration="c")
     values = [pair("t/c/m", 1.0), pair("t/c/stability:s", 1.0, kind="break_point", better="larger")]
     document = compare(run("a", *values, maps=[cells]), run("b", *values))
     silent = compare(run("a", *values, maps=[cells]), run("b", values[0]))

@@ -25,6 +25,7 @@ from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.record import record
 from spook_tracker.tracker.store.retention import drop_old_figures
 from spook_tracker.tracker.website.causes import anchor, causes_of
+from spook_tracker.tracker.website.comparisons import comparisons
 from spook_tracker.tracker.website.feed import atom
 from spook_tracker.tracker.website.nights import book
 from spook_tracker.tracker.website.page_index import health, index
@@ -85,6 +86,7 @@ def lost(runs: list[RunDocument], accepted: tuple[Accepted, ...] = ()) -> Any:
     assert finding.news == trend.news == (finding.bad.id == runs[-1].id)
     assert (finding.last_good, finding.first_bad) != ("", "")
     assert health(told)[0] == "fail"
+    assert {test.state for test in told.tests if test.lost_maps} == {"fail"}
     return finding.good.id, finding.bad.id, finding.news
 
 
@@ -177,6 +179,8 @@ def test_maps_that_retention_dropped_are_not_missed() -> None:
     assert lost(runs) is None
     records = DocumentHistory(runs)
     assert not [f for f in tonight(records, runs[2]) if f.series == KEY]
+    assert health(book(records))[0] != "fail"
+    assert '"missing"' not in json.dumps(comparisons(records, book(records), (), {}).pairs)
     assert may_be_dropped(records, runs[2:]) == {
         runs[2].id: {KEY},
         runs[3].id: {KEY},

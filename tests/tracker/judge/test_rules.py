@@ -18,9 +18,9 @@ from spook_tracker.tracker.judge.run_times import judge_noisy
 from spook_tracker.tracker.judge.series_history import judge_history
 from spook_tracker.tracker.judge.verdict import judge, judge_map
 from spook_tracker.tracker.judge.vocabulary import with_recoveries
-from tests.histories.documents import definition, engine, run_of
+from tests.histories.documents import definition, engine, gate, run_of
 from tests.tracker.judge.test_compare import side
-from tests.tracker.judge.test_verdict import sample, series
+from tests.tracker.judge.test_verdict import sample
 
 LEVELS = [1e-6, 1.0, 1e6]  # s: what counts is relative, so the unit of time makes no difference
 
@@ -93,15 +93,15 @@ def test_outcomes_have_the_documented_order(better: str, worse: str) -> None:
         return sample(1.0 if outcome in ("value", "unsettled", "out_of_limit") else math.nan, outcome)
 
     word = "missing" if worse == "missing" else "regressed"
-    assert judge(series(limit=1.0), one(better), one(worse)).word == word
-    assert judge(series(limit=1.0), one(worse), one(better)).word in ("fixed", "improved")
+    assert judge(gate(limit=1.0), one(better), one(worse)).word == word
+    assert judge(gate(limit=1.0), one(worse), one(better)).word in ("fixed", "improved")
 
 
 @pytest.mark.parametrize(
     "pair", [("diverged", "crashed"), ("crashed", "timed_out"), ("timed_out", "diverged")]
 )
 def test_ways_to_give_no_answer_are_equally_bad(pair: tuple[str, str]) -> None:
-    assert not judge(series(), sample(math.nan, pair[0]), sample(math.nan, pair[1])).red
+    assert not judge(gate(), sample(math.nan, pair[0]), sample(math.nan, pair[1])).red
 
 
 CELLS = ("settled", "bounded", "growing", "diverged", "not_finite", "an unknown word")

@@ -7,34 +7,9 @@ import math
 import pytest
 
 from spook_tracker.tracker.document.json_form import NAN, Number
-from spook_tracker.tracker.document.run_document import MapData, Sample, SeriesDefinition
+from spook_tracker.tracker.document.run_document import MapData, Sample
 from spook_tracker.tracker.judge.verdict import RANK, Verdict, judge, judge_map, ulp_distance
-
-
-def series(**facts) -> SeriesDefinition:
-    common = {
-        "key": "t/c/m",
-        "test": "t",
-        "title": "T",
-        "configuration": "c",
-        "metric": "m",
-        "description": "d",
-        "unit": "m",
-        "role": "gate",
-        "better": "smaller_magnitude",
-        "kind": "scalar",
-        "time_step": None,
-        "parameters": {},
-        "limit": None,
-        "limit_source": "",
-        "set_point": None,
-        "set_point_source": "",
-        "reference": None,
-        "tolerance": 0.0,
-        "relative_tolerance": 1e-9,
-        "test_version": "1",
-    }
-    return SeriesDefinition(**{**common, **facts})
+from tests.histories.documents import gate, stability_map
 
 
 def sample(value: float, outcome: str = "value", held: bool = True, state: str = "") -> Sample:
@@ -51,7 +26,7 @@ def sample(value: float, outcome: str = "value", held: bool = True, state: str =
 
 
 def verdict(before: float, after: float, **facts) -> Verdict:
-    definition = series(**facts)
+    definition = gate(**facts)
 
     def measured(value: float) -> Sample:
         inside = definition.limit is None or (
@@ -145,18 +120,18 @@ def test_what_is_not_finite_is_the_worst_value_at_once(broken):
 def test_a_document_that_calls_nan_a_value_is_not_believed():
     lying = Sample(series="t/c/m", value=NAN, outcome="value", passed=True, set_point_held=True)
 
-    assert judge(series(limit=1.0), sample(0.1), lying).name == "not finite"
+    assert judge(gate(limit=1.0), sample(0.1), lying).name == "not finite"
 
 
 def test_every_worse_class_is_regressed_and_every_better_one_is_not():
     for old in RANK:
         for new in RANK:
-            found = judge(series(), sample(1.0, old), sample(1.0, new))
+            found = judge(gate(), sample(1.0, old), sample(1.0, new))
             assert found.red == (RANK[new] > RANK[old]), (old, new)
 
 
 def test_leaving_the_set_point_is_regressed_inside_the_limit():
-    definition = series(limit=1.0, set_point=(0.4, 0.5))
+    definition = gate(limit=1.0, set_point=(0.4, 0.5))
 
     assert judge(definition, sample(0.45), sample(0.3, held=False)).name == "set point left"
     assert judge(definition, sample(0.3, held=False), sample(0.45)).word == "fixed"
@@ -168,17 +143,17 @@ def test_inside_a_band_the_reference_says_what_is_worse():
 
 
 def test_the_same_commit_with_two_values_is_non_deterministic():
-    found = judge(series(limit=1.0), sample(0.1), sample(0.1 + math.ulp(0.1)), same_commit=True)
-    by_state = judge(series(limit=1.0), sample(0.1, state="a"), sample(0.1, state="b"), same_commit=True)
+    found = judge(gate(limit=1.0), sample(0.1), sample(0.1 + math.ulp(0.1)), same_commit=True)
+    by_state = judge(gate(limit=1.0), sample(0.1, state="a"), sample(0.1, state="b"), same_commit=True)
 
     assert (found.word, found.red) == ("non_deterministic", True)
     assert by_state.word == "non_deterministic"
-    assert judge(series(), sample(0.1, state="a"), sample(0.1, state="b")).word == "changed"
+    assert judge(gate(), sample(0.1, state="a"), sample(0.1, state="b")).word == "changed"
 
 
 @pytest.mark.parametrize("broken", ["same_definition", "same_environment"])
 def test_another_definition_or_float_environment_is_not_comparable_and_never_red(broken):
-    found = judge(series(), sample(1e-3), sample(math.nan), **{broken: False})
+    found = judge(gate(), sample(1e-3), sample(math.nan), **{broken: False})
 
     assert (found.word, found.red) == ("not_comparable", False)
 
@@ -191,20 +166,7 @@ def test_ulps_count_the_doubles_between():
 
 
 def cells(*rows: tuple[str, ...], x=(1.0, 2.0)) -> MapData:
-    return MapData(
-        test="t",
-        name="m",
-        title="M",
-        configuration="c",
-        definition="finite",
-        x_label="x",
-        y_label="y",
-        x=x,
-        y=tuple(float(i) for i in range(len(rows))),
-        cells=rows,
-        prediction=None,
-        note="",
-    )
+    return stability_map(x=x, y=tuple(float(i) for i in range(len(rows))), cells=rows)
 
 
 def test_a_cell_that_moves_for_the_worse_is_a_regression_with_its_place():

@@ -150,7 +150,7 @@ def test_a_benchmark_of_another_tool_is_asked_by_its_own_command(pebble: Pebble)
         ({"comand": "make"}, "has no setting 'comand'"),
         ({"command": 3}, "command of [build] must be a shell command"),
         ({"questions": "tracking"}, "must be a list of paths"),
-        ({"questions": ["../tracking"]}, "must lie beside it"),
+        ({"questions": ["../tracking"]}, "must be inside its folder"),
         ({"environment": {"CC": 3}}, "must be a table of texts"),
     ],
 )

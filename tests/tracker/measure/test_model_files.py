@@ -20,7 +20,8 @@ from spook_tracker.tracker.judge.verdict import judge
 from spook_tracker.tracker.measure.catalogues import find
 from spook_tracker.tracker.measure.model_files import ModelFileError, catalogue
 from spook_tracker.tracker.measure.question import measure, metric_series
-from tests.tracker.judge.test_verdict import sample, series
+from tests.histories.documents import gate
+from tests.tracker.judge.test_verdict import sample
 
 BALL = """<mujoco><worldbody><geom type="plane" size="1 1 1"/>
 <body name="ball" pos="0 0 {height}"><freejoint/><geom type="sphere" size=".1"/></body></worldbody>
@@ -167,14 +168,12 @@ KNOWN = Sensitivity(rounding=Number(1e-14), step_error=Number(1e-5), scale=Numbe
 
 
 def _judged(before: float, after: float, tolerance: float = 0.0, known: Sensitivity = KNOWN):
-    definition = series(better="inside", role="reported", tolerance=tolerance, sensitivity=known)
+    definition = gate(better="inside", role="reported", tolerance=tolerance, sensitivity=known)
     return judge(definition, sample(before, state="a"), sample(after, state="b"))
 
 
 def test_three_things_are_told_apart() -> None:
-    assert (
-        judge(series(sensitivity=KNOWN), sample(1.0, state="a"), sample(1.0, state="a")).word == "identical"
-    )
+    assert judge(gate(sensitivity=KNOWN), sample(1.0, state="a"), sample(1.0, state="a")).word == "identical"
     assert _judged(0.1, 0.1 + 9e-15).word == "same"
     assert "rounding" in _judged(0.1, 0.1 + 9e-15).sentence
     changed = _judged(0.1, 0.1 + 1e-9)  # far below what halving the step changes, and a change all the same
@@ -220,7 +219,7 @@ def _side(run: str) -> Side:
 
 @pytest.mark.parametrize(("after", "seen"), [(0.1 + 9e-15, False), (0.1 + 1e-9, True), (0.1, False)])
 def test_between_releases_rounding_is_no_news_and_a_change_is_however_small(after: float, seen: bool) -> None:
-    definition = series(better="inside", role="reported", sensitivity=KNOWN)
+    definition = gate(better="inside", role="reported", sensitivity=KNOWN)
     before, later = (
         ComparedRun(side=_side(name), samples={"t/c/m": (definition, sample(value, state=name))})
         for name, value in (("a", 0.1), ("b", after))

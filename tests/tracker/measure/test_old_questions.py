@@ -103,7 +103,7 @@ def test_sweeps_and_stability_are_asked_of_the_commit_that_has_them(repository: 
         (repository.sweep.engine.git_hash, ("--sweep", "--stability")),
     ]
     assert done.output.count("none worse") == 2
-    assert "cannot be told" not in done.output
+    assert "? of these, " not in done.output
 
 
 def test_what_is_not_answered_is_no_green(repository: Repository) -> None:
@@ -112,7 +112,7 @@ def test_what_is_not_answered_is_no_green(repository: Repository) -> None:
     done = repository.judged("--junit", "found.xml")
 
     assert done.exit_code == 3, done.output
-    assert f"{ladders} cannot be told, {ladders} ladder: not measured in this run" in done.output
+    assert f"{ladders} cannot be compared, {ladders} ladder: not measured in this run" in done.output
     skipped = [
         case
         for case in ElementTree.parse("found.xml").iter("testcase")

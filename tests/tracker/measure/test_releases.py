@@ -248,7 +248,7 @@ def test_the_rest_goes_on_when_a_release_fails_and_a_second_call_measures_only_w
     again = list(command.progress("other", ("1.0", "1.4", "1.5"), measure, database, time.monotonic() - 1.0))
     assert measured == []
     assert "recorded already" in again[0] and "recorded already" in again[1]
-    assert "the time is up; the same command goes on from here" in again[2]
+    assert "time is up; run the same command again to go on" in again[2]
 
 
 def history(tmp_path: Path, *runs: Any) -> str:

@@ -298,7 +298,7 @@ def test_a_copy_that_arrives_changed_is_taken_back(session, migrated_url, tmp_pa
     session.close()
     monkeypatch.setattr("spook_tracker.tracker.store.database_copy.digest", lambda connection, table: None)
 
-    with pytest.raises(DatabaseError, match="arrived changed; nothing was copied"):
+    with pytest.raises(DatabaseError, match="differs; nothing was copied"):
         copy_database(migrated_url, f"sqlite:///{tmp_path}/copy.db")
 
     copied = open_database(f"sqlite:///{tmp_path}/copy.db")
