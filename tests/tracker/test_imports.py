@@ -204,7 +204,7 @@ def test_records_of_several_files_are_one_run_a_commit(tmp_path: Path) -> None:
 def test_numbers_in_no_known_unit_explain_and_the_command_says_so(tmp_path: Path) -> None:
     found = Imported(tmp_path, *COLUMNS, TOOLS / "json-lines" / "humanoid.jsonl")
 
-    assert "contacts_mean; say it with --column contacts_mean=UNIT" in found.said
+    assert "contacts_mean; give one with --column contacts_mean=UNIT" in found.said
     assert {d["role"] for d in found.runs()[0]["series"] if d["metric"] == "contacts_mean"} == {"explaining"}
 
 

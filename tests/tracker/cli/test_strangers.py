@@ -200,7 +200,7 @@ def test_a_run_without_any_value_is_left_out_and_said(tmp_path: Path) -> None:
     (tmp_path / "x.js").write_text(data({"f": [1000.0, None, 1000.0]}))
     _, said = Strangers(tmp_path)("import", tmp_path / "x.js")
 
-    assert said.startswith("2 runs recorded") and "no value in them: 1 of" in said
+    assert said.startswith("2 runs recorded") and "they contain no value: 1 of" in said
 
 
 def test_a_slow_night_as_there_are_now_and_then_is_called_flaky(tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -110,11 +111,11 @@ def test_interrupted_before_anything_was_finished_nothing_is_recorded() -> None:
 def test_the_library_hands_over_what_was_finished(monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
 
-    def sometimes(source: Questions, task: measuring.Task) -> object:
+    def sometimes(source: Questions, task: measuring.Task, **more: Any) -> object:
         asked.append(task.test)
         if task.test != "quick":
             raise KeyboardInterrupt
-        return answer(source, task)
+        return answer(source, task, **more)
 
     answer = measuring.perform
     monkeypatch.setattr(measuring, "perform", sometimes)

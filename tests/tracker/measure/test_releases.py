@@ -240,7 +240,7 @@ def test_the_rest_goes_on_when_a_release_fails_and_a_second_call_measures_only_w
     assert [line.partition(": ")[2][:30] for line in lines] == [
         "1 of 1 values in 0 s",
         "other==1.1 cannot be installed",
-        "it says it is '1.3', so nothin",  # another release of it lies in the way
+        "it reports version '1.3', so n",  # another release of it lies in the way
         "1 of 1 values in 0 s",
     ]
 
