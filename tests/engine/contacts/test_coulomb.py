@@ -28,17 +28,22 @@ from spook_tracker.engine import (
 
 TIME_STEP = 1.0 / 60.0  # s
 GRAVITY = 10.0  # m/s²
-DIRECTIONS = [math.radians(10 * k) for k in range(36)]
+DIRECTIONS = [math.radians(10 * k) for k in range(36)] + [math.pi / 4]
 Array = npt.NDArray[np.float64]
 
 
 def slope(
-    tangent: float, direction: float, mu: float = 0.5, mass: float = 1.0, slip_compliance: float = 0.0
+    tangent: float,
+    direction: float,
+    mu: float = 0.5,
+    mass: float = 1.0,
+    slip_compliance: float = 0.0,
+    below: float = 0.0,
 ) -> Scene:
     """A unit box on a level plane, gravity tilted by atan(tangent) towards `direction`."""
     theta = math.atan(tangent)
     pull = (math.sin(theta) * math.cos(direction), math.sin(theta) * math.sin(direction), -math.cos(theta))
-    surface = Material(friction=mu)
+    surface = Material(friction=mu, slip_compliance=below)
     plane = RigidBody(name="plane", position=(0, 0, 0), shape=Plane(), motion="static", material=surface)
     box = RigidBody(
         name="box",
@@ -66,13 +71,20 @@ def angle_between(a: float, b: float) -> float:
     return abs(math.remainder(a - b, 2.0 * math.pi))
 
 
-@pytest.mark.parametrize("tangent", [0.5, 0.6])
+@pytest.mark.parametrize("tangent", [0.1, 0.3, 0.5, 0.6])
 def test_the_cone_is_the_same_in_every_direction(tangent: float) -> None:
-    """Standing at tan θ = mu and sliding at .6: F_t/F_n = .5 to 1e-9 at every step, along the slope to 1e-6°."""
+    """Standing up to tan θ = mu, held by what pulls it, and sliding at .6: F_t/F_n to 1e-9 at every step, along the slope
+    to 1e-6°, with a = g (sin θ − mu cos θ)."""
+    theta = math.atan(tangent)
+    gain = max(0.0, GRAVITY * (math.sin(theta) - 0.5 * math.cos(theta)) * TIME_STEP)
     for direction in DIRECTIONS:
         result = simulate(slope(tangent, direction), time_step=TIME_STEP, duration=1.0, observe=OBSERVE)
 
-        assert np.abs(ratio(result["force"]) - 0.5).max() <= 1e-9
+        assert np.abs(ratio(result["force"]) - min(0.5, tangent)).max() <= 1e-9
+        assert np.abs(result["force"][:, 2] / (GRAVITY * math.cos(theta)) - 1.0).max() <= 1e-9
+        along = np.array([math.cos(direction), math.sin(direction), 0.0])
+        exact = np.outer(gain * np.arange(1, 61), along)
+        np.testing.assert_allclose(result["velocity"], exact, rtol=0, atol=1e-8)
         fx, fy, _ = result["force"][-1]
         assert math.degrees(angle_between(math.atan2(-fy, -fx), direction)) <= 1e-6
         if tangent > 0.5:
@@ -82,7 +94,7 @@ def test_the_cone_is_the_same_in_every_direction(tangent: float) -> None:
 
 @pytest.mark.parametrize("mu", [0.1, 0.5, 1.0])
 @pytest.mark.parametrize("mass", [1.0, 1e4])
-@pytest.mark.parametrize("direction", [0.0, 0.4, math.pi / 4])
+@pytest.mark.parametrize("direction", [0.0, 0.3, 0.4, math.pi / 4, math.pi / 2, 2.3, 3.7, 5.2])
 def test_it_sticks_just_below_the_friction_angle_and_slips_just_above(
     mu: float, mass: float, direction: float
 ) -> None:
@@ -114,12 +126,13 @@ def test_the_box_models_hold_a_tenth_more_across_their_axes(model: str) -> None:
     """At tan θ = .6: sliding along an axis the ratio is .5; at 45° each axis allows .5, so the box stands at .6."""
     method = Method(friction=model)  # type: ignore[arg-type]
     ratios = []
-    for direction in DIRECTIONS:
+    for direction in DIRECTIONS:  # the last is 45°
         result = simulate(
             slope(0.6, direction), time_step=TIME_STEP, duration=1.0, observe=OBSERVE, method=method
         )
         ratios.append(float(ratio(result["force"][-1])))
 
+    assert np.abs(result["velocity"][-1]).max() < 1e-6
     assert min(ratios) == pytest.approx(0.5, abs=1e-9)
     assert max(ratios) - min(ratios) == pytest.approx(0.1, abs=1e-3)
     expected = [
@@ -169,15 +182,16 @@ def test_iterations_reach_the_direct_answer(tangent: float) -> None:
     assert direct.counters["sweeps"] == 0
 
 
-def test_slip_compliance_lets_it_creep() -> None:
-    """T11: creep speed gamma F_t; four points share the force, none at its bound."""
+@pytest.mark.parametrize("below", [0.0, 1e-3])
+def test_slip_compliance_lets_it_creep(below: float) -> None:
+    """T11: creep speed gamma F_t, steadily; those of both surfaces add, four points share the force, none at its bound."""
     gamma = 1e-3
-    result = simulate(
-        slope(0.2, 0.7, slip_compliance=gamma), time_step=TIME_STEP, duration=2.0, observe=OBSERVE
-    )
+    scene = slope(0.2, 0.7, slip_compliance=gamma, below=below)
+    result = simulate(scene, time_step=TIME_STEP, duration=5.0, observe=OBSERVE)
 
     force = GRAVITY * math.sin(math.atan(0.2))
-    assert np.linalg.norm(result["velocity"][-1]) == pytest.approx(gamma * force / 4.0, rel=1e-6)
+    speeds = np.linalg.norm(result["velocity"][[-1, -50]], axis=1)
+    assert speeds == pytest.approx((gamma + below) * force / 4.0, rel=1e-6)
 
 
 def test_a_sliding_ball_begins_to_roll_and_keeps_five_sevenths() -> None:
@@ -222,10 +236,11 @@ def test_a_ball_rolls_down_a_slope_with_five_sevenths_of_gravity() -> None:
         Scene(bodies=bodies, gravity=(GRAVITY * math.sin(theta), 0, -GRAVITY * math.cos(theta))),
         time_step=TIME_STEP,
         duration=1.0,
-        observe={"v": Final(quantity=Velocity("ball")), "f": Final(quantity=ContactForce("ball"))},
+        observe={"v": Trace(quantity=Velocity("ball")), "f": Final(quantity=ContactForce("ball"))},
     )
 
-    assert result["v"][0] == pytest.approx(5.0 / 7.0 * GRAVITY * math.sin(theta), abs=1e-9)
+    gain = 5.0 / 7.0 * GRAVITY * math.sin(theta) * TIME_STEP
+    np.testing.assert_allclose(result["v"][:, 0], gain * np.arange(61), rtol=0, atol=1e-9)
     assert result["f"][0] == pytest.approx(-2.0 / 7.0 * 2.0 * GRAVITY * math.sin(theta), abs=1e-7)
 
 

@@ -14,21 +14,14 @@ from spook_tracker.engine import (
     Box,
     ConstraintForce,
     Distance,
-    Energy,
     Final,
     Hinge,
-    JointCoordinate,
     KineticEnergy,
     Load,
     Lock,
     Material,
-    Maximum,
-    MaximumAbsolute,
-    Mean,
     Method,
-    Minimum,
     Momentum,
-    Motor,
     Orientation,
     Particle,
     Plane,
@@ -39,7 +32,6 @@ from spook_tracker.engine import (
     SimulationFailed,
     Trace,
     Velocity,
-    Violation,
     compile,
     simulate,
 )
@@ -47,50 +39,12 @@ from tests.oracles.rigid import RigidOracle
 from tests.scenes.rigid import TIME_STEP, everything, loop, tree
 
 GRAVITY = (0.0, 0.0, -9.81)
-REDUCTIONS = {
-    Final: lambda samples: samples[-1],
-    Maximum: lambda samples: samples.max(axis=0),
-    Minimum: lambda samples: samples.min(axis=0),
-    MaximumAbsolute: lambda samples: np.abs(samples).max(axis=0),
-    Mean: lambda samples: sum(samples[1:], start=samples[0]) / len(samples),
-}
 
 
 def body(name: str = "body", **changes: object) -> RigidBody:
     return RigidBody(
         **{"name": name, "mass": 2.0, "inertia": (0.3, 0.4, 0.5), "position": (0.0, 0.0, 0.0)} | changes  # type: ignore[arg-type]
     )
-
-
-def test_reductions_equal_those_of_the_trace() -> None:
-    scene = everything(np.random.default_rng(3))
-    hinge = next(c.name for c in scene.constraints if isinstance(c, Hinge))
-    quantities = (
-        Position(),
-        Orientation("b0"),
-        Velocity("dot"),
-        AngularVelocity(),
-        KineticEnergy(),
-        PotentialEnergy(),
-        Energy(),
-        Momentum(),
-        AngularMomentum((1.0, 2.0, 3.0)),
-        Violation(hinge),
-        ConstraintForce(hinge),
-        JointCoordinate(hinge),
-        Violation("leash"),
-        ConstraintForce("leash"),
-    )
-    observe = {}
-    for i, quantity in enumerate(quantities):
-        observe[f"trace {i}"] = Trace(quantity=quantity)
-        observe |= {f"{kind.__name__} {i}": kind(quantity=quantity, first=3, last=17) for kind in REDUCTIONS}
-    result = simulate(scene, time_step=TIME_STEP, steps=20, observe=observe)
-
-    for i in range(len(quantities)):
-        for kind, reduce in REDUCTIONS.items():
-            np.testing.assert_array_equal(result[f"{kind.__name__} {i}"], reduce(result[f"trace {i}"][3:18]))
-    assert simulate(scene, time_step=TIME_STEP, steps=20).state_hash == result.state_hash
 
 
 def test_energies_and_momenta_are_those_of_the_state() -> None:
@@ -266,19 +220,6 @@ def test_a_time_limit_ends_a_rigid_run() -> None:
     run = simulate(tree(np.random.default_rng(1)), time_step=1e-6, steps=10**8, time_limit=0.05)
 
     assert run.status == "timed_out" and 0 < run.steps < 10**8
-
-
-def test_a_hinge_counts_its_turns() -> None:
-    """The coordinate goes on past half a turn: ten turns are 20 π."""
-    wheel = body(inertia=(0.5, 0.5, 0.5))
-    hinge = Hinge(name="hinge", between=(WORLD, "body"), motor=Motor(speed=2.0 * math.pi))
-    observe = {"angle": Trace(quantity=JointCoordinate("hinge"))}
-    angle = simulate(
-        Scene(bodies=(wheel,), constraints=(hinge,)), time_step=1e-3, duration=10.0, observe=observe
-    )["angle"]
-
-    assert np.diff(angle).min() > 0.0
-    assert angle[-1] == pytest.approx(20.0 * math.pi, rel=1e-4)
 
 
 def test_a_point_of_a_body_is_read_where_it_is() -> None:
