@@ -16,7 +16,6 @@ from spook_tracker.engine import (
     Cylinder,
     Energy,
     Final,
-    Fluid,
     Load,
     Material,
     Method,
@@ -26,7 +25,6 @@ from spook_tracker.engine import (
     Position,
     RigidBody,
     Scene,
-    SceneError,
     Sphere,
     Trace,
     Velocity,
@@ -54,26 +52,6 @@ def turned(axis: Any, angle: float) -> tuple[float, float, float, float]:
 def depth(*bodies: RigidBody) -> float:
     found = simulate(Scene(bodies=bodies), time_step=H, steps=1, observe={"d": Trace(quantity=Penetration())})
     return float(found["d"].max())
-
-
-@pytest.mark.parametrize("seed", range(8))
-def test_its_depth_below_a_plane_is_that_of_its_lowest_point(seed: int) -> None:
-    """The lowest point, found by minimising over the rim's angle."""
-    rng = np.random.default_rng(seed)
-    turn = Rotation.random(rng=rng)
-    w, x, y, z = turn.as_quat(scalar_first=True)
-
-    def height(angle: Any, side: float) -> float:
-        return float(turn.apply((0.3 * math.cos(angle[0]), 0.3 * math.sin(angle[0]), side))[2])
-
-    lowest = min(
-        minimize(height, (start,), (side,), tol=1e-12).fun
-        for side in (-0.25, 0.25)
-        for start in (0.0, 2.0, 4.0)
-    )
-    body = can(position=(0.0, 0.0, -lowest - 1e-3), orientation=(w, x, y, z))
-
-    assert depth(GROUND, body) == pytest.approx(1e-3, abs=1e-9)
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -145,31 +123,6 @@ def test_rolling_down_it_has_the_inertia_of_its_kind() -> None:
     )
 
     np.testing.assert_allclose(found["v"], (2.0 / 3.0, 0, 0), atol=1e-9)
-
-
-@pytest.mark.parametrize("level", [-0.2, -0.05, 0.1, 0.22])
-@pytest.mark.parametrize("lean", [0.0, 0.4, 1.2, math.pi / 2])
-def test_water_lifts_what_a_grid_of_points_finds_under_it(level: float, lean: float) -> None:
-    body = can(position=(0, 0, 0), orientation=turned((0, 1, 0), lean))
-    scene = Scene(bodies=(body,), forces=(Fluid(name="water", density=1000.0, level=level),), gravity=DOWN)
-    found = simulate(scene, time_step=1e-6, steps=1, observe={"v": Final(quantity=Velocity("can"))})
-    lifted = (float(found["v"][2]) / 1e-6 + 10.0) * 2.0 / (1000.0 * 10.0)  # m³
-    count = 120
-    middles = (np.arange(count) + 0.5) / count
-    r, angle, along = np.meshgrid(0.3 * middles, 2 * math.pi * middles, 0.5 * middles - 0.25, indexing="ij")
-    height = Rotation.from_rotvec((0, lean, 0)).apply(
-        np.stack((r * np.cos(angle), r * np.sin(angle), along), axis=-1).reshape(-1, 3)
-    )[:, 2]
-    cell = r.reshape(-1) * (0.3 / count) * (2 * math.pi / count) * (0.5 / count)
-
-    assert lifted == pytest.approx(float(cell[height < level].sum()), abs=6e-4)
-
-
-@pytest.mark.parametrize("field", ["radius", "length"])
-@pytest.mark.parametrize("value", [0.0, -1.0, math.nan, math.inf, "wide"])
-def test_a_size_that_cannot_be_is_refused_in_a_sentence(field: str, value: Any) -> None:
-    with pytest.raises(SceneError, match=f"cylinder.*{field}"):
-        Cylinder(**({"radius": 1.0, "length": 1.0} | {field: value}))
 
 
 @pytest.mark.parametrize("solver", ["direct", "iterative"])

@@ -10,7 +10,8 @@ E − ½ h g·p, p the momentum, up to what does not change.
 from __future__ import annotations
 
 import math
-from typing import Literal
+from functools import partial
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -97,42 +98,71 @@ def half_kicks(*masses: float) -> float:
     return 0.125 * sum(masses) * (GRAVITY * H) ** 2
 
 
-@pytest.mark.parametrize("impacts", IMPACTS)
-@pytest.mark.parametrize("solver", SOLVERS)
-@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
-def test_balls_that_touch_as_they_fly_are_carried_by_no_body(
-    share: float, solver: str, impacts: Impacts
-) -> None:
+def touching(share: float) -> list[RigidBody]:
     """Two rise, one on top of the other, and meet a third."""
     up, down, heavy = 2.4, 1.5, 8.0
     gap = share * H * (up + down)
-    places = (0.0, 2 * RADIUS, 4 * RADIUS + gap)
-    bodies = [
-        ball("lower", (0.0, 0.0, places[0]), (0.0, 0.0, up), 4.0),
-        ball("upper", (0.0, 0.0, places[1]), (0.0, 0.0, up), 0.5),
-        ball("third", (0.0, 0.0, places[2]), (0.0, 0.0, -down), heavy),
+    return [
+        ball("lower", (0.0, 0.0, 0.0), (0.0, 0.0, up), 4.0),
+        ball("upper", (0.0, 0.0, 2 * RADIUS), (0.0, 0.0, up), 0.5),
+        ball("third", (0.0, 0.0, 4 * RADIUS + gap), (0.0, 0.0, -down), heavy),
     ]
-    change, _ = changes(bodies, 3, H, solver, impacts)
-
-    np.testing.assert_allclose(change, 0.0, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("impacts", IMPACTS)
-@pytest.mark.parametrize("solver", SOLVERS)
-@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
-def test_a_ball_that_rises_along_a_wall_is_not_carried_by_it(
-    share: float, solver: str, impacts: Impacts
-) -> None:
+def along_a_wall(share: float) -> list[RigidBody]:
     speed = 3.0
-    reach = RADIUS + share * H * speed
-    bodies = [
+    return [
         wall("side", (-0.5 - RADIUS, 0.0, 0.0), (1.0, 4.0, 8.0)),
-        wall("roof", (0.0, 0.0, reach + 0.5), (4.0, 4.0, 1.0)),
+        wall("roof", (0.0, 0.0, RADIUS + share * H * speed + 0.5), (4.0, 4.0, 1.0)),
         ball("ball", (0.0, 0.0, 0.0), (0.0, 0.0, speed)),
     ]
-    change, _ = changes(bodies, 3, H, solver, impacts)
 
-    np.testing.assert_allclose(change, 0.0, rtol=0, atol=1e-12)
+
+def off_the_floor(share: float) -> list[RigidBody]:
+    """It begins the step on the floor, with a speed that gravity does not take back in it. Successive blows: in a
+    simultaneous one the floor, which it still touches as the step begins, takes part and stops it."""
+    _, *rest = along_a_wall(share)
+    return [wall("floor", (0.0, 0.0, -0.5 - RADIUS), (4.0, 4.0, 1.0)), *rest]
+
+
+def earlier(share: float) -> list[RigidBody]:
+    """Two would meet late in the step; a third, sent up by the floor, hits the lower one before: both had been led to the
+    time of their own blow."""
+    heavy, light = 5.0, 0.4
+    return [
+        wall("floor", (0.0, 0.0, -0.5), (9.0, 9.0, 1.0)),
+        ball("lowest", (0.0, 0.0, RADIUS + 0.1 * H * 12.0), (0.0, 0.0, -12.0), light),
+        ball("lower", (0.0, 0.0, 3.0 * RADIUS + 0.03), (0.0, 0.0, 1.6), heavy),
+        ball("upper", (0.0, 0.0, 5.0 * RADIUS + 0.03 + share * H * 2.6), (0.0, 0.0, -1.0), heavy),
+    ]
+
+
+SHARES = (0.1, 0.5, 0.9)
+FLIGHTS = (  # what flies, the shares of the step after which it is met, steps, impacts, J
+    (touching, SHARES, 3, IMPACTS, 1e-12),
+    (along_a_wall, SHARES, 3, IMPACTS, 1e-12),
+    (off_the_floor, SHARES, 1, ("successive",), 1e-12),
+    (earlier, (0.9,), 1, ("successive",), 1e-9),
+)
+
+
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize(
+    ("flight", "share", "steps", "impacts", "bound"),
+    [
+        (f, share, steps, how, bound)
+        for f, shares, steps, hows, bound in FLIGHTS
+        for share in shares
+        for how in hows
+    ],
+)
+def test_what_flies_is_carried_by_no_body(
+    flight: Any, share: float, steps: int, impacts: Impacts, bound: float, solver: str
+) -> None:
+    """Not by what it touches as it flies, rises along or has left: no impact gives or takes energy."""
+    change, _ = changes(flight(share), steps, H, solver, impacts)
+
+    np.testing.assert_allclose(change, 0.0, rtol=0, atol=bound)
 
 
 @pytest.mark.parametrize("impacts", IMPACTS)
@@ -154,46 +184,64 @@ def test_balls_locked_to_each_other_are_carried_by_no_body(
     np.testing.assert_allclose(change, -flight(1.0, 3.0), rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
-@pytest.mark.parametrize("share", [0.1, 0.5, 0.9])
-def test_a_ball_that_has_left_the_floor_is_not_carried_by_it(share: float, solver: str) -> None:
-    """It begins the step on the floor, with a speed that gravity does not take back in it. Successive blows: in a
-    simultaneous one the floor, which it still touches as the step begins, takes part and stops it."""
-    speed = 3.0
-    bodies = [
-        wall("floor", (0.0, 0.0, -0.5 - RADIUS), (4.0, 4.0, 1.0)),
-        wall("roof", (0.0, 0.0, RADIUS + share * H * speed + 0.5), (4.0, 4.0, 1.0)),
-        ball("ball", (0.0, 0.0, 0.0), (0.0, 0.0, speed)),
-    ]
-    change, _ = changes(bodies, 1, H, solver, "successive")
+def plank(name: str, slope: float, along: float, size: float) -> RigidBody:
+    """Its upper side through the origin, rising along x by that angle."""
+    way, normal = (math.cos(slope), 0.0, math.sin(slope)), (-math.sin(slope), 0.0, math.cos(slope))
+    return RigidBody(
+        name=name, motion="static", shape=Box((size, 4.0, 1.0)), material=ELASTIC,
+        position=tuple(along * w - 0.5 * n for w, n in zip(way, normal, strict=True)),
+        orientation=(math.cos(0.5 * slope), 0.0, -math.sin(0.5 * slope), 0.0),
+    )  # fmt: skip
 
-    np.testing.assert_allclose(change, 0.0, rtol=0, atol=1e-12)
+
+def on_a_slope(slope: float, share: float) -> list[RigidBody]:
+    """One rolls up a plank that carries it, and one that comes down knocks it back."""
+    up = np.array((math.cos(slope), 0.0, math.sin(slope)))
+    lies = RADIUS * np.array((-up[2], 0.0, up[0]))
+    return [
+        plank("plank", slope, 0.0, 9.0),
+        ball("rises", tuple(lies), tuple(2.0 * up)),
+        ball("falls", tuple(lies + (2 * RADIUS + share * H * 3.0) * up), tuple(-1.0 * up), 3.0),
+    ]
+
+
+def losing_its_support(share: float) -> list[RigidBody]:
+    """A ball leans on a wall and on another, which a third knocks away: it falls, with the kick of the whole step."""
+    large, speed, lean = 1.5 * RADIUS, 4.0, 0.6
+    support = np.array((0.0, 0.0, large))
+    leans = support + (large + RADIUS) * np.array((-math.sin(lean), 0.0, math.cos(lean)))
+    way = np.array((0.5, math.sqrt(0.75), 0.0))
+    comes = support - (2.0 * large + share * H * speed) * way
+    return [
+        wall("floor", (0.0, 0.0, -0.5), (9.0, 9.0, 1.0)),
+        wall("wall", (leans[0] - RADIUS - 0.5, 0.0, 1.0), (1.0, 0.2, 2.0)),
+        ball("leans", tuple(leans), (0.0, 0.0, 0.0)),
+        ball("support", tuple(support), (0.0, 0.0, 0.0), 1.0, large),
+        ball("comes", tuple(comes), tuple(speed * way), 1.0, large),
+    ]
+
+
+def onto_a_steeper_slope(share: float) -> list[RigidBody]:
+    """It slides up a plank to one that is steeper."""
+    up, normal = np.array((math.cos(0.3), 0.0, math.sin(0.3))), np.array((-math.sin(0.3), 0.0, math.cos(0.3)))
+    place = RADIUS * normal - (RADIUS * math.tan(0.03) + share * H * 2.0) * up
+    planks = plank("plank", 0.3, -2.0, 4.0), plank("steeper", 0.36, 2.0, 4.0)
+    return [*planks, ball("slides", tuple(place), tuple(2.0 * up))]
+
+
+CARRIED = (
+    *((partial(on_a_slope, slope), 4) for slope in (-0.3, 0.3, 1.0)), (losing_its_support, 1), (onto_a_steeper_slope, 1),
+)  # fmt: skip
 
 
 @pytest.mark.parametrize("impacts", IMPACTS)
 @pytest.mark.parametrize("solver", SOLVERS)
-@pytest.mark.parametrize("slope", [-0.3, 0.3, 1.0])
+@pytest.mark.parametrize(("scene", "steps"), CARRIED)
 @pytest.mark.parametrize("share", [0.2, 0.9])
-def test_a_ball_hit_on_a_slope_wins_nothing(
-    share: float, slope: float, solver: str, impacts: Impacts
+def test_what_is_carried_wins_nothing_by_an_impact(
+    share: float, scene: Any, steps: int, solver: str, impacts: Impacts
 ) -> None:
-    """It rolls up a plank that carries it, and one that comes down knocks it back."""
-    up = np.array((math.cos(slope), 0.0, math.sin(slope)))
-    normal = np.array((-up[2], 0.0, up[0]))
-    plank = RigidBody(
-        name="plank",
-        motion="static",
-        shape=Box((9.0, 4.0, 1.0)),
-        position=tuple(-(0.5 + RADIUS) * normal),
-        orientation=(math.cos(0.5 * slope), 0.0, -math.sin(0.5 * slope), 0.0),
-        material=ELASTIC,
-    )
-    bodies = [
-        plank,
-        ball("rises", (0.0, 0.0, 0.0), tuple(2.0 * up)),
-        ball("falls", tuple((2 * RADIUS + share * H * 3.0) * up), tuple(-1.0 * up), 3.0),
-    ]
-    change, energy = changes(bodies, 4, H, solver, impacts, carried=True)
+    change, energy = changes(scene(share), steps, H, solver, impacts, carried=True)
 
     assert change.max() <= 1e-9 * energy
 
@@ -233,47 +281,6 @@ def test_the_floor_carries_what_lies_on_it_until_an_impact_lifts_it(
     assert -result["floor"][2] == pytest.approx(3.0 * GRAVITY + rises @ (1.0, 2.0) / H, rel=1e-12)
 
 
-@pytest.mark.parametrize("impacts", IMPACTS)
-@pytest.mark.parametrize("solver", SOLVERS)
-@pytest.mark.parametrize("share", [0.2, 0.9])
-def test_what_loses_its_support_in_an_impact_wins_nothing_by_its_fall(
-    share: float, solver: str, impacts: Impacts
-) -> None:
-    """A ball leans on a wall and on another, which a third knocks away: it falls, with the kick of the whole step."""
-    large, speed, lean = 1.5 * RADIUS, 4.0, 0.6
-    support = np.array((0.0, 0.0, large))
-    leans = support + (large + RADIUS) * np.array((-math.sin(lean), 0.0, math.cos(lean)))
-    way = np.array((0.5, math.sqrt(0.75), 0.0))
-    bodies = [
-        wall("floor", (0.0, 0.0, -0.5), (9.0, 9.0, 1.0)),
-        wall("wall", (leans[0] - RADIUS - 0.5, 0.0, 1.0), (1.0, 0.2, 2.0)),
-        ball("leans", tuple(leans), (0.0, 0.0, 0.0)),
-        ball("support", tuple(support), (0.0, 0.0, 0.0), 1.0, large),
-        ball(
-            "comes", tuple(support - (2.0 * large + share * H * speed) * way), tuple(speed * way), 1.0, large
-        ),
-    ]
-    change, energy = changes(bodies, 1, H, solver, impacts, carried=True)
-
-    assert change.max() <= 1e-9 * energy
-
-
-@pytest.mark.parametrize("solver", SOLVERS)
-def test_an_impact_that_comes_before_the_expected_one_takes_nothing(solver: str) -> None:
-    """Two would meet late in the step; a third, sent up by the floor, hits the lower one before: both had been led to the
-    time of their own blow."""
-    heavy, light = 5.0, 0.4
-    bodies = [
-        wall("floor", (0.0, 0.0, -0.5), (9.0, 9.0, 1.0)),
-        ball("lowest", (0.0, 0.0, RADIUS + 0.1 * H * 12.0), (0.0, 0.0, -12.0), light),
-        ball("lower", (0.0, 0.0, 3.0 * RADIUS + 0.03), (0.0, 0.0, 1.6), heavy),
-        ball("upper", (0.0, 0.0, 5.0 * RADIUS + 0.03 + 0.9 * H * 2.6), (0.0, 0.0, -1.0), heavy),
-    ]
-    change, _ = changes(bodies, 1, H, solver, "successive")
-
-    np.testing.assert_allclose(change, 0.0, rtol=0, atol=1e-9)
-
-
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("share", [0.1, 0.3])
 def test_what_an_impact_lifts_falls_until_the_next_one(share: float, solver: str) -> None:
@@ -302,38 +309,6 @@ def test_what_an_impact_lifts_falls_until_the_next_one(share: float, solver: str
 
     assert result["roof"][2] > 0.0
     assert -half_kicks(1.0, 2.0) < change <= 1e-12
-
-
-@pytest.mark.parametrize("impacts", IMPACTS)
-@pytest.mark.parametrize("solver", SOLVERS)
-@pytest.mark.parametrize("share", [0.2, 0.9])
-def test_a_ball_that_slides_up_to_a_steeper_slope_wins_nothing(
-    share: float, solver: str, impacts: Impacts
-) -> None:
-    planks, ways = [], []
-    for name, slope in (("plank", 0.3), ("steeper", 0.36)):
-        way, normal = (
-            np.array((math.cos(slope), 0.0, math.sin(slope))),
-            np.array((-math.sin(slope), 0.0, math.cos(slope))),
-        )
-        ways.append((way, normal))
-        planks.append(
-            RigidBody(
-                name=name,
-                motion="static",
-                shape=Box((4.0, 4.0, 1.0)),
-                position=tuple((-2.0 if name == "plank" else 2.0) * way - 0.5 * normal),
-                orientation=(math.cos(0.5 * slope), 0.0, -math.sin(0.5 * slope), 0.0),
-                material=ELASTIC,
-            )
-        )
-    (up, normal), speed = ways[0], 2.0
-    place = RADIUS * normal - (RADIUS * math.tan(0.03) + share * H * speed) * up
-    change, energy = changes(
-        [*planks, ball("slides", tuple(place), tuple(speed * up))], 1, H, solver, impacts, carried=True
-    )
-
-    assert change[0] <= 1e-9 * energy
 
 
 @pytest.mark.parametrize("solver", SOLVERS)
