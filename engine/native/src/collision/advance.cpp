@@ -128,6 +128,14 @@ double safe(const Marks& first, const Marks& second, double slop, double until) 
     return least;
 }
 
+/// How long, at most `left`, what discs lean by does not halve.
+double lean_lasts(const Marks& marks, double left) noexcept {
+    for (int i = 0; i < marks.count; ++i)
+        if (const Mark& mark = marks.of[i]; mark.turn * left > 0.499 * mark.sine && mark.radius > 0.0)
+            left = 0.499 * mark.sine / mark.turn;
+    return left;
+}
+
 /// The longest that is found by looking less far ahead, where less can change.
 double longest(const Marks& first, const Marks& second, double slop, double left) noexcept {
     double best = 0.0, until = left;
@@ -138,6 +146,8 @@ double longest(const Marks& first, const Marks& second, double slop, double left
         if (!(here > 0.0) || here >= until || nearer >= 0.9 * until) break;
         until = nearer;
     }
+    const double leans = lean_lasts(second, lean_lasts(first, left));
+    if (best < leans && leans < left) best = std::max(best, safe(first, second, slop, leans));
     return best;
 }
 

@@ -40,7 +40,7 @@ struct Around {
     double a, b, r, p, m, w;
 
     struct Look {
-        double value, slope, bend;
+        double value, slope, bend, root;
     };
     Look at(SineCosine turn) const noexcept {
         const double s = turn.sine, c = turn.cosine, v = p * m * s - w;
@@ -52,7 +52,7 @@ struct Around {
             const double turned = p * p * (s * s - c * c + m * m * c * c) - p * m * s * v;  // q″/2
             second -= r * (turned - half * half / q) / root;
         }
-        return {a * c + b * s - r * root, first, second};
+        return {a * c + b * s - r * root, first, second, root};
     }
 
     /// Calls visit(cos φ, sin φ) at every local maximum on the whole circle but those that `below` excludes: it is told what two
@@ -105,11 +105,12 @@ private:
             (here.slope > 0.0 ? low : high) = angle;
             double next = angle - here.slope / here.bend;
             // Steps round a kink can go to and fro for ever: after a few every second one halves.
-            const bool halves = round > 8 && round % 2 != 0;
-            if (halves || !(next > low && next < high)) next = 0.5 * (low + high);
+            const bool halves = (round > 8 && round % 2 != 0) || !(next > low && next < high);
+            if (halves) next = 0.5 * (low + high);
             const double way = std::abs(next - angle);
             angle = next;
-            if (way <= 4e-16) break;
+            // What Newton's steps leave is of the order of their square over the width of the kink.
+            if (way <= 4e-16 || (!halves && way * way <= 4e-16 * here.root)) break;
         }
         const SineCosine turn = sine_cosine(angle);
         visit(turn.cosine, turn.sine);
