@@ -63,7 +63,10 @@ public:
             std::vector<Vec6> impulses;
             stage.impact(system, impulses);
             for (std::size_t k = 0, u = 0; k < bodies.size(); ++k)
-                if (bodies[k].mass > 0.0) velocity[k] = system.velocity[u++];
+                if (bodies[k].mass > 0.0) {
+                    velocity[k] = system.velocity[u++];
+                    lead[k] = stage.toi_fraction(static_cast<int>(k));
+                }
         }
         for (std::size_t k = 0; k < bodies.size(); ++k)
             for (int i = 0; i < 3 && bodies[k].mass > 0.0; ++i) {

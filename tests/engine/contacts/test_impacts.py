@@ -80,6 +80,23 @@ def test_t12_two_balls_part_with_their_restitution(ratio: float, psi: float) -> 
         assert result["e"] == pytest.approx(0.5 * (9.0 + ratio), rel=1e-12)
 
 
+@pytest.mark.parametrize("h", [1 / 60, 1 / 240, 1 / 960])
+def test_an_oblique_hit_without_rebound_comes_along_the_line_of_centres_of_its_meeting(h: float) -> None:
+    """The ball that is hit leaves with half the speed along it, wherever in its step they meet."""
+    speed, aside = 3.0, 0.05
+    line = np.array([math.sqrt(0.2**2 - aside**2), -aside, 0.0]) / 0.2
+    for before in np.linspace(1.0, 2.0, 9, endpoint=False):  # steps until they meet
+        first = ball("first", -0.2 * line[0] - before * h * speed, speed, 1.0, 0.0, y=aside)
+        v = simulate(
+            Scene(bodies=(first, ball("second", 0.0, 0.0, 1.0, 0.0))),
+            time_step=h,
+            steps=4,
+            observe={"v": Final(quantity=Velocity("second"))},
+        )["v"]
+
+        assert v == pytest.approx(0.5 * speed * line[0] * line, abs=1e-14 * speed)
+
+
 def test_t12_an_oblique_hit_without_friction_leaves_the_tangent_alone() -> None:
     offset = 0.1
     first, second = ball("first", -0.5, 2.0, 1.0, 1.0, y=offset), ball("second", 0.0, 0.0, 1.0, 1.0)

@@ -118,7 +118,9 @@ def test_a_slide_that_turns_is_of_order_1() -> None:
     assert order([end(n) - exact for n in STEPS]) == pytest.approx(1.0, abs=0.15)
 
 
-def test_a_ball_that_slides_down_a_dome_without_friction_is_of_order_2() -> None:
+@pytest.mark.parametrize("rebounds", [False, True])
+def test_a_ball_that_slides_down_a_dome_without_friction_is_of_order_2(rebounds: bool) -> None:
+    """It leaves the dome and meets it again in each step, without a rebound, whatever rebounds elsewhere."""
     start, duration = 0.2, 0.5
     far = 2.0 + RADIUS
     dome = RigidBody(name="dome", motion="static", shape=Sphere(2.0), position=(0.0, 0.0, 0.0))
@@ -128,7 +130,14 @@ def test_a_ball_that_slides_down_a_dome_without_friction_is_of_order_2() -> None
         shape=Sphere(RADIUS),
         position=(far * math.sin(start), 0.0, far * math.cos(start)),
     )
-    scene = Scene(bodies=(dome, body), gravity=(0.0, 0.0, -GRAVITY))
+    far_off = RigidBody(
+        name="far off",
+        mass=1.0,
+        shape=Sphere(RADIUS),
+        position=(50.0, 0.0, 0.0),
+        material=Material(restitution=0.5),
+    )
+    scene = Scene(bodies=(dome, body, *(far_off,) * rebounds), gravity=(0.0, 0.0, -GRAVITY))
 
     def angle(method: Method, n: int) -> float:
         seen = {"x": Final(quantity=Position("body"))}

@@ -24,14 +24,10 @@ public:
     /// at the look before: those that have more pairs now join them.
     void widen(const Cast& cast, std::vector<char>& changed, StepMotion& motion, ContactPoints& points);
 
-    struct Found {
-        int pairs = 0;
-        bool left_out = false;  // impacts that rebound: found after a solve they come too late for it
-    };
     /// Casts the open pairs, once a step is begun those of bodies that `changed` names: the others were judged before.
-    /// Those that meet get points. `keeps_rebounds`: none is left out.
-    Found find_impacts(const Cast& cast, const std::vector<char>& changed, bool keeps_rebounds,
-                       const StepMotion& motion, ContactPoints& points);
+    /// Those that meet get points. How many they are.
+    int find_impacts(const Cast& cast, const std::vector<char>& changed, const StepMotion& motion,
+                     ContactPoints& points);
     /// An impact that is no event acts with the bodies at the start of the step, or the angular momentum of both would
     /// not be kept: with the points of that moment, if their rows stop the approach, else at the point of the meeting,
     /// taken back half-way between both bodies, or with the one that moves by itself.
@@ -63,10 +59,9 @@ private:
     double meeting(const OpenPair& open, const Cast& cast, const StepMotion& motion,
                    const ContactPoints& points) const;
     bool add_toi_point_at_start(const OpenPair& open, double time, const std::vector<Vec6>& velocity,
-                                bool keeps_rebounds, const StepMotion& motion, ContactPoints& points);
+                                const StepMotion& motion, ContactPoints& points);
     bool add_toi_points(const OpenPair& open, double time, const std::vector<Vec6>& velocity,
-                        bool leaves_rebounds, const StepMotion& motion, ContactPoints& points,
-                        bool& left_out);
+                        const StepMotion& motion, ContactPoints& points);
     bool is_known(const ContactPoints& points, const Contact& contact, std::size_t from, std::size_t end,
                   double size, bool& named) const;
 

@@ -23,6 +23,7 @@ struct ContactOptions {
     double floor = 1e-12;               // of pivots, in the factor only
     int refinements = 1;
     ImpactOrder impacts = ImpactOrder::simultaneous;
+    bool stops_rebound = false;       // some joint's does
     double unsettled_residual = 0.1;  // m/s; a solve that leaves more has no answer
 };
 

@@ -49,8 +49,9 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     motion_.predict(free_velocity);
     const std::size_t closed_points = points_.all.size();
     if (!state_.initial_penetration_known) note_initial_penetrations(*model_, points_, state_);
-    if (search_.find_impacts({motion_.predicted}, changed_, false, motion_, points_).pairs > 0) {
-        events_.find(search_, motion_, points_);
+    const bool met = search_.find_impacts({motion_.predicted}, changed_, motion_, points_) > 0;
+    if (met || impacts_.queue().possible()) impacts_.queue().find_meetings(search_, motion_, points_);
+    if (met) {
         search_.move_impacts_to_start(closed_points, motion_.predicted, motion_, points_);
     }
     if (points_.all.empty()) {
@@ -64,20 +65,11 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     return true;
 }
 
-bool ContactStage::meets(const std::vector<Vec6>& next, bool stop_hit, bool rebounds) {
-    if (rebounds)
-        impacts_.meet_plastic_too();    // impacts that a stop's rebound leads to are found again after it
+bool ContactStage::meets(const std::vector<Vec6>& next) {
     changed_ = model_->bodies.jointed;  // others have been cast along what they fly with
     const Cast cast{next, Cast::When::solved};
     search_.widen(cast, changed_, motion_, points_);
-    const std::size_t closed_points = points_.all.size();
-    CandidateSearch::Found found =
-        search_.find_impacts(cast, changed_, impacts_.plastic_too(), motion_, points_);
-    if (found.left_out && stop_hit) {  // as are those to a body that it only stops
-        impacts_.meet_plastic_too();
-        found.pairs += search_.find_impacts(cast, changed_, true, motion_, points_).pairs;
-    }
-    if (found.pairs > 0) search_.move_impacts_to_start(closed_points, next, motion_, points_);
+    find_impacts(cast);
     if (points_.all.empty()) return false;
     state_.counters.contacts += points_.all.size();
     motion_.apply_half_of_forces();
@@ -86,11 +78,16 @@ bool ContactStage::meets(const std::vector<Vec6>& next, bool stop_hit, bool rebo
 }
 
 /// Gives points to what bodies meet along such velocities, where the step begins.
-CandidateSearch::Found ContactStage::find_impacts(const Cast& cast, bool keeps_rebounds) {
+int ContactStage::find_impacts(const Cast& cast) {
     const std::size_t from = points_.all.size();
-    const CandidateSearch::Found found =
-        search_.find_impacts(cast, changed_, keeps_rebounds, motion_, points_);
-    if (found.pairs > 0) search_.move_impacts_to_start(from, cast.velocity, motion_, points_);
+    const int found = search_.find_impacts(cast, changed_, motion_, points_);
+    if (found > 0) search_.move_impacts_to_start(from, cast.velocity, motion_, points_);
+    for (std::size_t k = from; k < points_.all.size() && !rebounds_late_; ++k) {
+        const Contact& contact = points_.all[k].contact;
+        rebounds_late_ = model_->surfaces.pair(contact).restitution > 0.0 &&
+                         -relative_velocity(points_.all[k], contact.point.normal, cast.velocity) >
+                             falls * motion_.fall(contact);  // what forces give is no impact
+    }
     return found;
 }
 
@@ -116,10 +113,10 @@ void ContactStage::after_impact(const MixedSystem& system) {
     const Cast cast{next_};
     search_.widen(cast, changed_, motion_, points_);
     const std::size_t known = points_.all.size();
-    if (search_.find_impacts(cast, changed_, false, motion_, points_).pairs > 0) {
+    if (search_.find_impacts(cast, changed_, motion_, points_) > 0) {
         for (std::size_t k = known; k < points_.all.size(); ++k)
-            if (impacts_.order().come_in_order(*model_, points_.all[k]))
-                impacts_.order().move_to_last_impact(motion_, points_.all[k]);
+            if (impacts_.queue().come_in_order(*model_, points_.all[k]))
+                impacts_.queue().move_to_last_impact(motion_, points_.all[k]);
         search_.move_impacts_to_start(known, next_, motion_, points_);
         state_.counters.contacts += points_.all.size() - known;
         order_points();
@@ -128,19 +125,13 @@ void ContactStage::after_impact(const MixedSystem& system) {
     if (!impacts_.look_again(*model_, points_)) motion_.lay_down(points_.all);
 }
 
-/// After a solve: whether an impact is to come first. Where impacts that rebound were left out, bodies that a plastic impact
-/// sets in motion may meet others with restitution in this very step. The resting rows that answer such impacts know of no
-/// bounce: plastic ones, too, are then met before, so that these are found in time. If there are none, what has been left out is
-/// met as if it did not rebound. So come impacts of bodies that a stop sends back with others that no row knew
-/// of: `known` is how many points there were.
-bool ContactStage::needs_impact_first(const MixedSystem& system, std::size_t known, bool left_out) {
-    if (left_out) {
-        impacts_.meet_plastic_too();
-        if (measure_points()) {
-            order_points();
-            return true;
-        }
-        find_impacts({next_, Cast::When::solved}, true);
+/// After a solve: whether an impact is to come first. Impacts that rebound and were found late follow from others that were too slow
+/// to rebound: the resting rows that answer these know of no bounce, so they are met before, as plastic ones. So come
+/// impacts of bodies that a stop sends back with others that no row knew of: `known` is how many points there were.
+bool ContactStage::needs_impact_first(const MixedSystem& system, std::size_t known) {
+    if (rebounds_late_ && impacts_.meet_slow_too() && measure_points()) {
+        order_points();
+        return true;
     }
     if (points_.all.size() == known || !impacts_.stop_is_hit(system, model_->bodies, points_)) return false;
     order_points();
@@ -157,7 +148,7 @@ ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vecto
     const std::size_t joints = system.rows.size();
     points_.forget(model_->bodies, anew);
     motion_.velocity = velocity;
-    ran_away_ = false;
+    ran_away_ = rebounds_late_ = false;
     if (model_->options.solver == SolverKind::iterative && !model_->surfaces.resists_turning) {
         if (by_rows(joints))
             pgs_.start(system, model_->options.friction);  // overlaps are parted with its masses
@@ -178,7 +169,8 @@ ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vecto
         const Cast cast{next_, Cast::When::solved};
         search_.widen(cast, changed_, motion_, points_);
         search_.find_turned(next_, motion_, points_);
-        if (needs_impact_first(system, known, find_impacts(cast, impacts_.plastic_too()).left_out)) return {};
+        find_impacts(cast);
+        if (needs_impact_first(system, known)) return {};
         if (points_.all.size() == known) {
             if (passes_other_ends(system, joints, model_->options.time_step)) return {.ends_passed = true};
             break;

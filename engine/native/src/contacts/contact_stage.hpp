@@ -17,8 +17,9 @@
 // gets rows only if a cast of both along their motion finds that they meet (`collision/shape_cast.hpp`): supported bodies
 // (`contacts/supported_bodies.cpp`) are cast with v, flying ones with v + h M⁻¹ f.
 //
-// An impact of balls that no other contact disturbs is an event at its own time t within the step: impulses act there, with a
-// part of the step's forces (contacts/supported_bodies.cpp) before and the rest after, and both bodies move by t v₋ + (h − t) v₊.
+// Impacts of balls that fly, and of a few that something holds, are events at their own times t within the step, one after the
+// other (contacts/impact_queue.hpp), with the normals and the arms of their meetings: impulses act there, with a part of the
+// step's forces before and the rest after, and the bodies move by t v₋ + (h − t) v₊. Which part: contacts/supported_bodies.cpp.
 // Other impacts act at the start of the step: the gap may close, no more; with restitution a step early, psi then
 // reduced to psi', psi'² = psi² − (1 − psi²) 2 a g/V², a the approaching acceleration and V the approaching
 // speed, so that the fall still ahead is not won twice.
@@ -46,7 +47,6 @@
 #include "contacts/candidate_search.hpp"
 #include "contacts/contact_cache.hpp"
 #include "contacts/contact_pgs.hpp"
-#include "contacts/impact_events.hpp"
 #include "contacts/impact_solver.hpp"
 #include "contacts/position_projection.hpp"
 #include "contacts/resting_solver.hpp"
@@ -74,9 +74,9 @@ public:
     bool detect(const std::vector<Pose>& poses, const std::vector<Vec6>& velocity,
                 const std::vector<Vec6>& free_velocity);
 
-    /// After detect() found none: whether bodies meet with the velocities that joints alone would give them, one per body of
-    /// the scene: it is a step with contacts then. Whether some stop is hit, and whether one rebounds.
-    bool meets(const std::vector<Vec6>& next, bool stop_hit, bool rebounds);
+    /// After detect() found none: whether bodies meet with the velocities that joints alone would give them, one per
+    /// body of the scene. Then it is a step with contacts.
+    bool meets(const std::vector<Vec6>& next);
 
     /// Whether a contact with restitution is approached faster than rounding, or a stop among the rows of joints in
     /// `system` is hit that is connected to bodies in contact; asked anew after each impact.
@@ -159,8 +159,8 @@ public:
     const SolveQuality& quality() const noexcept { return quality_; }
 
 private:
-    bool needs_impact_first(const MixedSystem& system, std::size_t known, bool left_out);
-    CandidateSearch::Found find_impacts(const Cast& cast, bool keeps_rebounds);
+    bool needs_impact_first(const MixedSystem& system, std::size_t known);
+    int find_impacts(const Cast& cast);
     void order_points() { points_.order(state_.cache, model_->surfaces.resists_turning); }
     bool measure_points() { return impacts_.measure(motion_, search_.margins().reach(), points_); }
     void after_impact(const MixedSystem& system);
@@ -176,28 +176,23 @@ private:
     };
     PgsSolveEnd solve_by_pgs(MixedSystem& system);
     bool warm_start_by_pgs(MixedSystem& system, std::size_t known, int round);
-    struct PgsLook {
-        bool iterating = false;  // PGS goes on: what bodies do so far is not final
-        bool left_out = false;   // some impact that rebounds was
-    };
-    bool find_more(bool over, PgsLook& look);
-    bool iterate(MixedSystem& system, PgsLook& look, FrictionReport& report);
-    bool find_left_out();
+    bool find_more(bool over, bool& iterating);
+    bool iterate(MixedSystem& system, FrictionReport& report);
 
     State state_;
     std::shared_ptr<ContactModel> model_;
     StepMotion motion_;
     CandidateSearch search_;
     ContactPoints points_;
-    ImpactEvents events_;
     ImpactSolver impacts_;
     RestingSolver resting_;
     ContactPgs pgs_;
     EnergyLimit energy_;
     PositionProjector projector_;
-    bool ran_away_ = false;      // in this solve: islands that are not too large are solved directly
-    std::vector<Vec6> next_;     // velocities between iterations, per body of the scene
-    std::vector<char> changed_;  // bodies with another than at the look before: the rest was judged then
+    bool ran_away_ = false;       // in this solve: islands that are not too large are solved directly
+    bool rebounds_late_ = false;  // some impact that a solve, or its iterations, showed
+    std::vector<Vec6> next_;      // velocities between iterations, per body of the scene
+    std::vector<char> changed_;   // bodies with another than at the look before: the rest was judged then
     IslandFinder connected_;
     std::vector<char> has_rows_;  // moving bodies with rows, by solver index
     SolveQuality quality_;

@@ -39,9 +39,8 @@ double CandidateSearch::meeting(const OpenPair& open, const Cast& cast, const St
     return time;
 }
 
-CandidateSearch::Found CandidateSearch::find_impacts(const Cast& cast, const std::vector<char>& changed,
-                                                     bool keeps_rebounds, const StepMotion& motion,
-                                                     ContactPoints& points) {
+int CandidateSearch::find_impacts(const Cast& cast, const std::vector<char>& changed,
+                                  const StepMotion& motion, ContactPoints& points) {
     const std::vector<Vec6>& velocity = cast.velocity;
     const bool late = cast.when != Cast::When::ahead;
     meetings_.clear();
@@ -66,7 +65,7 @@ CandidateSearch::Found CandidateSearch::find_impacts(const Cast& cast, const std
             meetings_.push_back({asked_[at], time});
     }
     edges.remove_occluded(step(motion, points), open_.pairs, velocity, meetings_);
-    Found found;
+    int found = 0;
     for (std::size_t at = 0; at < meetings_.size(); ++at) {
         if (at + ahead < meetings_.size()) {
             const OpenPair& later = open_.pairs[meetings_[at + ahead].open];
@@ -75,27 +74,26 @@ CandidateSearch::Found CandidateSearch::find_impacts(const Cast& cast, const std
         }
         const auto& [k, time] = meetings_[at];
         OpenPair& open = open_.pairs[k];
-        if (!(late && add_toi_point_at_start(open, time, velocity, keeps_rebounds, motion, points)) &&
-            !add_toi_points(open, time, velocity, late && !keeps_rebounds, motion, points, found.left_out))
+        if (!(late && add_toi_point_at_start(open, time, velocity, motion, points)) &&
+            !add_toi_points(open, time, velocity, motion, points))
             continue;
         open_.meet(open);
-        ++found.pairs;
+        ++found;
     }
     return found;
 }
 
 /// What add_toi_points() and move_impacts_to_start() make of spheres and planes without a point at their meeting: half of the
-/// contacts of a heap that moves come so. False if they may rebound, if another side of what does not move by itself may be
-/// met than is faced at the start, or if the point of the start does not stop them.
+/// contacts of a heap that moves come so. False if another side of what does not move by itself may be met than is faced at the
+/// start, or if the point of the start does not stop them.
 bool CandidateSearch::add_toi_point_at_start(const OpenPair& open, double time,
-                                             const std::vector<Vec6>& velocity, bool keeps_rebounds,
-                                             const StepMotion& motion, ContactPoints& points) {
+                                             const std::vector<Vec6>& velocity, const StepMotion& motion,
+                                             ContactPoints& points) {
     bool elsewhere = !(motion.bodies().moves(open.first) && motion.bodies().moves(open.second));
     for (const int collider : {open.pair.first, open.pair.second}) {
         const Collider::View own = detection.collider(collider);
         const bool flat = own.shape.kind == ShapeKind::plane;
         if (!flat && own.shape.kind != ShapeKind::sphere) return false;
-        if (!keeps_rebounds && motion.surfaces()[own.body].restitution > 0.0) return false;
         if (flat && angular(velocity[own.body]) == Vec3{}) elsewhere = false;
     }
     if (elsewhere) return false;
@@ -112,10 +110,9 @@ bool CandidateSearch::add_toi_point_at_start(const OpenPair& open, double time,
     return stops;
 }
 
-/// The points of a pair that meets at `time`, with the bodies where they will be then; whether one that rebounds was left out.
+/// The points of a pair that meets at `time`, with the bodies where they will be then.
 bool CandidateSearch::add_toi_points(const OpenPair& open, double time, const std::vector<Vec6>& velocity,
-                                     bool leaves_rebounds, const StepMotion& motion, ContactPoints& points,
-                                     bool& left_out) {
+                                     const StepMotion& motion, ContactPoints& points) {
     const int a = open.first, b = open.second;
     const OpenWays way(step(motion, points), open, velocity);
     const Pose first = way.first.body_at(time), second = way.second.body_at(time);
@@ -133,16 +130,6 @@ bool CandidateSearch::add_toi_points(const OpenPair& open, double time, const st
             continue;
         StepContact& point = add_point(motion.model(), points, contact, first, second, time);
         const double closing = -relative_velocity(point, contact.point.normal, velocity);
-        // What forces give to one of them in this step is no impact, though both got it before one was held.
-        const double push =
-            std::max({std::abs(relative_velocity(point, contact.point.normal, motion.dv_ext)),
-                      std::abs(dot(contact.point.normal, linear(motion.dv_ext[contact.first]))),
-                      std::abs(dot(contact.point.normal, linear(motion.dv_ext[contact.second])))});
-        if (leaves_rebounds && motion.surfaces().pair(contact).restitution > 0.0 && closing > 4.0 * push) {
-            left_out = true;
-            points.all.pop_back();
-            continue;
-        }
         point.meeting_gap = contact.point.gap;
         point.begun = contact.point.gap + time * closing;
         point.contact.point.gap = std::max(0.0, point.begun);
@@ -156,7 +143,9 @@ void CandidateSearch::move_impacts_to_start(std::size_t from, const std::vector<
                                             const StepMotion& motion, ContactPoints& points) {
     const ContactBodies& bodies = motion.bodies();
     const double h = motion.options().time_step;
-    const auto is_there = [](const StepContact& point) { return point.at_start || point.toi < 0.0; };
+    const auto is_there = [](const StepContact& point) {
+        return point.event || point.queued || point.at_start || point.toi < 0.0;
+    };
     if (std::all_of(points.all.begin() + static_cast<std::ptrdiff_t>(from), points.all.end(), is_there))
         return;
     const LargeArray<StepContact>& found = points.take_from(from);
@@ -166,7 +155,7 @@ void CandidateSearch::move_impacts_to_start(std::size_t from, const std::vector<
         const double toi = found[k].toi;
         std::size_t end = k;
         while (end < found.size() && pair_of(found[end].contact) == (pair_of(meeting))) ++end;
-        if (toi < 0.0 || found[k].event || found[k].at_start) {
+        if (is_there(found[k])) {
             for (; k < end; ++k) points.all.push_back(found[k]);
             continue;
         }

@@ -91,9 +91,10 @@ Vec3 impulse_of(const RowBlock& block) {
 void ImpactSolver::begin_step(const ContactModel& model) {
     solver_.floor = model.options.floor;
     solver_.refinements = model.options.refinements;
-    needed_ = plastic_too_ = false;
+    needed_ = slow_too_ = false;
+    plastic_too_ = model.surfaces.rebounds || model.options.stops_rebound;
     rounds_ = 0;
-    order_.begin(model);
+    queue_.begin(model);
 }
 
 /// A pair that meets at more points than its motion can tell apart may share an impact among them in many ways, and
@@ -165,7 +166,7 @@ void ImpactSolver::solve_rows(MixedSystem& hit, std::size_t joints, std::vector<
     if (report.finite && !settled) judge_impact(quality, motion, hit, friction, rules.friction);
 }
 
-/// Whether a joint's stop takes part in impacts: it sends back what hits it, or plastic impacts are met as well.
+/// Whether a joint's stop takes part in impacts: it sends back what hits it, or others may.
 bool ImpactSolver::is_hit(const RowBlock& block) const noexcept {
     return block.stop.rebound != 0.0 || (plastic_too_ && block.stop.hit);
 }
@@ -205,7 +206,7 @@ void ImpactSolver::take_part(MixedSystem& system, const ContactModel& model, con
     std::vector<std::size_t>& hit_points = work_.hit_points;
     const auto is_met =
         [&](const StepContact& point) {  // where impacts come in order, plastic ones have their turn
-            return order_.come_in_order(model, point) ? point.approach < -point.rounding : is_impact(point);
+            return queue_.come_in_order(model, point) ? point.approach < -point.rounding : is_impact(point);
         };
     std::vector<char>&touched = filled(work_.touched, islands.count),
     &taking_part = filled(work_.taking_part, islands.count);
@@ -240,7 +241,7 @@ void ImpactSolver::take_part(MixedSystem& system, const ContactModel& model, con
 
 /// Whether a point is approached so that the impact is to answer it.
 bool ImpactSolver::is_impact(const StepContact& point) const noexcept {
-    const bool answered = point.bounce > 0.0 || (plastic_too_ && point.bounce == 0.0);
+    const bool answered = point.bounce > 0.0 || (point.bounce == 0.0 && queue_.rebounds(point.contact));
     return answered && point.approach < -point.rounding;
 }
 
@@ -325,9 +326,9 @@ SolveQuality ImpactSolver::solve(MixedSystem& system, const OpenPairs& open, std
     const ContactOptions& options = motion.options();
     ++counters.impacts;
     ++rounds_;
-    const bool in_order = order_.possible() && rounds_ <= most_rounds(points.all.size());
+    const bool in_order = queue_.possible() && rounds_ <= most_rounds(points.all.size());
     std::vector<std::size_t>& hit_points = filled(work_.hit_points, 0);
-    if (in_order) order_.find_earliest(system, open, motion, points, hit_points);
+    if (in_order) queue_.find_next(system, open, motion, points, hit_points);
     for (std::size_t k = 0; !in_order && k < points.all.size(); ++k)
         if (points.all[k].bounce >= 0.0) hit_points.push_back(k);
     MixedSystem& hit = work_.hit;
@@ -365,17 +366,19 @@ bool ImpactSolver::measure(const StepMotion& motion, const std::vector<double>& 
         const double gap = contact.point.gap;
         motion.measure(point);
         const double psi = motion.surfaces().pair(contact).restitution, speed = -point.approach;
+        const bool plastic = (psi == 0.0 || slow_too_) && queue_.rebounds(contact);
         point.bounce = -1.0;
         if (motion.bodies().is_closed(contact)) {
             point.bounce = speed > 0.0 ? psi : 0.0;
-        } else if (plastic_too_ && point.impact > 0.0) {  // an impact of this step has brought them together
+        } else if (plastic && !point.event &&
+                   point.impact > 0.0) {  // an impact of this step has brought them together
             point.bounce = 0.0;
         } else if (speed > 0.0 && gap + motion.time_left(point) * (point.approach + point.dv_ext) < 0.0) {
             const double push = relative_velocity(point, contact.point.normal, motion.whole_dv_ext);
-            const double ahead = 2.0 * (-push / h) * gap / (speed * speed);
+            const double ahead = point.queued ? 0.0 : 2.0 * (-push / h) * gap / (speed * speed);
             const double left = psi > 0.0 ? psi * psi - (1.0 - psi * psi) * ahead : 0.0;
             if (left > 0.0) point.bounce = std::min(1.0, std::sqrt(left));
-            else if (plastic_too_) point.bounce = 0.0;
+            else if (plastic) point.bounce = 0.0;
         }
         const double kick =
             norm(linear(motion.dv_ext[contact.first])) + norm(linear(motion.dv_ext[contact.second]));
@@ -389,7 +392,7 @@ bool ImpactSolver::look_again(const ContactModel& model, const ContactPoints& po
     needed_ = false;
     const bool again = rounds_ <= most_rounds(points.all.size());
     for (const StepContact& point : points.all) {
-        if (order_.come_in_order(model, point))
+        if (queue_.come_in_order(model, point))
             needed_ |= again && point.bounce >= 0.0 && point.approach < -point.rounding;
         else if (rounds_ < simultaneous_rounds)  // what was hit already is not hit again
             needed_ |= point.impact == 0.0 && point.toi >= 0.0 && is_impact(point);

@@ -13,21 +13,19 @@
 #include <vector>
 
 #include "contacts/contact_points.hpp"
+#include "contacts/impact_queue.hpp"
 #include "contacts/open_pairs.hpp"
 #include "contacts/solve_islands.hpp"
 #include "contacts/solve_quality.hpp"
 #include "contacts/step_motion.hpp"
-#include "contacts/successive_impacts.hpp"
 
 namespace spook {
 
 class ImpactSolver {
 public:
     void begin_step(const ContactModel& model);
-    /// From now on in this step plastic impacts are met in the impact as well.
-    void meet_plastic_too() noexcept { plastic_too_ = true; }
-    bool plastic_too() const noexcept { return plastic_too_; }
-
+    /// From now on in this step impacts too slow to rebound are met as plastic ones. Whether they were not yet.
+    bool meet_slow_too() noexcept { return !std::exchange(slow_too_, true); }
     /// Approach, push and part in the impact of every point, from the current velocities. `reach`: see SearchMargins.
     /// Whether an impact is needed.
     bool measure(const StepMotion& motion, const std::vector<double>& reach, ContactPoints& points);
@@ -47,7 +45,7 @@ public:
     /// What took part in it.
     const std::vector<RowBlock>& hit_rows() const noexcept { return work_.hit.rows; }
 
-    const SuccessiveImpacts& order() const noexcept { return order_; }
+    ImpactQueue& queue() noexcept { return queue_; }
     IslandSolver& solver() noexcept { return solver_; }
     const IslandSolver& solver() const noexcept { return solver_; }
 
@@ -66,9 +64,11 @@ private:
                     SolveQuality& quality);
 
     IslandSolver solver_;
-    SuccessiveImpacts order_;
-    bool needed_ = false, plastic_too_ = false;
-    int rounds_ = 0;  // impacts of this step
+    ImpactQueue queue_;
+    bool needed_ = false;
+    bool plastic_too_ = false;  // impacts without rebound are met as well: others may follow from them
+    bool slow_too_ = false;     // and those that are too slow to rebound
+    int rounds_ = 0;            // impacts of this step
     /// Of one impact; energies, shares and flags by island.
     struct Arrays {
         MixedSystem hit, start, plastic;

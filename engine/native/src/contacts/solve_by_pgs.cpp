@@ -11,20 +11,18 @@ namespace spook {
 using namespace tolerances::solve_by_pgs;
 
 /// Pairs that meet because of what the iterations have found so far get rows in the same solve.
-bool ContactStage::find_more(bool over, PgsLook& look) {
+bool ContactStage::find_more(bool over, bool& iterating) {
     const bool first = next_.empty();  // look of this step
     if (first) next_ = motion_.velocity;
     // On the way bodies are skipped at the sides of others that they do meet in the end, and need not have changed since.
-    const bool was_settling = std::exchange(look.iterating, !over);
+    const bool was_settling = std::exchange(iterating, !over);
     const bool all = first || (was_settling && over && model_->bodies.swings);
     pgs_.follow(model_->bodies, all, next_, changed_);
     const Cast cast{next_, over ? Cast::When::solved : Cast::When::iterating};
     search_.widen(cast, changed_, motion_, points_);
     const std::size_t known = points_.all.size();
     const bool turned = search_.find_turned(next_, motion_, points_);
-    const CandidateSearch::Found found = find_impacts(cast, impacts_.plastic_too());
-    look.left_out = look.left_out || found.left_out;
-    if (found.pairs == 0 && !turned) return false;
+    if (find_impacts(cast) == 0 && !turned) return false;
     state_.counters.contacts += points_.all.size() - known;
     pgs_.take_in(known, state_.cache, motion_, points_);
     return true;
@@ -45,9 +43,9 @@ bool ContactStage::warm_start_by_pgs(MixedSystem& system, std::size_t known, int
     next_.clear();
     pgs_.hand_over(motion_, points_);
     const double enough = warm_started * speed;
-    PgsLook look;  // what is left out by velocities on the way, the solve will tell
+    bool iterating = false;
     const FrictionReport report = pgs_.solver().run(warm_start_iterations, enough, enough,
-                                                    [&](bool over) { return find_more(over, look); });
+                                                    [&](bool over) { return find_more(over, iterating); });
     state_.counters.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
     if (!report.finite) return false;
     pgs_.find_unanswered(model_->bodies, known, points_);
@@ -56,11 +54,12 @@ bool ContactStage::warm_start_by_pgs(MixedSystem& system, std::size_t known, int
 }
 
 /// Iterates until the step is settled, or long enough. Whether the iterations run away.
-bool ContactStage::iterate(MixedSystem& system, PgsLook& look, FrictionReport& report) {
+bool ContactStage::iterate(MixedSystem& system, FrictionReport& report) {
+    bool iterating = false;
     double last = unbounded;
     for (int turn = 0; turn < most_turns || pgs_.solver().work() < most_turns * model_->options.iterations;
          ++turn) {
-        report = pgs_.run(model_->options, [&](bool over) { return find_more(over, look); });
+        report = pgs_.run(model_->options, [&](bool over) { return find_more(over, iterating); });
         state_.counters.pgs_iterations += static_cast<std::uint64_t>(report.pgs_iterations);
         if (!report.finite) return true;
         const bool joint_is_worst = pgs_.judge(system, motion_, points_, quality_);
@@ -73,37 +72,20 @@ bool ContactStage::iterate(MixedSystem& system, PgsLook& look, FrictionReport& r
     return false;
 }
 
-/// What was left out by velocities on the way is looked for with those of the solve.
-bool ContactStage::find_left_out() {
-    for (std::size_t b = 0; b < model_->bodies.count(); ++b)
-        if (model_->bodies.moves(b)) next_[b] = pgs_.solver().velocity(model_->bodies.solver_index[b]);
-    changed_.assign(model_->bodies.count(), 1);
-    return find_impacts({next_, Cast::When::solved}, impacts_.plastic_too()).left_out;
-}
-
 ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
     pgs_.start(system, model_->options.friction);
     next_.clear();
     pgs_.hand_over(motion_, points_);
-    PgsLook look;
     const std::size_t begun = points_.all.size();
     FrictionReport report;
     quality_ = {};
-    for (bool again = true; again;) {
-        if (iterate(system, look, report)) {
-            points_.all.resize(begun);  // what was met on that way is not
-            search_.find_open(motion_, points_);
-            ran_away_ = true;
-            return {{}, true};
-        }
-        const std::size_t known = points_.all.size();
-        again = std::exchange(look.left_out, false);
-        if (needs_impact_first(system, begun, again && find_left_out())) return {};
-        again = again && points_.all.size() > known;
-        if (!again) break;
-        state_.counters.contacts += points_.all.size() - known;
-        pgs_.take_in(known, state_.cache, motion_, points_);
+    if (iterate(system, report)) {
+        points_.all.resize(begun);  // what was met on that way is not
+        search_.find_open(motion_, points_);
+        ran_away_ = true;
+        return {{}, true};
     }
+    if (needs_impact_first(system, begun)) return {};
     if (passes_other_ends(system, system.rows.size(), model_->options.time_step))
         return {{.ends_passed = true}};
     const std::size_t blocks = system.rows.size() + points_.all.size();

@@ -23,6 +23,7 @@ struct StepContact {
     double dv_ext = 0.0;         // C (free velocity − v), m/s, negative when pressed together
     int extras = -1;             // the place of its ContactExtras, −1 if it has none
     bool event = false;          // acts at the time of its impact, not at the start of the step
+    bool queued = false;         // will act at that time, see ImpactQueue
     bool at_start = false;       // an impact with the point of the step's start already
     bool solved = false;         // in an earlier round of this step: these start the next
     bool answered = false;       // the same, by a solve and not by warm_start_by_pgs()

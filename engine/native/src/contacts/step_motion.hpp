@@ -53,6 +53,10 @@ struct StepMotion {
         point.approach = relative_velocity(point, point.contact.point.normal, velocity);
         point.dv_ext = relative_velocity(point, point.contact.point.normal, dv_ext);
     }
+    /// The speed that forces give to the bodies of a contact in the whole step, m/s.
+    double fall(const Contact& contact) const noexcept {
+        return norm(linear(whole_dv_ext[contact.first])) + norm(linear(whole_dv_ext[contact.second]));
+    }
     /// What is left of the step after a point's event, s.
     double time_left(const StepContact& point) const noexcept {
         const double h = model_->options.time_step;

@@ -7,7 +7,7 @@
 // it would be lifted by the rest, see lay_down(). A supported one stays on its way with v, its support taking the kick:
 // all of it is left for the rest of the step, and the energy changes by (t/h) k·(v₊ − v) − ½ |v₊ − v₁|² with v₁ after the
 // impact. That is a gain where the impact gives a speed along the forces. So a supported body that moves along them already is not advanced, but
-// where what it meets can only push against them, see find_events(). Another body that an impact sends along them, or against
+// where what it meets can only push against them, see ImpactQueue::find_meetings(). Another body that an impact sends along them, or against
 // them, is let go, and free from then on. What still would be won, at most ½ |k|² by falling in the rest of the step,
 // is paid in height.
 #include "contacts/supported_bodies.hpp"

@@ -71,10 +71,11 @@ namespace tolerances::contact_judge {
 inline constexpr double sunk = 0.02;  // of the smaller body's radius: an overlap that a solve has left
 }
 
-// impact_events.cpp
-namespace tolerances::impact_events {
-inline constexpr std::size_t event_bodies = 8;  // larger islands keep to the step's start
-}
+// impact_queue.cpp
+namespace tolerances::impact_queue {
+inline constexpr int event_bodies = 8;  // larger islands that something holds keep to the step's start
+inline constexpr double still = 1e-9;  // of where bodies may get to in the step: an approach that is rounding
+}  // namespace tolerances::impact_queue
 
 // contact_pgs.cpp
 namespace tolerances::contact_pgs {
@@ -86,6 +87,8 @@ inline constexpr double focus = 0.5;     // of the residual allowed: what change
 namespace tolerances::contact_stage {
 inline constexpr std::size_t not_too_large = 500;  // row blocks: solved directly after a run-away
 inline constexpr int late_rounds = 64;             // of solves: each sets others in motion
+inline constexpr double falls =
+    2.0;  // of a step, of both bodies: slower approaches are no impacts that rebound
 }  // namespace tolerances::contact_stage
 
 // contact_turning.cpp

@@ -34,13 +34,7 @@ void MixedRows::detect() {
 /// In a step that began without contacts, whether bodies meet because of what joints make of their velocities, scratch_.next:
 /// cast along their own they do not. Then the step is to be solved with contacts.
 bool MixedRows::find_late_contacts() {
-    const auto any = [this](auto is) {
-        return scratch_.last_rows == LastRows::mixed &&
-               std::any_of(system.rows.begin(), system.rows.end(), is);
-    };
-    const bool stop_hit = any([](const RowBlock& block) { return block.stop.hit; }),
-               rebounds = any([](const RowBlock& block) { return block.stop.rebound != 0.0; });
-    const bool meets = contacts_->meets(scratch_.next, stop_hit, rebounds);
+    const bool meets = contacts_->meets(scratch_.next);
     clock_.mark(Stage::collision);
     if (!meets) return false;
     touching_ = true;

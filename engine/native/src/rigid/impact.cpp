@@ -36,17 +36,18 @@ void MixedRows::impact() {
     fill_momenta(false);
     contacts_->impact(system, scratch_.impulses);
     judge_contacts();
-    for (const int i : model_.constrained)
-        if (contacts_->toi_fraction(i) > 0.0 && !live_.asleep(i))
-            forces_.set_share(i, 1.0 - contacts_->toi_fraction(i));
-    const auto add_to_before = [this](double sign) {
+    const auto add_to_before = [this](double sign) {  // with the forces that are still to come
         if (!model_.half_step) return;
         for (const int i : model_.constrained) {
-            live_.before[i].velocity += sign * live_.bodies[i].velocity;
-            live_.before[i].angular_momentum += sign * live_.bodies[i].angular_momentum;
+            live_.before[i].velocity += sign * (live_.bodies[i].velocity + forces_.kick(i));
+            live_.before[i].angular_momentum +=
+                sign * (live_.bodies[i].angular_momentum + forces_.angular_impulse(i));
         }
     };
     add_to_before(1.0);
+    for (const int i : model_.constrained)
+        if (contacts_->toi_fraction(i) > 0.0 && !live_.asleep(i))
+            forces_.set_share(i, 1.0 - contacts_->toi_fraction(i));
     take_velocities(true, [this](int k) { return !contacts_->has_rows(k); });
     add_to_before(-1.0);  // less what it has changed: see read_half_step()
     for (std::size_t k = 0; k < model_.constrained.size(); ++k)

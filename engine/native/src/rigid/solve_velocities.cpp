@@ -55,6 +55,9 @@ void MixedRows::take_contacts(const RigidScene& scene) {
         if (!model_.stages.runs(Stage::move_surfaces)) materials.back().surface_velocity = {};
         if (!model_.stages.runs(Stage::roll)) materials.back().rolling = materials.back().torsional = 0.0;
     }
+    const bool stops_rebound = std::ranges::any_of(scene.joints, [](const JointSpec& joint) {
+        return joint.restitution > 0.0 || (joint.limit && joint.limit->restitution > 0.0);
+    });
     std::vector<PairFriction> pairs = scene.pair_frictions;
     for (PairFriction& pair : pairs) {
         if (!model_.stages.runs(Stage::friction)) pair.friction = 0.0;
@@ -66,7 +69,7 @@ void MixedRows::take_contacts(const RigidScene& scene) {
         Detection(scene.colliders, dynamic, scene.no_contact), materials, model_.solver_index,
         ContactOptions{model_.h, model_.method.friction, solver, model_.method.iterations,
                        model_.method.residual_tolerance, model_.method.floor, model_.method.refinements,
-                       model_.method.impacts, model_.method.unsettled_residual},
+                       model_.method.impacts, stops_rebound, model_.method.unsettled_residual},
         joint_pairs, yielding, std::move(pairs));
     for (const JointBlock& block : joints_.blocks())
         for (const int body : {block.first, block.second})
