@@ -187,7 +187,7 @@ function dressLayout(layout, title) {
     return { ...band, y0: shape.low === null ? (log ? 1e-300 : 0) : shape.low, y1: shape.high };
   });
   const onLine = { xref: "paper", x: 1, xanchor: "right", borderpad: 1 };
-  const annotations = (layout.annotations || []).map((a) => ({ showarrow: false, ...(a.meta === "line" ? onLine : {}), font: { size: 11, color: ink }, yanchor: "bottom", ...a }));
+  const annotations = (layout.annotations || []).map((a) => ({ showarrow: false, ...(a.meta === "line" ? onLine : {}), font: { size: 11, color: ink, shadow: "auto" }, yanchor: "bottom", ...a }));
   return {
     ...layout, shapes, annotations, paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)",
     font: { family: getComputedStyle(document.body).fontFamily, size: 12, color: ink },
