@@ -92,6 +92,6 @@ class ModelRun:
     swing: float = 0.0  # rad/s and m/s: conservative, without equality constraints, joints started by up to that at random
     gain: float = 1.0  # times the file's own, of its servos
     without: frozenset[str] = frozenset()  # of PARTS: what is left out to see what it does
-    stiffer: float = 1.0  # times faster, contacts, limits and ties that give way: the engine's own softness
+    rigid: bool = False  # all that gives way as hard as can be, without rebound, begun within limits
     elsewhere: bool = False  # in a process of its own
     shown: bool = False  # with all that is seen of it

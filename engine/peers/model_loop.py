@@ -64,7 +64,7 @@ def refuse_settings(engine: str, run: ModelRun) -> None:
         or run.accurate
         or run.gain != 1.0
         or run.without
-        or run.stiffer != 1.0
+        or run.rigid
     ):
         raise NotSupported(f"{engine} is asked without controls, keyframes and other settings than its own")
 

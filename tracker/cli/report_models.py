@@ -11,6 +11,9 @@ if TYPE_CHECKING:
     from spook_tracker.tracker.measure.model_standing import Cause, Checkpoint, Standing
 
 
+LEAST = 1e-5  # m, rad: what a start is told to be off by
+
+
 def standing_lines(told: Iterable[tuple[str, Standing | str]]) -> Iterator[str]:
     """Of each model a line for each time, with the groups of engines and how far they are apart."""
     for name, found in told:
@@ -116,9 +119,11 @@ def _because(cause: Cause) -> str:
     if not cause.parts:
         return f"{said}, whatever part of the model is left out"
     said += f", over {' and '.join(cause.parts)}: without, {cause.left:.1g} m"
-    if cause.softness:
-        said += f"; mujoco itself moves {cause.softness:.1g} m where these give way eight times faster"
-    return said
+    if cause.rigid is not None:
+        said += f"; in small steps, rigid and without rebound in mujoco, too, {cause.rigid:.1g} m"
+    begins = [f"{cause.beyond:.2g} beyond its limits (m or rad)"] if cause.beyond > LEAST else []
+    begins += [f"with an overlap of {cause.overlap:.2g} m"] if cause.overlap > LEAST else []
+    return f"{said}; it begins {' and '.join(begins)}" if begins else said
 
 
 def _group(point: Checkpoint, group: tuple[str, ...], first: tuple[str, ...]) -> str:

@@ -26,7 +26,8 @@ ERROR = 3.0  # times what halving the step changes
 SPLIT = ("mujoco", "spook")  # engines that can leave parts of a model out
 GONE = 0.1  # of a distance: what is left of it without the parts that make it
 SOFT = {"contacts", "limits", "ties"}  # parts that give way in MuJoCo
-STIFFER = 8.0  # times faster they do so, to see what that changes
+AT_ONCE = 1e-6  # s
+FINER = 32  # parts of the file's step, where they are asked as if they did not
 LEAST = 1e-9  # of the size: errors below it are rounding
 LIMIT = 60.0  # s, of one run
 FALLS = 0.25  # of the size: what ends lower by more has fallen
@@ -65,8 +66,9 @@ class Checkpoint:
 class Cause:
     """Why two engines part: without `parts` of the model they stand together at that time, or `left` of the distance is small.
 
-    `parts` is empty where no parts explain it. `softness` is how far MuJoCo itself moves where what gives way in it does so
-    eight times faster, at an eighth of the step; 0 where no such part is among them.
+    `parts` is empty where no parts explain it. `rigid` is how far they are then apart where what gives way in MuJoCo does not,
+    does not rebound, and begins within its limits, both in small steps; None where no such part is among them, or one breaks
+    off. What begins `beyond` its limits, or with an `overlap`, each engine brings back in its own way.
     """
 
     engines: tuple[str, str]
@@ -74,7 +76,9 @@ class Cause:
     apart: float  # m, there
     parts: tuple[str, ...]
     left: float  # m
-    softness: float = 0.0  # m
+    rigid: float | None = None  # m
+    beyond: float = 0.0  # m or rad
+    overlap: float = 0.0  # m
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,7 +176,7 @@ def _ran(
     step: float,
     times: tuple[float, ...],
     without: tuple[str, ...] = (),
-    stiffer: float = 1.0,
+    rigid: bool = False,
     elsewhere: bool = False,
     rests: bool = False,
 ) -> Result:
@@ -182,7 +186,7 @@ def _ran(
         samples=(0.0, *times),
         until_settled=rests,
         without=frozenset(without),
-        stiffer=stiffer,
+        rigid=rigid,
         elsewhere=elsewhere,
     )
     lasts = max(times[-1], LONGEST_REST) if rests else times[-1]
@@ -221,13 +225,18 @@ def _cause(model: ModelFile, times: tuple[float, ...], apart_now: float, size: f
         if alike := without(rest):
             parts, point = rest, alike
     left = point.apart(*SPLIT)
-    softness = 0.0
-    if SOFT.intersection(parts):
-        step = model.time_step / STIFFER
-        own, stiff = (_ran(model, SPLIT[0], step, times, stiffer=stiffer) for stiffer in (1.0, STIFFER))
-        moved = _at(len(times), own, stiff, size)
-        softness = moved if np.isfinite(moved) else 0.0  # it broke off
-    return Cause(SPLIT, times[-1], apart_now, parts, left, softness)
+    if not SOFT.intersection(parts):
+        return Cause(SPLIT, times[-1], apart_now, parts, left)
+    begun = _ran(model, SPLIT[0], AT_ONCE, (AT_ONCE,))
+    beyond, overlap = (float(np.ravel(begun[name])[0]) for name in ("violation", "overlap"))
+    try:
+        hard, ours = (_ran(model, engine, model.time_step / FINER, times, rigid=True) for engine in SPLIT)
+        rigid = _at(len(times), hard, ours, size)
+    except EngineError:  # ties that do not hold within the limits
+        rigid = np.inf
+    return Cause(
+        SPLIT, times[-1], apart_now, parts, left, rigid if np.isfinite(rigid) else None, beyond, overlap
+    )
 
 
 def _checkpoints(

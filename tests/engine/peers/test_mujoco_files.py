@@ -435,3 +435,30 @@ def test_turns_are_angles_whatever_the_sign_of_the_quaternion() -> None:
 
     assert turns(later, start) == pytest.approx(0.4, abs=1e-15)
     assert turns(-later, start) == pytest.approx(0.4, abs=1e-15)
+
+
+@pytest.mark.parametrize("ratio", [0.15, 0.5, 1.0])
+def test_a_contact_rebounds_as_a_damped_spring_that_never_pulls_and_a_rigid_one_does_not(
+    tmp_path: Path, ratio: float
+) -> None:
+    """A damped half-oscillation that is let go when its force is none: by exp(-2 tan f (pi/2 - f)), sin f the damping ratio,
+    exp(-2) where that is 1. At 1 m/s, without gravity, in steps of a two-hundredth of the time constant."""
+    file = (
+        f'<mujoco><option timestep="5e-6" gravity="0 0 0"/><default><geom solref=".001 {ratio}" solimp=".9999 .9999 .001"/></default>'
+        '<worldbody><geom type="plane" size="1 1 1"/><body name="ball" pos="0 0 .11"><freejoint/><geom size=".1"/></body></worldbody>'
+        '<keyframe><key name="thrown" qpos="0 0 .11 1 0 0 0" qvel="0 0 -1 0 0 0"/></keyframe></mujoco>'
+    )
+    model = _model(tmp_path, file, keyframe="thrown")
+    angle = math.asin(ratio)
+    law = math.exp(-2.0 * (math.tan(angle) * (0.5 * math.pi - angle) if ratio < 1.0 else 1.0))
+
+    def speed(rigid: bool) -> float:
+        run = find("mujoco").simulate(
+            ModelRun(model=model, samples=(0.03, 0.04), rigid=rigid), time_step=5e-6, duration=0.04
+        )
+        return float(np.diff(run["position"][:, 0, 2])[0]) / 0.01
+
+    assert speed(False) == pytest.approx(law, rel=0.02)
+    assert (
+        0.0 <= speed(True) < 0.0073
+    )  # the same law at a ratio of sqrt(32): exp(-2 arccosh(r) r / sqrt(r^2 - 1))

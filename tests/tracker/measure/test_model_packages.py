@@ -141,7 +141,10 @@ def test_the_part_is_named_over_which_two_engines_part(
     assert isinstance(found, Standing) and found.cause
     assert found.cause.parts == (part,)
     assert found.cause.left < 0.1 * found.cause.apart
-    assert (found.cause.softness > 0.5 * found.cause.apart) == gives_way
+    if gives_way:  # rigid in both, they hardly part
+        assert found.cause.rigid is not None and found.cause.rigid < 0.1 * found.cause.apart
+    else:
+        assert found.cause.rigid is None
 
 
 @pytest.mark.parametrize("breaks", ["refuses", "stops"])
@@ -155,11 +158,11 @@ def test_engines_that_cannot_be_asked_without_a_part_are_told_to_part_all_the_sa
     monkeypatch.chdir(tmp_path)
     ran = model_standing._ran
 
-    def broken(model, engine, step, times, without=(), stiffer=1.0, elsewhere=False, rests=False):
+    def broken(model, engine, step, times, without=(), rigid=False, elsewhere=False, rests=False):
         assert Path(model.path).is_absolute()  # DART takes no other
         if without and breaks == "refuses":
             raise NotSupported("not without")
-        return ran(model, engine, step, (1e9,) if without else times, without, stiffer, rests=rests)
+        return ran(model, engine, step, (1e9,) if without else times, without, rigid, rests=rests)
 
     monkeypatch.setattr(model_standing, "_ran", broken)
     monkeypatch.setattr(model_standing, "LIMIT", 0.2)
@@ -191,7 +194,10 @@ def test_a_table_says_up_to_when_engines_stand_with_the_first_and_why_not_longer
         r"- spook takes 4 of .* Of 2 that rest in mujoco 2 rest alike and 0 elsewhere, 0 move; of 2 that move 1 move",
         said,
     )
-    assert "- `soft.xml`: mujoco and spook part at" in said and "eight times faster" in said
+    assert (
+        "- `soft.xml`: mujoco and spook part at" in said
+        and "rigid and without rebound in mujoco, too, " in said
+    )
     assert re.search(
         "- no_such: there is no engine .*: `outside.xml`, `rubs.xml`, `soft.xml`, `swing.xml`.", said
     )
