@@ -16,7 +16,7 @@ STEPS = 240
 
 def test_a_stack_at_rest_is_factored_as_often_as_is_said() -> None:
     found = re.search(
-        r"of (\d+) steps of a stack of (\d+) boxes at rest one is factored, by (\d+) factorisations", SAID
+        r"of (\d+) steps of a stack of (\d+) boxes at rest, one is factored, with (\d+) factorisations", SAID
     )
     assert found
     steps, boxes, factorisations = map(int, found.groups())
