@@ -348,7 +348,7 @@ class _Reader:
             raise ModelError(f"{self.path} is no model: it has no links")
         hanging(bodies, self.path)
         step = root.findtext(".//physics/max_step_size")
-        gravity = _gravity([root.findtext(".//gravity")], self.path)
+        gravity = _gravity([root.findtext(".//world/gravity")], self.path)
         return self.found("SDF", bodies, _step(step, self.path) if step else 0.001, gravity=gravity)
 
     def sdf_completed(self, root: ElementTree.Element, file: Path, within: tuple[Path, ...]) -> None:

@@ -395,3 +395,13 @@ def test_products_of_inertia_may_be_negative_and_moments_by_rounding(cart: Path)
         '<joint name="j" type="continuous"><parent link="b"/><child link="a"/></joint></robot>'
     )
     assert [one.name for one in read(cart).watched] == ["a"]
+
+
+def test_a_link_of_an_sdf_may_say_whether_gravity_pulls_at_it(tmp_path: Path) -> None:
+    """<gravity> of a link is a flag, of the world a vector."""
+    file = tmp_path / "robot.sdf"
+    for world, pull in (("<gravity>0 0 -1.6</gravity>", (0.0, 0.0, -1.6)), ("", (0.0, 0.0, -9.81))):
+        file.write_text(
+            f'<sdf><world>{world}<model><link name="a"><gravity>1</gravity></link></model></world></sdf>'
+        )
+        assert read(file).gravity == pull
