@@ -319,39 +319,12 @@ def test_a_hull_in_a_compound_and_in_water_is_the_box_it_looks_like() -> None:
 # --- refused --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    ("points", "sentence"),
-    [
-        ((), "lie in one plane"),
-        (CUBE[:3], "lie in one plane"),
-        (((0, 0, 0), (1, 0, 0), (0, 1, 0), (1, 1, 0)), "lie in one plane"),
-        (((0, 0, 0), (1, 0, 0), (2, 0, 0), (3, 0, 0)), "lie in one plane"),
-        (((0, 0, 0),) * 9, "lie in one plane"),
-        ((*CUBE, (math.nan, 0, 0)), "finite"),
-        ((*CUBE, (math.inf, 0, 0)), "finite"),
-        ((*CUBE, (1, 2)), "corners"),
-        ("cube", "corners must be points"),
-        (3, "corners must be points"),
-        (tuple((math.cos(k), math.sin(k), k / 70) for k in range(70)), "at most 64"),
-        (
-            tuple(
-                (math.cos(k * math.pi / 9), math.sin(k * math.pi / 9), z) for k in range(18) for z in (0, 1)
-            ),
-            "at most 16",
-        ),
-        ((*CUBE, (0.5 + 3e-9, 0.1, 0.1)), ""),  # a hair out of a face: either a corner or none, never a crash
-    ],
-)
-def test_points_that_make_no_hull_are_refused_in_a_sentence(points: Any, sentence: str) -> None:
-    if not sentence:
-        try:
-            assert ConvexHull(points).volume == pytest.approx(1.0, abs=1e-8)
-        except SceneError as refused:
-            assert "convex hull" in str(refused)
-        return
-    with pytest.raises(SceneError, match=sentence) as caught:
-        ConvexHull(points)
-    assert str(caught.value).startswith("convex hull: ") and "\n" not in str(caught.value)
+def test_a_corner_a_hair_out_of_a_face_is_one_or_none_and_no_crash() -> None:
+    points = (*CUBE, (0.5 + 3e-9, 0.1, 0.1))
+    try:
+        assert ConvexHull(points).volume == pytest.approx(1.0, abs=1e-8)
+    except SceneError as refused:
+        assert "convex hull" in str(refused)
 
 
 def test_a_hull_beside_its_centre_of_mass_needs_an_inertia_and_says_so() -> None:

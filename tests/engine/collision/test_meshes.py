@@ -344,52 +344,6 @@ def test_from_below_it_is_not_there() -> None:
     assert float(found["v"][2]) == 3.0
 
 
-# --- refusals -------------------------------------------------------------------------------------------
-
-SQUARE = ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (1.0, 1.0, 0.0), (0.0, 1.0, 0.0))
-
-
-@pytest.mark.parametrize(
-    ("corners", "faces", "words"),
-    [
-        (SQUARE, (), "at least one triangle"),
-        (SQUARE, ((0, 1, 2), (0, 1, 3)), "from corner 0 to 1"),
-        (SQUARE, ((0, 1, 1),), "triangle 0 has no area"),
-        ((*SQUARE, (2.0, 0.0, 0.0)), ((0, 1, 4),), "triangle 0 has no area"),
-        (SQUARE, ((0, 1, 4),), "three indices of its 4 corners"),
-        (SQUARE, ((0, 1),), "three indices"),
-        (SQUARE, ((0, 1.5, 2),), "three indices"),
-        (SQUARE, ((0, 1, math.inf),), "three indices"),
-        (((0, 0, math.nan), *SQUARE), ((0, 1, 2),), "corners"),
-        ("corners", ((0, 1, 2),), "must be a list"),
-    ],
-)
-def test_a_mesh_that_cannot_be_is_refused_in_a_sentence(corners: Any, faces: Any, words: str) -> None:
-    with pytest.raises(SceneError, match=words) as caught:
-        TriangleMesh(corners, faces)
-    assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("spacing", "heights", "words"),
-    [
-        ((1, 1), ((0, 0),), "two rows"),
-        ((1, 1), ((0, 0), (0, 0, 0)), "two rows"),
-        ((0, 1), ((0, 0), (0, 0)), "spacing"),
-        (1.0, ((0, 0), (0, 0)), "two numbers"),
-        ((1, 1), ((0, math.inf), (0, 0)), "heights"),
-        ((1e-200, 1e-200), ((0, 0), (0, 0)), "row 0, column 0 has no area"),
-        ((1e-12, 1), ((0, 0), (0, 0)), "row 0, column 0 has no area"),
-        ((1, 1), ((0, 0, 0), (0, 0, 1e12)), "row 0, column 1 has no area"),
-    ],
-)
-def test_a_height_field_that_cannot_be_is_refused_in_a_sentence(
-    spacing: Any, heights: Any, words: str
-) -> None:
-    with pytest.raises(SceneError, match=words):
-        HeightField(spacing, heights)
-
-
 def test_a_mesh_is_fixed_and_no_part_of_a_compound() -> None:
     for motion in ("dynamic", "kinematic"):
         with pytest.raises(SceneError, match=r"'sheet'.*make the body static"):

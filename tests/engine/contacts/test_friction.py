@@ -180,10 +180,3 @@ def test_a_pair_may_roll_with_friction_and_a_ball_without_it_goes_on() -> None:
 def test_a_pair_that_is_none_is_refused(pairs: Any, said: str) -> None:
     with pytest.raises(SceneError, match=said):
         replace(slope(0.0, 0.0, Material()), pair_frictions=pairs)
-    with pytest.raises(SceneError, match="does not rub on itself"):
-        PairFriction(between=("box", "box"))
-    for told in ("ab", ("box",), ("box", ["ground"]), 3):
-        with pytest.raises(SceneError, match="is not a pair of names"):
-            PairFriction(between=told)  # type: ignore[arg-type]
-    with pytest.raises(SceneError, match="friction must"):
-        PairFriction(between=("box", "ground"), friction=-0.1)

@@ -16,7 +16,6 @@ from spook_tracker.engine import (
     Plane,
     RigidBody,
     Scene,
-    SceneError,
     Sphere,
     Trace,
     Velocity,
@@ -128,18 +127,3 @@ def test_the_stage_is_left_out_with_a_reason_where_no_surface_moves() -> None:
         (choice,) = [c for c in explain(scene, time_step=H) if c.stage == "move_surfaces"]
         assert choice.kept == kept and reason in choice.reason
     assert "move_surfaces" not in compile(Scene(bodies=(still, box())), time_step=H).stages
-
-
-@pytest.mark.parametrize(
-    ("fields", "sentence"),
-    [
-        ({"surface_velocity": (math.nan, 0, 0)}, "surface_velocity"),
-        ({"surface_velocity": 1.0}, "surface_velocity"),
-        ({"material": Material()}, "only a surface with friction takes things along"),
-        ({"shape": None}, "only a surface with friction takes things along"),
-    ],
-)
-def test_a_belt_that_cannot_be_is_refused_in_a_sentence(fields: dict[str, object], sentence: str) -> None:
-    with pytest.raises(SceneError, match=sentence) as caught:
-        belt(**fields)
-    assert "belt" in str(caught.value) and "\n" not in str(caught.value)

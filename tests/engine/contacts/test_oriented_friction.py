@@ -257,27 +257,6 @@ def test_equal_coefficients_leave_every_bit() -> None:
     assert (runs[0] == runs[1]).all()
 
 
-@pytest.mark.parametrize(
-    ("fields", "sentence"),
-    [
-        ({"friction_direction": (1, 0, 0)}, "friction_direction says nothing without friction_across"),
-        ({"friction_across": 0.2}, "friction_across says nothing without friction_direction"),
-        ({"friction_direction": (0, 0, 0), "friction_across": 0.2}, "friction_direction"),
-        ({"friction_direction": (math.nan, 0, 0), "friction_across": 0.2}, "friction_direction"),
-        ({"friction_direction": "x", "friction_across": 0.2}, "friction_direction"),
-        ({"friction_direction": (1, 0, 0), "friction_across": 0.0}, "friction_across"),
-        ({"friction_direction": (1, 0, 0), "friction_across": math.inf}, "friction_across"),
-        ({"friction_direction": (1, 0, 0), "friction_across": -0.1}, "friction_across"),
-        ({"friction_direction": (1, 0, 0), "friction_across": 4.9e-4}, "too far apart"),
-        ({"friction": 0.0, "friction_direction": (1, 0, 0), "friction_across": 0.2}, "too far apart"),
-    ],
-)
-def test_a_direction_that_cannot_be_is_refused_in_a_sentence(fields: dict[str, Any], sentence: str) -> None:
-    with pytest.raises(SceneError, match=sentence) as caught:
-        Material(**({"friction": 0.5} | fields))
-    assert "\n" not in str(caught.value)
-
-
 def test_two_directions_may_not_meet() -> None:
     """Two ellipses that cross have no agreed law; bodies that cannot touch, or not move, may both have one."""
     one, two = box("one", material=grained()), box("two", material=grained(), position=(0, 0, 0.15))

@@ -215,28 +215,6 @@ def test_a_rough_wire_held_in_pieces_keeps_its_bits() -> None:
         assert run.result().state_hash == whole.state_hash
 
 
-THROUGH = (("one", (0.0, 0.0, 0.0)), (WORLD, (0.0, 0.0, 5.0)), ("two", (1.0, 0.0, 0.0)))
-HOSTILE: dict[str, tuple[dict[str, Any], str]] = {
-    "less than none": ({"friction": -0.1}, "friction must not be negative"),
-    "NaN": ({"friction": (math.nan,)}, "friction must be finite"),
-    "too many": ({"friction": (0.1, 0.2)}, "friction needs one number or 1"),
-    "no bend": ({"through": THROUGH[::2], "friction": 0.1}, "no point between its ends"),
-    "turns of text": ({"turns": "2"}, "turns must be a number"),
-    "no one tension": ({"friction": 0.1, "strength": 5.0}, "no one tension"),
-    "a drum of no size": ({"wound": (("axle", 0.0),)}, "radius of drum 'axle' is 0"),
-    "a drum twice": ({"wound": (("axle", 1.0), ("axle", 2.0))}, "named twice"),
-    "a drum alone": ({"wound": ("axle",)}, "pairs of a hinge and a radius"),
-}
-
-
-@pytest.mark.parametrize("name", HOSTILE)
-def test_hostile_input_is_refused_with_one_sentence(name: str) -> None:
-    changes, words = HOSTILE[name]
-    with pytest.raises(SceneError, match=words) as caught:
-        Wire(name="wire", **({"through": THROUGH} | changes))
-    assert "\n" not in str(caught.value)
-
-
 def test_what_a_scene_or_a_method_cannot_do_with_it_is_refused() -> None:
     scene = winch()
     with pytest.raises(SceneError, match="there is no hinge named 'wire'; there is 'axle'"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -110,34 +109,6 @@ def test_other_engines_are_not_asked_for_what_they_lack() -> None:
     assert unsupported(able, masses(), {}) == ("the joint wire",)
     assert "the joint relation" in unsupported(able, pair(), {})
     assert unsupported(able, hung(strength=1.0), {}) == ("a joint that breaks", "functions of time")
-
-
-BAD: dict[str, tuple[dict[str, Any], str]] = {
-    "no direction": ({"axis": (0.0, 0.0, 0.0)}, "axis"),
-    "a direction of NaN": ({"axis": (math.nan, 0.0, 1.0)}, "axis"),
-    "an endless direction": ({"axis": (math.inf, 0.0, 1.0)}, "axis"),
-    "two numbers": ({"axis": (0.0, 1.0)}, "axis"),
-    "itself": ({"between": ("body", "body")}, "itself"),
-    "a place": ({"between": ((0.0, 0.0, 0.0), "body")}, "names"),
-    "at two numbers": ({"at": (0.0, 0.0)}, "at"),
-    "at NaN": ({"at": (0.0, 0.0, math.nan)}, "at"),
-    "less than soft": ({"compliance": -1e-9}, "compliance"),
-    "as many as none": ({"compliance": (0.0,) * 6}, "compliance"),
-    "damping of NaN": ({"damping": math.nan}, "damping"),
-    "no strength": ({"strength": 0.0}, "strength"),
-    "no name": ({"name": ""}, "name"),
-}
-
-
-@pytest.mark.parametrize("kind", [PointOnLine, Cylindrical, Planar])
-@pytest.mark.parametrize("what", BAD)
-def test_what_cannot_be_is_refused_in_a_sentence_that_names_it(kind: Any, what: str) -> None:
-    fields, word = BAD[what]
-    with pytest.raises(SceneError, match=word) as caught:
-        kind(**({"name": "guide", "between": (WORLD, "body")} | fields))
-    assert "\n" not in str(caught.value)
-    if "name" not in fields:
-        assert "'guide'" in str(caught.value) and kind.kind in str(caught.value)
 
 
 @pytest.mark.parametrize("kind", [PointOnLine, Cylindrical, Planar])

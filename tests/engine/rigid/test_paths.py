@@ -26,7 +26,6 @@ from spook_tracker.engine import (
     Scene,
     SceneError,
     Sinusoid,
-    Sphere,
     Table,
     Trace,
     Velocity,
@@ -205,36 +204,6 @@ def test_corrections_keep_their_order_on_what_accelerates(
     assert linear[1] > 1e-4
     assert coarse[1] < linear[1] * 1e-3**corrections
     assert fine[1] < max(1e-14, coarse[1] / 4.0 ** (1.9 + 1.9 * corrections))
-
-
-@pytest.mark.parametrize(
-    ("make", "say"),
-    [
-        (lambda: told(path=(0.5, 1.0, 2.0)), "begins at x = 0.5 m, but it stands at 0 m"),
-        (lambda: told(path=(0.0, 1.0)), "three numbers or functions"),
-        (lambda: told(path=(0.0, 1.0, math.nan)), "finite"),
-        (lambda: told(path=(0.0, 1.0, lambda t: t)), "must be a number, Sinusoid"),
-        (lambda: told(path=(0.0, 1.0, 2.0), velocity=(1.0, 0.0, 0.0)), "leave its velocity"),
-        (lambda: told(angle=Sinusoid(amplitude=1.0, frequency=1.0, phase=1.0)), "instead of 0"),
-        (lambda: told(angle=WAVE, angular_velocity=(1.0, 0.0, 0.0)), "leave its angular velocity"),
-        (lambda: told(angle=WAVE, angle_axis=(0.0, 0.0, 0.0)), "angle_axis"),
-        (
-            lambda: RigidBody(
-                name="b", mass=1.0, shape=Sphere(1.0), position=(0.0, 0.0, 0.0), path=(0.0, 0.0, 0.0)
-            ),
-            "only a kinematic body has a path",
-        ),
-        (
-            lambda: RigidBody(
-                name="b", mass=1.0, shape=Sphere(1.0), position=(0.0, 0.0, 0.0), spin_pace=WAVE
-            ),
-            "only a kinematic body has a spin_pace",
-        ),
-    ],
-)
-def test_hostile_paths_are_refused_in_one_sentence(make: Any, say: str) -> None:
-    with pytest.raises(SceneError, match=say):
-        make()
 
 
 def test_compositions_and_settings_from_outside_do_not_follow_a_path() -> None:

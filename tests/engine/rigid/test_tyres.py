@@ -243,32 +243,12 @@ def test_it_is_left_out_where_there_is_none_and_named_where_an_engine_lacks_it()
     )
 
 
-HOSTILE: dict[str, tuple[dict[str, Any], str]] = {
-    "no wheel": ({"between": ("wheel", WORLD)}, "turn them round"),
-    "itself": ({"between": ("wheel", "wheel")}, "cannot roll on itself"),
-    "one end": ({"between": "wheel"}, "a road and a wheel"),
-    "flat": ({"axis": (0.0, 0.0, 1.0)}, "lies flat"),
-    "no axis": ({"axis": (0.0, 0.0, 0.0)}, "zero vector"),
-    "no radius": ({"radius": 0.0}, "radius must be positive"),
-    "rigid across": ({"cornering": math.inf}, "cornering must be finite"),
-    "three frictions": ({"friction": (1.0, 1.0, 1.0)}, "one number or two"),
-    "less than none": ({"friction": (0.5, -1.0)}, "not be negative"),
-    "text": ({"damping": "soft"}, "damping must be a number"),
-    "stranger": ({"between": (WORLD, "ghost")}, "no body named 'ghost'"),
-    "below": ({"normal": (0.0, 0.0, -1.0)}, "not above its road"),
-}
-
-
-@pytest.mark.parametrize("name", HOSTILE)
-def test_hostile_input_is_refused_with_one_sentence(name: str) -> None:
-    changes, words = HOSTILE[name]
-    with pytest.raises(SceneError, match=words) as caught:
-        wheel(**changes)
-    assert "\n" not in str(caught.value)
-
-
 def test_wheels_are_dynamic_bodies_and_methods_plain() -> None:
     point = Particle(name="wheel", mass=1.0, position=(0.0, 0.0, 0.3))
+    with pytest.raises(SceneError, match="no body named 'ghost'"):
+        wheel(between=(WORLD, "ghost"))
+    with pytest.raises(SceneError, match="not above its road"):
+        wheel(normal=(0.0, 0.0, -1.0))
     with pytest.raises(SceneError, match="'wheel' is a particle"):
         Scene(bodies=(point,), constraints=(tyre(),))
     with pytest.raises(SceneError, match="cannot move"):
@@ -365,8 +345,6 @@ def test_a_spring_of_bounded_force_gives_way_and_holds_again() -> None:
 
     assert float(np.abs(change).max()) <= 2.0 * (1.0 + 1e-12)
     np.testing.assert_allclose(change[40:200], -2.0, rtol=1e-12)
-    with pytest.raises(SceneError, match="max_force must not be negative"):
-        JointSpring(stiffness=1.0, max_force=-1.0)
     with pytest.raises(MethodError, match="'axle' has a spring of bounded force"):
         simulate(
             Scene(bodies=(body,), constraints=(hinge,)),
