@@ -72,8 +72,10 @@ class _Surfaces:
             for pair, (one, two) in enumerate(zip(model.pair_geom1, model.pair_geom2, strict=True))
         }
         self.meets = self.meeting(tied)
+        self.rebounds = self.rebounding()
         self.rubs_as = [
             (
+                self.rebounds[geom],
                 *model.geom_friction[geom].tolist(),
                 int(model.geom_condim[geom]),
                 int(model.geom_priority[geom]),
@@ -124,6 +126,16 @@ class _Surfaces:
         ahead = int(m.geom_priority[one]) - int(m.geom_priority[two])
         both = [one, two] if ahead == 0 else [one] if ahead > 0 else [two]
         return _friction(int(np.max(m.geom_condim[both])), np.max(m.geom_friction[both], axis=0))
+
+    def rebounding(self) -> list[float]:
+        """Restitution of each geom whose softness counts in all its contacts, for its priority; of others none is said."""
+        m, found = self.m, [0.0] * self.m.ngeom
+        paired = {geom for pair in self.pairs for geom in pair}
+        for geom in range(m.ngeom):
+            others = np.asarray(m.geom_priority)[self.meets[geom]]
+            if geom not in paired and len(others) and m.geom_priority[geom] > others.max():
+                found[geom] = rebound(m.geom_solref[geom])
+        return found
 
     def meeting(self, tied: set[frozenset[str]]) -> npt.NDArray[np.bool_]:
         """Which geoms may touch, by bits, bodies, exclusions and pairs."""
@@ -257,8 +269,9 @@ class _Surfaces:
         return KIND.get(int(self.m.geom_type[geom]), "of this kind")
 
     def material(self, geom: int) -> Material:
-        """Friction of the kinds that its condim has."""
-        return _friction(int(self.m.geom_condim[geom]), self.m.geom_friction[geom])
+        """Friction of the kinds that its condim has, and its rebound."""
+        rubs = _friction(int(self.m.geom_condim[geom]), self.m.geom_friction[geom])
+        return replace(rubs, restitution=self.rebounds[geom])
 
     def shape(self, geom: int) -> Shape | None:
         m = self.m
@@ -293,6 +306,18 @@ class _Surfaces:
         )
         spacing = (2.0 * half_x / (columns - 1), 2.0 * half_y / (rows - 1))
         return HeightField(spacing, tuple(map(tuple, data.T.tolist())))
+
+
+def rebound(solref: Any) -> float:
+    """What a damped spring that never pulls gives back of the speed it is met with, where a damping ratio below 1 asks for it."""
+    first, second = (
+        float(number) for number in solref
+    )  # a time constant and a ratio, or -stiffness and -damping
+    ratio = second if first > 0.0 else -second / (2.0 * math.sqrt(-first)) if first else 1.0
+    if not 0.0 <= ratio < 1.0:
+        return 0.0
+    angle = math.asin(ratio)
+    return math.exp(-2.0 * math.tan(angle) * (0.5 * math.pi - angle))
 
 
 def _friction(kinds: int, numbers: Any) -> Material:
