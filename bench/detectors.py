@@ -44,27 +44,27 @@ MIXES = [(0.0005, 0.03), (0.002, 0.03), (0.005, 0.03), (0.01, 0.03), (0.01, 0.05
 RECORDED = Path(__file__).resolve().parent.parent / "tests" / "data" / "recorded"
 EXPLAINED = RECORDED.parent / "recorded_alarms.json"
 WHAT_CAN_BE = """\
-No test finds every step. Asked is an alarm within some nights. A detector that raises so many alarms a night raises one
-in these nights, if nothing happened, with at most so many times that probability, whatever it looks at on which of them;
-and no test of that size finds more than the best one of all these nights together (Neyman and Pearson; a mean over what
-was before gains nothing, as what the best test finds bends downwards over its size). Where level and noise have to be
-learnt, no unbiased test finds more than Student's of both (Lehmann and Romano, Testing Statistical Hypotheses, 5.3).
-Of +3 % at 1 % noise, three deviations up for four nights after sixty; and of +10 % on
-clusters 8 % apart, both known, for six:"""
+No test finds every step. The bound for alarms within n nights: a detector with a given rate of false alarms a night raises one
+in n nights without a change with at most n times that probability, whatever it uses;
+and no test of that size finds more than the most powerful one on all these nights together (Neyman and Pearson; averaging over the
+nights before gains nothing, as the power is concave in the size). If level and noise have to be
+estimated, no unbiased test finds more than Student's (Lehmann and Romano, Testing Statistical Hypotheses, 5.3).
+For +3 % at 1 % noise, three deviations, in four nights after sixty; and for +10 % on
+clusters 8 % apart, both known, in six:"""
 WHAT_IS = """\
-Fifty series of a thousand nights shall be silent, so ours asks for one in 100 000 of what nights that remember each other
-could do by chance, and for a permutation test that holds whatever the noise is. Where the nights before look independent
+Fifty series of a thousand nights should raise no false alarm, so ours requires a chance of one in 100 000 under correlated
+nights, and a permutation test that is valid for any noise. Where the nights before look independent
 and normal, Student's test of the last four decides alone: at one in 20 000 until a series has sixty nights, at less the
-longer it is, at one in 100 000 from three hundred on. There no night counts for more than 3.5 deviations: two slow nights
+longer it is, at one in 100 000 from three hundred on. In it no night counts for more than 3.5 deviations: two slow nights
 may be an accident of the machine, where the best test, which knows that there are none, needs one. On two clusters the
-same is asked of how far nights lie off the nearer of them, of the last six too. Otava's share stands beside its alarms on
-the same noise. A rise is also held to four deviations of what twenty nights usually moved by against the twenty before:
-a level that wanders moves by more than its noise from night to night tells. Not asked, ours raises 31 alarms in 10 000
+same test is applied to the distance from the nearer cluster, also of the last six nights. Compare Otava's share with its alarms on
+the same noise. A rise must also exceed four deviations of the usual change of twenty nights against the twenty before:
+a drifting level changes by more than its noise from night to night suggests. Without this rule ours raises 31 alarms in 10 000
 night-values of the walk, and 22 in the seasons."""
 MISSING = """\
-Of 54k1/boa all that has sixty values and a name is here, fifteen series; what its file holds beside them under no name
-mixes several benchmarks in turn and is no series. Drift is told against the first nights, as nothing in these data
-says what was released or accepted."""
+Of 54k1/boa all fifteen named series with sixty values are included; the unnamed values in its file
+mix several benchmarks and are no series. Drift is measured against the first nights, as these data do not
+say what was released or accepted."""
 Detector = Callable[[Sequence[float]], list[int]]  # places where it says that it became slower
 
 
@@ -340,9 +340,9 @@ def main() -> None:
     started = time.process_time()
     lines = [
         "# Detectors of slower run times, scored", "",
-        "Made by `make detectors`, not by hand; what is counted stands at the head of `bench/detectors.py`,",
+        "Made by `make detectors`, not by hand; `bench/detectors.py` explains what is counted,",
         f"the noise in `tests/histories/noise.py`. {given.series} series of {NIGHTS} nights of each kind.",
-        *([f"Beside ours: {others()}."] if len(found) > 1 else []), "",
+        *([f"Compared with {others()}."] if len(found) > 1 else []), "",
         *false_alarms(found, range(given.first, given.first + given.series)),
         *steps(found, range(given.first, given.first + 2 * given.series)), *blamed(found, 20 * given.series), *WHAT_CAN_BE.splitlines(), "", *bounds(),
         *WHAT_IS.splitlines(), "",

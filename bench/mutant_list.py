@@ -178,7 +178,7 @@ MUTANTS = (
         "composition",
         "short-last-stage",
         "the middle stage of order 4 is a little short",
-        "tests/engine/particles/test_composition.py::test_the_order_holds_on_the_pendulum",
+        "tests/engine/particles/test_order.py::test_the_trajectory_has_its_order",
         "run/composition.hpp",
         "-0.65796308717750294857",
         "-0.65795",

@@ -106,7 +106,7 @@ def real(tests: Sequence[str], processes: int, busy: int, file: Path | None) -> 
     count = len(next(iter(levels.values())))
     lines = [
         "\n## Real processes\n",
-        f"{count} fresh processes of one build of this engine, one after the other, beside {told['busy']} that only compute",
+        f"{count} fresh processes of one build of this engine, one after the other, next to {told['busy']} busy processes",
         f"(load {told['load']:.0f} on {os.cpu_count()} cores); stretches cut from them, sides drawn, 2000 changes of every size. The",
         "spread is the median distance from the median of all.\n",
         HEAD[0].replace("noise between processes", "run time, spread between processes"),
@@ -132,10 +132,10 @@ def main() -> None:
     reader.add_argument("--page", type=Path, help="write the tables there")
     asked = reader.parse_args()
     lines = [
-        "# Changes beside their base\n",
-        "Made by `make pairs`, not by hand. How a change is measured beside its base: [in CI](how-to/ci.md); why that bounds the",
-        f"share of unchanged changes that are blocked by {100.0 * ERROR:g} %: the head of `tracker/judge/pairs.py`. A change up to",
-        f"{100.0 * SMALLEST:g} % is none; blocks of {', '.join(map(str, BLOCKS))} processes of either side.\n",
+        "# Changes measured against their base\n",
+        "Made by `make pairs`, not by hand. How a change is measured against its base: [in CI](how-to/ci.md); why that bounds the",
+        f"share of unchanged changes that are blocked by {100.0 * ERROR:g} %: the head of `tracker/judge/pairs.py`. A change of at most",
+        f"{100.0 * SMALLEST:g} % counts as none; blocks of {', '.join(map(str, BLOCKS))} processes of either side.\n",
         "## Simulated\n",
         f"{asked.unchanged} unchanged changes each, {asked.changed} of every size (`tests/histories/process_noise.py`).\n",
         *HEAD,

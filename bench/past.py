@@ -135,16 +135,16 @@ def backfilled(folder: Path, commits: Sequence[str]) -> tuple[int, list[str]]:
     return answers, rows
 
 
-PAGE = """# This project's own past, asked
+PAGE = """# This project's old commits, measured
 
-Made by `make past`, not by hand, at commit {head}; how stands at the head of `bench/past.py`.
+Made by `make past`, not by hand, at commit {head}; `bench/past.py` explains how.
 
 ## A planted commit
 {planted}
 
 ## Old commits
-`tracker backfill` of {count} commits, spread evenly over the {all} of the first-parent line, asked `{test}`: {answers}
-answer. Today's questions where the engine of then can be asked them, else its own.
+`tracker backfill` of {count} commits, spread evenly over the {all} of the first-parent line, with `{test}`: {answers}
+could be measured, with today's questions where the old engine can answer them, else with its own.
 
 {table}
 """
@@ -162,7 +162,7 @@ def main() -> int:
     every = max(1, len(line) // (given.commits + 1))
     old = line[every::every][: given.commits]
     right, search = found(folder, given.range) if given.range else (True, ["Not searched."])
-    answers, table = backfilled(folder, old) if old else (0, ["None asked."])
+    answers, table = backfilled(folder, old) if old else (0, ["None measured."])
     print("\n".join(table))
     print(f"{answers} of {len(old)} old commits answered")
     if given.page:

@@ -237,6 +237,31 @@ def test_a_senseless_method_is_refused_by_name(options: dict[str, Any]) -> None:
         Method(**options)
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"runge_kutta": "order4"}, "runge_kutta must be none or order8"),
+        ({"runge_kutta": "order8", "composition": "order4"}, "a composition or one of Runge-Kutta"),
+        ({"tolerance": 1e-6}, "tolerance is of runge_kutta"),
+        ({"runge_kutta": "order8", "tolerance": -1.0}, "tolerance must be from 0"),
+        ({"runge_kutta": "order8", "sleep_speed": 0.1}, "leave runge_kutta at 'none'"),
+        *(
+            ({"sleep_speed": speed}, "sleep_speed must be a speed from 0")
+            for speed in (-1.0, math.inf, math.nan)
+        ),
+        *(({"sleep_speed": speed}, "sleep_speed must be a number") for speed in (True, "slow")),
+        *(({"sleep_after": after}, "sleep_after must be a time above 0") for after in (0.0, math.nan)),
+        ({"sleep_speed": 0.1, "composition": "order4"}, "leave composition at 'none'"),
+        ({"sleep_speed": 0.1, "half_step_velocities": True}, "leave half_step_velocities at False"),
+        ({"sleep_speed": 0.1, "string_stiffness": True}, "leave string_stiffness at False"),
+        ({"sleep_speed": 0.1, "corrections": 1}, "leave corrections at 0"),
+    ],
+)
+def test_options_that_make_no_sense_together_are_refused(options: dict[str, Any], said: str) -> None:
+    with pytest.raises(MethodError, match=said):
+        Method(**options)
+
+
 @pytest.mark.parametrize("scene", [particles(), stones()], ids=["particles", "rigid"])
 @pytest.mark.parametrize(
     "quantity", [Position("ghost"), Violation("ghost"), JointCoordinate("ghost")], ids=str

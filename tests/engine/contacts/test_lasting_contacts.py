@@ -17,7 +17,6 @@ from spook_tracker.engine import (
     Material,
     MaximumAbsolute,
     Method,
-    MethodError,
     Plane,
     Position,
     RigidBody,
@@ -25,7 +24,6 @@ from spook_tracker.engine import (
     Sphere,
     Trace,
     Velocity,
-    compile,
     simulate,
 )
 
@@ -208,19 +206,6 @@ def test_what_rests_rests_and_what_falls_lands() -> None:
     )  # fmt: skip
     assert end["z"][2] == pytest.approx(RADIUS, abs=1e-6)
     assert abs(end["v"][2]) < 1e-9
-
-
-@pytest.mark.parametrize(
-    ("method", "why"),
-    [
-        (Method(half_step_velocities=True, solver="iterative"), "needs the direct solver"),
-        (Method(composition="order4"), "half_step_velocities, of order 2 while contacts last"),
-    ],
-)
-def test_what_no_higher_order_can_carry_is_refused_by_name(method: Method, why: str) -> None:
-    body = RigidBody(name="body", mass=1.0, shape=Sphere(RADIUS), position=(0.0, 0.0, 2.0))
-    with pytest.raises(MethodError, match=why):
-        compile(Scene(bodies=(ground(), body)), time_step=0.01, method=method)
 
 
 def test_a_block_of_steps_taken_back_behind_a_look_ahead_goes_the_same_way_again() -> None:

@@ -389,21 +389,6 @@ def test_what_has_no_joint_coordinates_is_refused_by_name(name: str, said: str) 
         simulate(scene, time_step=0.01, steps=1, method=method)
 
 
-@pytest.mark.parametrize(
-    ("asked", "said"),
-    [
-        ({"runge_kutta": "order4"}, "runge_kutta must be none or order8"),
-        ({"runge_kutta": "order8", "composition": "order4"}, "a composition or one of Runge-Kutta"),
-        ({"tolerance": 1e-6}, "tolerance is of runge_kutta"),
-        ({"runge_kutta": "order8", "tolerance": -1.0}, "tolerance must be from 0"),
-        ({"runge_kutta": "order8", "sleep_speed": 0.1}, "leave runge_kutta at 'none'"),
-    ],
-)
-def test_options_that_make_no_sense_are_refused(asked: dict[str, Any], said: str) -> None:
-    with pytest.raises(MethodError, match=said):
-        Method(**asked)
-
-
 def test_a_step_that_no_part_of_fits_is_told() -> None:
     """A body that falls into a centre: its acceleration grows without end."""
     dot = Particle(name="dot", mass=1.0, position=(1.0, 0.0, 0.0))

@@ -20,7 +20,6 @@ from spook_tracker.engine import (
     Load,
     Material,
     Method,
-    MethodError,
     Momentum,
     Plane,
     Ramp,
@@ -325,24 +324,3 @@ def test_a_pendulum_at_its_turning_point_does_not_sleep() -> None:
     assert min(awake["e"][1:]) < 0.5 * SLOW**2  # it is slower for a moment
     assert same(awake.final_state, tired.final_state)
     assert tired.counters["slept_steps"] == 0
-
-
-@pytest.mark.parametrize(
-    ("options", "said"),
-    [
-        ({"sleep_speed": -1.0}, "sleep_speed must be a speed from 0"),
-        ({"sleep_speed": math.inf}, "sleep_speed must be a speed from 0"),
-        ({"sleep_speed": math.nan}, "sleep_speed must be a speed from 0"),
-        ({"sleep_speed": True}, "sleep_speed must be a number"),
-        ({"sleep_speed": "slow"}, "sleep_speed must be a number"),
-        ({"sleep_after": 0.0}, "sleep_after must be a time above 0"),
-        ({"sleep_after": math.nan}, "sleep_after must be a time above 0"),
-        ({"sleep_speed": 0.1, "composition": "order4"}, "leave composition at 'none'"),
-        ({"sleep_speed": 0.1, "half_step_velocities": True}, "leave half_step_velocities at False"),
-        ({"sleep_speed": 0.1, "string_stiffness": True}, "leave string_stiffness at False"),
-        ({"sleep_speed": 0.1, "corrections": 1}, "leave corrections at 0"),
-    ],
-)
-def test_refusals(options: dict[str, Any], said: str) -> None:
-    with pytest.raises(MethodError, match=said):
-        Method(**options)
