@@ -19,11 +19,8 @@ from spook_tracker.engine import (
     Sphere,
     Trace,
     Velocity,
-    compile,
-    explain,
     simulate,
 )
-from spook_tracker.engine.bodies import Particle
 
 ROUGH = Material(friction=0.5)
 DOWN = (0.0, 0.0, -10.0)
@@ -110,20 +107,3 @@ def test_a_bounce_on_a_belt_takes_its_speed_along() -> None:
 
     assert found["v"][2] == pytest.approx(1.0, abs=1e-12)
     assert found["v"][0] == pytest.approx(0.08 * 3.0, abs=1e-12)
-
-
-def test_the_stage_is_left_out_with_a_reason_where_no_surface_moves() -> None:
-    still = belt(surface_velocity=(0.0, 0.0, 0.0))
-    for scene, kept, reason in (
-        (Scene(bodies=(belt(), box()), gravity=DOWN), True, "takes along"),
-        (Scene(bodies=(still, box()), gravity=DOWN), False, "no surface moves along itself"),
-        (
-            Scene(bodies=(belt(), box(material=Material())), gravity=DOWN),
-            False,
-            "no two surfaces have friction",
-        ),
-        (Scene(bodies=(Particle(name="p", position=(0, 0, 0), mass=1.0),)), False, "no surface"),
-    ):
-        (choice,) = [c for c in explain(scene, time_step=H) if c.stage == "move_surfaces"]
-        assert choice.kept == kept and reason in choice.reason
-    assert "move_surfaces" not in compile(Scene(bodies=(still, box())), time_step=H).stages

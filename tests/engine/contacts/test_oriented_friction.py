@@ -25,11 +25,8 @@ from spook_tracker.engine import (
     Sphere,
     Trace,
     Velocity,
-    compile,
-    explain,
     simulate,
 )
-from spook_tracker.engine.bodies import Particle
 
 H = 1.0 / 60.0
 GRAVITY = 10.0
@@ -233,19 +230,6 @@ def test_rolling_friction_may_be_there_as_well(solver: str) -> None:
         speeds.append(run(scene, 60, Method(solver=solver, iterations=200)))  # type: ignore[arg-type]
     np.testing.assert_allclose(*speeds, atol=1e-8)
     assert 0.1 < speeds[0][-1, 0] < 0.9
-
-
-def test_the_stage_is_left_out_with_a_reason_where_friction_is_the_same_all_round() -> None:
-    even = grained(0.5, 0.5)
-    for scene, kept, reason in (
-        (Scene(bodies=(floor(grained()), box())), True, "than across"),
-        (Scene(bodies=(floor(even), box())), False, "same friction in all directions"),
-        (Scene(bodies=(floor(grained()), box(material=Material()))), False, "no two surfaces have friction"),
-        (Scene(bodies=(Particle(name="p", position=(0, 0, 0), mass=1.0),)), False, "no surface"),
-    ):
-        (choice,) = [c for c in explain(scene, time_step=H) if c.stage == "orient_friction"]
-        assert choice.kept == kept and reason in choice.reason
-    assert "orient_friction" not in compile(Scene(bodies=(floor(even), box())), time_step=H).stages
 
 
 def test_equal_coefficients_leave_every_bit() -> None:

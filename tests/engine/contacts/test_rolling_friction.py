@@ -25,8 +25,6 @@ from spook_tracker.engine import (
     Sphere,
     Trace,
     Velocity,
-    compile,
-    explain,
     simulate,
 )
 
@@ -158,19 +156,6 @@ def test_a_heap_with_rolling_friction_comes_to_rest_on_a_slope() -> None:
     )
 
     assert found["energy"] < 1e-20
-
-
-def test_the_stage_is_left_out_with_a_reason_where_nothing_resists() -> None:
-    for body, kept, reason in (
-        (ball(rolling_friction=0.01), True, "meets friction"),
-        (ball(torsional_friction=0.01), True, "meets friction"),
-        (ball(), False, "no surface resists rolling"),
-    ):
-        (choice,) = [
-            c for c in explain(Scene(bodies=(floor(), body), gravity=DOWN), time_step=H) if c.stage == "roll"
-        ]
-        assert choice.kept == kept and reason in choice.reason
-    assert "roll" not in compile(Scene(bodies=(floor(), ball())), time_step=H).stages
 
 
 def coin_on_hills(solver: str, steps: int) -> Result:

@@ -16,13 +16,11 @@ from spook_tracker.engine import (
     Method,
     MethodError,
     Part,
-    Particle,
     RigidBody,
     Scene,
     SceneError,
     Shape,
     Sphere,
-    explain,
     simulate,
 )
 
@@ -159,21 +157,6 @@ def test_drag_is_quadratic_in_the_speed_through_the_fluid(shape: Shape, area: fl
 
         assert force[0] == pytest.approx(0.5 * RHO * 0.8 * area * speed**2, rel=1e-6)
         assert force[2] == pytest.approx(calm[2], rel=1e-9)
-
-
-def test_what_does_not_swim_costs_nothing() -> None:
-    body = RigidBody(name="body", mass=1.0, shape=Sphere(1.0), position=(0.0, 0.0, 0.0))
-
-    def stage(scene: Scene) -> Any:
-        (choice,) = [c for c in explain(scene, time_step=0.01) if c.stage == "apply_fluids"]
-        return choice
-
-    dry = stage(Scene(bodies=(body,), gravity=(0.0, 0.0, -G)))
-    assert (dry.kept, dry.reason) == (False, "there is no fluid")
-    sea = Fluid(name="sea", density=RHO)
-    assert stage(Scene(bodies=(body,), forces=(sea,), gravity=(0.0, 0.0, -G))).kept
-    point = Particle(name="point", mass=1.0, position=(0.0, 0.0, 0.0))
-    assert not stage(Scene(bodies=(point,), forces=(sea,), gravity=(0.0, 0.0, -G))).kept
 
 
 def swim(**changes: Any) -> Any:

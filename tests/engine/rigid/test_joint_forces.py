@@ -32,7 +32,6 @@ from spook_tracker.engine import (
     Table,
     Trace,
     Velocity,
-    explain,
     simulate,
     start,
 )
@@ -214,14 +213,6 @@ def test_a_held_run_sets_the_force_of_a_motor_and_takes_it_back() -> None:
         pytest.raises(SceneError, match="follows the time"),
     ):
         run.set_motor("axle", force=1.0)
-
-
-def test_what_is_not_used_is_left_out_and_named() -> None:
-    choices = {c.stage: c for c in explain(wheel(), time_step=H)}
-    assert (choices["rub_joints"].kept, choices["rub_joints"].reason) == (False, "no joint has friction")
-    assert choices["solve_block"].kept
-    rubbing = {c.stage: c for c in explain(wheel(friction=1.0), time_step=H)}
-    assert rubbing["rub_joints"].kept and rubbing["pivot"].kept and not rubbing["solve_block"].kept
 
 
 @pytest.mark.parametrize(

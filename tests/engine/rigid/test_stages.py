@@ -22,17 +22,11 @@ from spook_tracker.engine import (
     Particle,
     Plane,
     Position,
-    Relation,
     RigidBody,
     Scene,
     Sphere,
-    StageChoice,
-    TriangleMesh,
-    Wire,
-    explain,
     simulate,
 )
-from spook_tracker.engine.joints import Constraint
 from spook_tracker.scalar_tests import cornering
 
 TIME_STEP = 1.0 / 60.0
@@ -160,47 +154,3 @@ def test_a_singular_system_without_a_floor_is_reported() -> None:
 
     assert result.status == "not_finite"
     assert "cannot be solved" in result.failure
-
-
-def test_relations_wires_drums_meshes_friction_and_strengths_are_stages_of_their_own() -> None:
-    """Each is kept where a scene has it and left out with its reason where not; nothing else comes with it."""
-    beam, drum = body("beam"), body("drum", position=(0.0, 0.0, 3.0))
-    axles = (
-        Hinge(name="beam axle", between=(WORLD, "beam")),
-        Hinge(name="drum axle", between=(WORLD, "drum")),
-    )
-    gear = Relation(name="gear", terms=(("beam axle", 1.0), ("drum axle", 2.0)))
-    rope = Wire(name="rope", through=((WORLD, (0.0, 1.0, 5.0)), ("beam", (0.0, 1.0, 0.0))))
-    wound = replace(rope, wound=(("drum axle", 0.1),))
-    weak = replace(axles[0], strength=100.0)
-    rough = replace(axles[0], friction=1.0)
-
-    def joined(*constraints: Constraint) -> dict[str, StageChoice]:
-        scene = Scene(bodies=(beam, drum), constraints=constraints)
-        return {c.stage: c for c in explain(scene, time_step=TIME_STEP)}
-
-    plain = joined(*axles)
-    named = {
-        "couple_joints": (joined(*axles, gear), "there are no relations between joints"),
-        "hold_wires": (joined(*axles, rope), "there are no wires"),
-        "wind_wires": (joined(*axles, wound), "there are no wires"),
-        "break_joints": (joined(weak, axles[1]), "no joint has a strength"),
-        "rub_joints": (joined(rough, axles[1]), "no joint has friction"),
-    }
-    for stage, (with_it, why_not) in named.items():
-        assert (plain[stage].kept, plain[stage].reason) == (False, why_not)
-        assert with_it[stage].kept and with_it[stage].reason != why_not
-        others = {s for s, c in with_it.items() if c.kept} & named.keys() - {stage}
-        assert others == ({"hold_wires"} if stage == "wind_wires" else set())
-    assert joined(*axles, rope)["wind_wires"].reason == "no wire is wound on a drum"
-
-    ground = TriangleMesh(corners=((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0)), faces=((0, 1, 2),))
-    ball = body("ball", shape=Sphere(0.1), position=(0.2, 0.2, 1.0))
-    for shape, met, reason in (
-        (ground, True, "surfaces meet triangles: of their edges only what sticks out"),
-        (Plane(), False, "no surface is a mesh or a height field"),
-    ):
-        floor = RigidBody(name="floor", motion="static", shape=shape, position=(0.0, 0.0, 0.0))
-        choices = {c.stage: c for c in explain(Scene(bodies=(ball, floor)), time_step=TIME_STEP)}
-        assert (choices["meet_meshes"].kept, choices["meet_meshes"].reason) == (met, reason)
-    assert plain["meet_meshes"].reason == "fewer than two bodies have a surface"

@@ -28,7 +28,6 @@ from spook_tracker.engine import (
     Table,
     Trace,
     Velocity,
-    explain,
     simulate,
     start,
 )
@@ -157,18 +156,6 @@ def test_a_shaken_floor_carries_what_hangs_on_it() -> None:
 
         assert run.result().state_hash == hash_of_once
     assert simulate(scene, time_step=H, steps=77).state_hash == hash_of_once
-
-
-def test_what_does_not_follow_the_time_has_no_such_stage() -> None:
-    def kept(scene: Scene) -> bool:
-        (choice,) = [c for c in explain(scene, time_step=H) if c.stage == "follow_time"]
-        assert choice.reason
-        return choice.kept
-
-    assert not kept(slider(motor=Motor(speed=1.0)))
-    assert kept(slider(motor=Motor(speed=WAVE)))
-    particle = Particle(name="p", mass=1.0, position=(0.0, 0.0, 0.0))
-    assert not kept(Scene(bodies=(particle,), forces=(Load(name="push", body="p", force=(1.0, 0, 0)),)))
 
 
 def test_compositions_and_settings_from_outside_do_not_follow_the_time() -> None:

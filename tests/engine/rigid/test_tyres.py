@@ -33,7 +33,6 @@ from spook_tracker.engine import (
     Trace,
     Tyre,
     Velocity,
-    explain,
     simulate,
     start,
 )
@@ -225,17 +224,13 @@ def test_a_wheel_held_in_pieces_keeps_its_bits() -> None:
         assert run.result().state_hash == whole.state_hash
 
 
-def test_it_is_left_out_where_there_is_none_and_named_where_an_engine_lacks_it() -> None:
-    rolling = {c.stage: c.kept for c in explain(wheel(), time_step=H)}
+def test_it_is_named_where_an_engine_lacks_it() -> None:
     spring = JointSpring(stiffness=1.0, max_force=1.0)
     hinge = Hinge(name="axle", between=(WORLD, "wheel"), axis=Y, spring=spring)
     other = replace(wheel(), constraints=(hinge,))
-    choice = {c.stage: c for c in explain(other, time_step=H)}["roll_tyres"]
     beside = Spring(name="s", between=(Y, "wheel"), stiffness=1.0, anchors=((0, 0, 0), (0, 0, 1)))
     can = Capabilities(joints=frozenset({Hinge}), forces=frozenset({Spring}), springs=True)
 
-    assert rolling["roll_tyres"] and not rolling["rub_wires"]
-    assert (choice.kept, choice.reason) == (False, "there are no tyres")
     assert unsupported(can, wheel(), {})[0] == "the joint tyre"
     assert unsupported(can, other, {}) == ("a spring of bounded force in a joint",)
     assert unsupported(can, replace(wheel(), constraints=(), forces=(beside,)), {}) == (
