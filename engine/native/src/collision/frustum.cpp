@@ -117,7 +117,7 @@ private:
     }
 };
 
-/// The most of value cos Δ + slope sin Δ over a turn Δ of less than a right angle. The gap of convex shapes, a concave function of
+/// The most of value cos Δ + slope sin Δ over a turn Δ of less than two right angles. The gap of convex shapes, a concave function of
 /// the direction's length and turn, is nowhere more, if this is what it is and how it changes at Δ = 0.
 double most_along(double value, double slope, SineCosine turn) noexcept {
     const double there = value * turn.cosine + slope * turn.sine;
@@ -184,12 +184,15 @@ void meet_edge(Search<Gap>& search, const Frustum& frustum, Vec3 from, Vec3 to, 
         }
     }
     const bool whole = left == nullptr;
-    double low = 0.0, high = 0.0;
+    SineCosine ends[2], arc{0.0, 0.0};
     if (!whole) {
-        low = arc_tangent(-dot(*left, v), -dot(*left, u)),
-        high = arc_tangent(-dot(*right, v), -dot(*right, u));
-        if (low > high) std::swap(low, high);
-        if (high - low > std::numbers::pi) low += 2.0 * std::numbers::pi, std::swap(low, high);
+        const auto turned = [&](Vec3 n) {
+            const double c = -dot(n, u), s = -dot(n, v), size = spook::length(c, s);
+            return SineCosine{s / size, c / size};
+        };
+        const SineCosine one = ends[0] = turned(*left), two = ends[1] = turned(*right);
+        arc = {one.cosine * two.sine - one.sine * two.cosine, one.cosine * two.cosine + one.sine * two.sine};
+        if (arc.sine < 0.0) arc.sine = -arc.sine, std::swap(ends[0], ends[1]);
     }
     const double aside = dot(u, beside - from), above = dot(v, beside - from);
     for (int i = 0; i < 2; ++i) {
@@ -209,8 +212,16 @@ void meet_edge(Search<Gap>& search, const Frustum& frustum, Vec3 from, Vec3 to, 
             return most_along(near, near_slope, turn) < least || most_along(far, -far_slope, turn) < least;
         };
         const auto visit = [&](double c, double s) { search.curved(c * u + s * v, edge); };
-        if (whole) around.peaks(below, visit);
-        else around.peaks(low, high, below, visit);
+        if (whole) {
+            around.peaks(below, visit);
+            continue;
+        }
+        if (around.r > 0.0 && below(around.at(ends[0]), ends[0], around.at(ends[1]), ends[1], arc)) continue;
+        double low = arc_tangent(-dot(*left, v), -dot(*left, u)),
+               high = arc_tangent(-dot(*right, v), -dot(*right, u));
+        if (low > high) std::swap(low, high);
+        if (high - low > std::numbers::pi) low += 2.0 * std::numbers::pi, std::swap(low, high);
+        around.peaks(low, high, below, visit);
     }
 }
 
