@@ -122,20 +122,14 @@ void ContactStage::after_impact(const MixedSystem& system) {
         order_points();
     }
     measure_points();
-    if (!impacts_.look_again(*model_, points_)) motion_.lay_down(points_.all);
+    impacts_.look_again(*model_, points_);
 }
 
 /// After a solve: whether an impact is to come first. Impacts that rebound and were found late follow from others that were too slow
-/// to rebound: the resting rows that answer these know of no bounce, so they are met before, as plastic ones. So come
-/// impacts of bodies that a stop sends back with others that no row knew of: `known` is how many points there were.
-bool ContactStage::needs_impact_first(const MixedSystem& system, std::size_t known) {
-    if (rebounds_late_ && impacts_.meet_slow_too() && measure_points()) {
-        order_points();
-        return true;
-    }
-    if (points_.all.size() == known || !impacts_.stop_is_hit(system, model_->bodies, points_)) return false;
+/// to rebound: the resting rows that answer these know of no bounce, so they are met before, as plastic ones.
+bool ContactStage::needs_impact_first() {
+    if (!rebounds_late_ || !impacts_.meet_slow_too() || !measure_points()) return false;
     order_points();
-    measure_points();
     return true;
 }
 
@@ -170,7 +164,7 @@ ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vecto
         search_.widen(cast, changed_, motion_, points_);
         search_.find_turned(next_, motion_, points_);
         find_impacts(cast);
-        if (needs_impact_first(system, known)) return {};
+        if (needs_impact_first()) return {};
         if (points_.all.size() == known) {
             if (passes_other_ends(system, joints, model_->options.time_step)) return {.ends_passed = true};
             break;

@@ -159,7 +159,7 @@ public:
     const SolveQuality& quality() const noexcept { return quality_; }
 
 private:
-    bool needs_impact_first(const MixedSystem& system, std::size_t known);
+    bool needs_impact_first();
     int find_impacts(const Cast& cast);
     void order_points() { points_.order(state_.cache, model_->surfaces.resists_turning); }
     bool measure_points() { return impacts_.measure(motion_, search_.margins().reach(), points_); }

@@ -85,7 +85,7 @@ ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
         ran_away_ = true;
         return {{}, true};
     }
-    if (needs_impact_first(system, begun)) return {};
+    if (needs_impact_first()) return {};
     if (passes_other_ends(system, system.rows.size(), model_->options.time_step))
         return {{.ends_passed = true}};
     const std::size_t blocks = system.rows.size() + points_.all.size();

@@ -56,18 +56,6 @@ void StepMotion::release_support(int body, const Vec6& after) {
     for (double& k : dv_ext[body]) k *= 1.0 - toi_fraction[body];
 }
 
-void StepMotion::lay_down(const LargeArray<StepContact>& points) {
-    for (const StepContact& point : points) {
-        if (!point.event) continue;
-        const double apart = relative_velocity(point, point.contact.point.normal, velocity),
-                     push = relative_velocity(point, point.contact.point.normal, whole_dv_ext);
-        const double left = 1.0 - point.toi / model_->options.time_step;
-        if (!(std::abs(apart) < 0.5 * left * -push)) continue;
-        for (const int b : {point.contact.first, point.contact.second})
-            if (model_->bodies.moves(b) && toi_fraction[b] > 1.0) dv_ext[b] = Vec6{}, toi_fraction[b] = 1.0;
-    }
-}
-
 Vec3 StepMotion::free_fall_correction(int body, Vec3 after) const {
     const Vec3 k = linear(dv_ext[body]), change = after - linear(velocity[body]);
     if (!supported[body] || !(dot(k, k) > 0.0)) return {};

@@ -9,7 +9,6 @@
 #include "contacts/external_drive.hpp"
 #include "contacts/step_contact.hpp"
 #include "contacts/supported_bodies.hpp"
-#include "linear/large_array.hpp"
 
 namespace spook {
 
@@ -35,9 +34,6 @@ struct StepMotion {
     void apply_half_of_forces();
     /// A supported body that an impact sends along the forces, or against them: until then its support took its kick.
     void release_support(int body, const Vec6& after);
-    /// Bodies that forces would bring together again in the rest of the step, so soon after their impact, lie on each other: what
-    /// is left of their forces, which would lift them off where more than the half of the step has passed, is taken by the contact.
-    void lay_down(const LargeArray<StepContact>& points);
     /// What a supported body of an event that falls in the rest of the step is to go besides, m/s: it falls for all of it, or it
     /// would have the speed of a fall and not have lost the height.
     Vec3 free_fall_correction(int body, Vec3 after) const;

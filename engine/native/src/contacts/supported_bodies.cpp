@@ -3,8 +3,7 @@
 //
 // A free body goes along a parabola, on which it has v + k/2 at the start of a step with the kick k. Until the time t of an event
 // it takes (1/2 + t/h) k, and goes with v + k: ½ |v + k/2|² and the height change by what the impact takes, and by nothing else,
-// whatever t, and however many impacts come (tests/engine/contacts/test_elastic_balls.py). One that comes to rest in it has no more of k, or
-// it would be lifted by the rest, see lay_down(). A supported one stays on its way with v, its support taking the kick:
+// whatever t, and however many impacts come (tests/engine/contacts/test_elastic_balls.py). A supported one stays on its way with v, its support taking the kick:
 // all of it is left for the rest of the step, and the energy changes by (t/h) k·(v₊ − v) − ½ |v₊ − v₁|² with v₁ after the
 // impact. That is a gain where the impact gives a speed along the forces. So a supported body that moves along them already is not advanced, but
 // where what it meets can only push against them, see ImpactQueue::find_meetings(). Another body that an impact sends along them, or against
