@@ -409,7 +409,7 @@ bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, Fr
 /// Joints and contacts, or contacts with friction of turning: the joints are eliminated, and iterations and Newton's method go
 /// over contacts alone, in turns with more iterations each from the best so far, which is the answer. Newton's method on the
 /// whole, which knows no friction of turning and costs a factor of all bodies an iteration, shares loads of redundant points
-/// evenly: it comes before where these are more than one in two bodies, else after the first turn, from the start.
+/// evenly: it comes before where these are many, and no few for so many bodies, else after the first turn, from the start.
 /// `kept`: work() has a copy of the system already.
 void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points, DirectSolver& direct,
                          bool kept, FrictionReport& report) {
@@ -439,15 +439,16 @@ void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points
         report.rounds += found.newton_steps, report.pgs_iterations += found.iterations;
         take(found.residual);
     };
-    const std::size_t bodies = system.mass.size();
-    const std::size_t a_point = bodies < many_bodies ? bodies_a_point : of_many_a_point;
     const bool newton = is_for_newton(system, points, FrictionModel::cone);
     const bool redundant = newton && is_redundant(system);
-    const bool first = redundant && points.size() * a_point > bodies, later = newton && !first;
+    const bool first =
+        redundant && points.size() >= many_points && points.size() * bodies_a_point > system.mass.size();
+    const bool later = newton && !first;
     if (later && !kept) start = system;
     if (first) by_newton();
     const int turns = std::any_of(points.begin(), points.end(), spook::turns) ? turning_turns : joint_turns;
-    for (int turn = 0; turn < turns && !(report.residual <= (turn == 0 ? fair : near)); ++turn) {
+    const double enough = points.size() < few_points ? fair : near;
+    for (int turn = 0; turn < turns && !(report.residual <= (turn == 0 ? fair : enough)); ++turn) {
         reduced(turn);
         if (later && turn == 0 && !(report.residual <= (redundant ? fair : near)))
             system = start, by_newton();

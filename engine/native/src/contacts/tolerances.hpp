@@ -111,10 +111,10 @@ inline constexpr int plain_rounds = 3;         // most systems settle within the
 inline constexpr double poor = 1e-4;           // a residual, of the speeds: beyond it another way is tried
 inline constexpr double fair = 1e-9;           // one that is an answer
 inline constexpr double near = 1e-6, redundant_near = 3e-5;  // residuals, of the speeds: answers
-// Newton's method beside joints, which takes a factor of all bodies an iteration, comes first where redundant points are more
-// than one in so many bodies; than one in four of `many_bodies`.
-inline constexpr std::size_t bodies_a_point = 2, many_bodies = 64, of_many_a_point = 4;
-inline constexpr std::size_t many_points = 16;  // from which on it follows no convex part
+// Beside joints Newton's method, which takes a factor of all bodies an iteration, comes first from so many points on, redundant ones,
+// if there is one in so many bodies; and follows no convex part then.
+inline constexpr std::size_t many_points = 16, bodies_a_point = 2;
+inline constexpr std::size_t few_points = 9;  // below, a turn costs little: only a fair answer ends them
 // Beside joints: iterations, four times as many each turn, and paths of the convex part where points are few.
 inline constexpr int joint_turns = 3, first_iterations = 8, max_frozen = 8;
 inline constexpr int turning_turns = 4;                         // the same with friction of turning
