@@ -42,6 +42,8 @@ def _sentence(kind: type, given: tuple[object, ...], named: Mapping[str, object]
     else:
         return None
     fields = signature.parameters
+    if not fields:
+        return f"{kind.__name__} takes no values: write {kind.__name__}()"
     for name in named:
         if name not in fields:
             return f"{kind.__name__} has no {name!r}; {nearest(name, fields)}"
@@ -53,7 +55,8 @@ def _sentence(kind: type, given: tuple[object, ...], named: Mapping[str, object]
     if len(given) <= len(by_place):
         lacks = [name for name in needed if name not in {*named, *by_place[: len(given)]}]
         return f"{kind.__name__} needs {' and '.join(lacks)}: write {_call(kind, needed)}"
-    if by_place and _constructs(kind, given, named):
+    vector = not any(isinstance(value, str) for value in given)  # several names are not the name of one
+    if vector and by_place and _constructs(kind, given, named):
         return f"{kind.__name__} takes them as one value, {by_place[0]}: write {kind.__name__}({given!r})"
     if by_place:
         return f"{kind.__name__} takes {' and '.join(by_place)}, not {len(given)} values"

@@ -1,4 +1,4 @@
-"""Masses, moments of inertia and densities as a model file says them, looked at before an engine takes what is none for one."""
+"""Masses, moments of inertia and densities of a model file, checked before an engine takes a wrong one for valid."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ MASSES = {  # element: attributes that say one, or several
 
 
 def wrong_mass(root: ElementTree.Element) -> tuple[str, str] | None:
-    """A mass, inertia or density that is no finite number, negative or beyond all bounds: a pattern that finds it in the file,
-    and what it is. What is no number at all engines refuse themselves."""
+    """The first mass, inertia or density that is not finite, negative or beyond all bounds: a pattern that finds it in the
+    file, and what is wrong with it. Text that is no number is left to the engines, which refuse it."""
     for element in root.iter():
         for name, written, numbers, signed in _said(element):
             for number in numbers:

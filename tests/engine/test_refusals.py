@@ -22,6 +22,7 @@ from spook_tracker.engine import (
     ContactForce,
     ConvexHull,
     Distance,
+    Energy,
     EngineError,
     Final,
     Hinge,
@@ -307,6 +308,9 @@ MISCALLED: tuple[tuple[Callable[..., object], tuple[object, ...], dict[str, obje
     (Capsule, (0.2,), {}, "Capsule needs length: write Capsule(radius=…, length=…)"),
     (Material, (), {"frictoin": 0.5}, "Material has no 'frictoin'; did you mean 'friction'"),
     (Box, (), {"edges": (1.0, 1.0, 1.0)}, "Box has no 'edges'; there is 'size'"),
+    (Energy, ("stone",), {}, "Energy takes no values: write Energy()"),
+    (Energy, (), {"body": "stone"}, "Energy takes no values: write Energy()"),
+    (Position, ("stone", "wall", ORIGIN), {}, "Position takes body and point, not 3 values"),
     (Metric, (), {"limits": 1.0}, "Metric has no 'limits'; did you mean 'limit'"),
 )
 

@@ -17,8 +17,9 @@ public:
     void begin(const ContactModel& model);
     /// Whether impacts may come one after the other at all.
     bool possible() const noexcept { return possible_; }
-    /// Whether something in the islands of a contact's bodies rebounds: then its impact without a rebound is met in its order as well,
-    /// since others may follow from it. Else it is left to the resting rows, at its time.
+    /// Whether something in the islands of a contact's bodies may rebound, as where several bodies meet in a scene in which any does:
+    /// then its impact without a rebound is met in its order as well, since others may follow from it. Else it is left to the
+    /// resting rows, at its time.
     bool rebounds(const Contact& contact) const noexcept {
         return (rebounds_[contact.first] | rebounds_[contact.second]) != 0;
     }
@@ -43,7 +44,7 @@ private:
         bool balls = true, flies = true,
              known = true;  // all in it: are, are held by nothing, are where the queue says
         bool followed = false;
-        bool rebounds = false;                     // something in it
+        bool rebounds = false;                     // something in it, or what it may set in motion
         bool open = false;                         // more than one pair of it may meet yet, or is approached
         double fastest = 0.0;                      // of its bodies, m/s
         std::uint64_t pair = 0;                    // that meets, plus one
