@@ -101,18 +101,20 @@ def shadow(shape: Shape, turn: Rotation, along: Any) -> float:
 
 @pytest.mark.parametrize("shape", SHAPES, ids=lambda shape: type(shape).__name__)
 def test_buoyancy_turns_as_the_centre_of_what_is_below_does(shape: Shape) -> None:
-    """Turned at random; upright, leaning, lying and upside down."""
+    """Turned at random; upright, leaning, lying and upside down, each at several depths."""
+    turns = Rotation.random(6, rng=np.random.default_rng(3))
     leans = [Rotation.from_rotvec((0.0, lean, 0.0)) for lean in (0.0, 0.4, 1.2, math.pi / 2, 2.5, math.pi)]
-    for k, turn in enumerate((*Rotation.random(6, rng=np.random.default_rng(3)), *leans)):
-        place, grid = (
-            (0.3, -0.2, -0.3 + 0.12 * (k % 6)),
-            2e-6 if k < 6 else 1e-3,
-        )  # m³; a column lies under as a whole
+    asked = [(turn, -0.3 + 0.12 * k) for k, turn in enumerate(turns)]
+    asked += [(turn, depth) for turn in leans for depth in (-0.2, -0.05, 0.1, 0.22)]
+    for turn, depth in asked:
+        place = (0.3, -0.2, depth)
+        # m³; where it lies each column of the grid is under water as a whole, or not
+        grid = 5e-5 if abs(turn.as_matrix()[2, 2]) < 1e-12 else 2e-6
         force, torque = push(shape, place, turn)
         volume, centre = below(shape, place, turn)
         right = np.array((0.0, 0.0, RHO * G * volume))
 
-        assert volume > 0.0 or k > 5
+        assert volume > 0.0 or depth > 0.0
         np.testing.assert_allclose(force, right, atol=grid * RHO * G)
         np.testing.assert_allclose(torque, np.cross(centre - place, right), atol=grid * RHO * G)
 
