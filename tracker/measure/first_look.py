@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import os
 import time
+import uuid
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from spook_tracker.engine.model_file import ModelRun
 from spook_tracker.engine.result import Result
@@ -13,6 +14,14 @@ from spook_tracker.engine.scene import Scene
 from spook_tracker.scalar_tests.case import OutOfTime
 from spook_tracker.tracker.document.run_document import LEFT_OUT, RunDocument, TestCard
 from spook_tracker.tracker.measure.remembered import Option
+
+
+@dataclass(frozen=True)
+class Share:
+    """The time that each process has for a test in one run: the workers of a cluster outlive it."""
+
+    seconds: float  # of the processor
+    run: str = field(default_factory=lambda: uuid.uuid4().hex)
 
 
 @dataclass(frozen=True)
@@ -30,7 +39,7 @@ class Look:
     """Simulates until this process has spent so many seconds of the processor on a test; then OutOfTime."""
 
     simulate: Callable[..., Result]
-    seconds: float
+    share: Share
     begun: float
     why: str = ""  # something of this piece of work was left out
 
@@ -44,7 +53,7 @@ class Look:
 
     def left(self) -> float:
         """Seconds of the processor."""
-        return self.seconds - (_spent() - self.begun)
+        return self.share.seconds - (_spent() - self.begun)
 
     def over(self, why: str) -> None:
         self.why = self.why or why or "over"
@@ -54,10 +63,10 @@ class Look:
 _looks: dict[str, Look] = {}
 
 
-def look(test: str, simulate: Callable[..., Result], seconds: float) -> Look:
+def look(test: str, simulate: Callable[..., Result], share: Share) -> Look:
     """The look of this process at a test, for its next piece of work."""
-    if (found := _looks.get(test)) is None:
-        found = _looks[test] = Look(simulate, seconds, _spent())
+    if (found := _looks.get(test)) is None or found.share != share:
+        found = _looks[test] = Look(simulate, share, _spent())
     found.simulate, found.why = simulate, ""
     return found
 

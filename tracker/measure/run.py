@@ -243,10 +243,10 @@ def _test_of(task: Task) -> str:
 
 
 def perform(
-    source: Questions, task: Task, shared: Path | None = None, look: float | None = None
+    source: Questions, task: Task, shared: Path | None = None, look: first_look.Share | None = None
 ) -> Parts | crew.Lost:
     """Do one piece of work in this process; whatever it throws costs this piece alone. `shared` is a folder of all
-    processes that are at work on these tests, `look` as a request says it."""
+    processes that are at work on these tests, `look` the time for a first look."""
     try:
         if look is None:
             return _performed(source, task, source.simulate(), shared)
@@ -309,12 +309,13 @@ def _perform_all(
     `workers` counts the answers of each machine of an executor.
     """
     left = {name: sum(task.test == name for task in tasks) for name in tests}
+    look = None if request.look is None else first_look.Share(request.look)
     found: Iterator[tuple[Task, Parts | crew.Lost]] = (
-        (task, perform(source, task, look=request.look)) for task in tasks
+        (task, perform(source, task, look=look)) for task in tasks
     )
     if request.executor != executors.PROCESS:
         at_work = (
-            partial(perform, source, look=request.look),
+            partial(perform, source, look=look),
             tasks,
             partial(_place, source),
             lambda machine: workers.update([machine]),
@@ -322,7 +323,7 @@ def _perform_all(
         found = executors.answers(request.executor, *at_work)
     elif request.workers:
         limits = crew.Limits(seconds=request.time_limit, memory=request.memory_limit)
-        found = _answers(source, tasks, request, limits)
+        found = _answers(source, tasks, request.workers, limits, look)
     for done, (task, parts) in enumerate(found, start=1):
         if isinstance(parts, crew.Lost):
             parts = _lost(task, tests[task.test], parts)
@@ -339,11 +340,15 @@ def _perform_all(
 
 
 def _answers(
-    source: Questions, tasks: Sequence[Task], request: Request, limits: crew.Limits
+    source: Questions,
+    tasks: Sequence[Task],
+    workers: int,
+    limits: crew.Limits,
+    look: first_look.Share | None,
 ) -> Iterator[tuple[Task, Parts | crew.Lost]]:
     with TemporaryDirectory(prefix="tracker-runs-") as shared:
-        work = partial(perform, source, shared=Path(shared), look=request.look)
-        yield from crew.answers(work, tasks, request.workers, limits, _test_of)
+        work = partial(perform, source, shared=Path(shared), look=look)
+        yield from crew.answers(work, tasks, workers, limits, _test_of)
 
 
 def _place(source: Questions) -> executors.Place:

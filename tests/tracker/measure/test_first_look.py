@@ -57,6 +57,13 @@ def test_what_tells_most_is_known_first_and_the_rest_is_named(file: Path) -> Non
     assert all(name in document.tests[0].lacks["look"] for name in [*left, "replay"])
 
 
+def test_a_second_look_in_the_same_process_has_its_own_time(file: Path) -> None:
+    first, second = _looked(file, 8.0), _looked(file, 8.0)
+
+    assert _known(first) == _known(second)
+    assert first.tests[0].lacks == second.tests[0].lacks
+
+
 def test_a_look_with_time_enough_leaves_nothing_out(file: Path) -> None:
     whole, looked = _looked(file, None), _looked(file, 1e6)
 
