@@ -167,16 +167,17 @@ def _earlier(history: StoredHistory, before: str, after: str) -> RunInfo:
     if word == "latest" and before == f"{whose}{at}previous":
         return _previous(history, after) or history.resolve(before)
     if word == "latest" and before == f"{whose}{at}last-green":
-        return _previous(history, after, green=True) or _no_green(history.resolve(before))
+        history.resolve(before)  # where none at all is green, that is said
+        return _previous(history, after, green=True) or _no_green()
     return history.resolve(before)
 
 
-def _no_green(only: RunInfo) -> RunInfo:
+def _no_green() -> RunInfo:
     """UnknownName: a run is no news against itself."""
     from spook_tracker.tracker.document.errors import UnknownName
 
     raise UnknownName(
-        f"no version before the latest has kept every limit, {only.engine.version} itself is the first; name a version"
+        "no version before the latest has kept every limit on its branch; name one to compare with"
     )
 
 
