@@ -106,7 +106,7 @@ def real(tests: Sequence[str], processes: int, busy: int, file: Path | None) -> 
     count = len(next(iter(levels.values())))
     lines = [
         "\n## Real processes\n",
-        f"{count} fresh processes of one build of this engine, one after the other, next to {told['busy']} busy processes",
+        f"{count} fresh processes of one build of this engine, one after the other, with {told['busy']} other processes busy",
         f"(load {told['load']:.0f} on {os.cpu_count()} cores); stretches cut from them, sides drawn, 2000 changes of every size. The",
         "spread is the median distance from the median of all.\n",
         HEAD[0].replace("noise between processes", "run time, spread between processes"),

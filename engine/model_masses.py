@@ -1,4 +1,4 @@
-"""Masses, moments of inertia and densities of a model file, checked before an engine takes a wrong one for valid."""
+"""Masses and moments of inertia of a model file, and densities of MJCF, checked before an engine takes a wrong one for valid."""
 
 from __future__ import annotations
 

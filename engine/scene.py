@@ -96,8 +96,8 @@ class Scene:
         """√(g r) [m/s], what the defaults of `Method`'s residuals are shares of; units of length, mass and time scale it.
 
         g is the scene's gravity, r the median radius of gyration √(tr I / 2 m) of the bodies that move; of particles alone, the
-        median length of what ties them. Without gravity the largest speed that a body starts with, |v| + |ω| r, and 1
-        where nothing moves.
+        median length of what ties them. Where there is no gravity, or no length, the largest speed that a body starts with, |v| + |ω| r, and 1
+        where nothing moves or this is no finite number.
         """
         moving = [body for body in self.bodies if isinstance(body, Particle) or body.motion == "dynamic"]
         radii = {body.name: _gyration(body) for body in moving if isinstance(body, RigidBody)}
@@ -113,7 +113,7 @@ class Scene:
         for body in self.bodies if not speed > 0.0 else ():
             turning = math.hypot(*body.angular_velocity) if isinstance(body, RigidBody) else 0.0
             speed = max(speed, math.hypot(*body.velocity) + turning * radii.get(body.name, 0.0))
-        return speed or 1.0
+        return speed if 0.0 < speed < math.inf else 1.0
 
     def _repr_html_(self) -> str | None:
         """The scene at its start, to be turned, for notebooks; None, so its text, where nothing draws it."""

@@ -148,7 +148,9 @@ def model_looks(run: RunDocument) -> list[str]:
             found.setdefault(pair[0].test, []).append(pair)
     looks = [f"{test}: {said}" for test, of_test in found.items() if (said := _look(of_test))]
     return looks + [
-        clean(f"{card.name}: left out of this first look: {card.lacks[LEFT_OUT]}; --all asks for it, too")
+        clean(
+            f"{card.name}: left out of this first look: {card.lacks[LEFT_OUT]}; nothing is recorded; --all asks all"
+        )
         for card in run.tests
         if LEFT_OUT in card.lacks
     ]

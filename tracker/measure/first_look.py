@@ -84,8 +84,8 @@ def told(card: TestCard, left: list[LeftOut]) -> dict[str, str]:
 
 def why_nothing(run: RunDocument) -> str:
     """Of a look in which nothing came to an end."""
-    left = [f"{card.name} in the time of a first look: {card.lacks[LEFT_OUT]}" for card in run.tests]
-    return f"{run.engine.name} came to no end with {'; '.join(left)}; --all gives it more"
+    left = [f"{card.name} within a first look: {card.lacks[LEFT_OUT]}" for card in run.tests]
+    return f"{run.engine.name} did not finish {'; '.join(left)}; --all gives it more"
 
 
 def _said(one: LeftOut) -> str:

@@ -107,7 +107,8 @@ def test_sleep_comes_after_the_time_asked_for_and_not_a_step_before() -> None:
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_a_ball_dropped_onto_sleepers_does_to_them_what_it_does_without_sleep(solver: str) -> None:
     """The island it meets wakes as a whole, in the step it is met; the stack beside goes on sleeping. What they sleep with
-    is speed of rounding, so that both runs are the same to rounding, times what tumbling boxes make of it."""
+    is speed of rounding, so that both runs are the same to rounding, times what tumbling boxes make of it, until the ball
+    sleeps."""
     ball = RigidBody(name="ball", mass=3.0, shape=Sphere(0.3), position=(0.3, 0.1, 12.0), material=ROUGH)
     built = scene(FLOOR, *stack(), *stack(5.0, 2, "other"), ball)
     solved: dict[str, Any] = {"solver": solver, "iterations": 200, "residual_tolerance": 1e-13}

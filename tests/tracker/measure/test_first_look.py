@@ -92,7 +92,6 @@ def test_a_run_that_takes_too_long_is_broken_off(file: Path, monkeypatch: pytest
 
     run = watched(asked, Impatient())
     assert run.status == "timed_out"
-    assert run.cpu_seconds < 0.2
 
 
 def test_of_a_look_that_is_not_whole_nothing_is_recorded_and_all_asks_the_rest(
@@ -108,7 +107,7 @@ def test_of_a_look_that_is_not_whole_nothing_is_recorded_and_all_asks_the_rest(
     whole = CliRunner().invoke(main, [*asked, "--all"], prog_name="tracker")
 
     assert "ball: left out of this first look: " in look.output
-    assert "--all asks for it, too" in look.output
+    assert "nothing is recorded; --all asks all" in look.output
     assert "left out" not in whole.output
     assert look.exit_code == whole.exit_code == 0
     after = CliRunner().invoke(main, ["export", *asked[-2:]], prog_name="tracker")
@@ -118,6 +117,6 @@ def test_of_a_look_that_is_not_whole_nothing_is_recorded_and_all_asks_the_rest(
 
 def test_where_nothing_comes_to_an_end_that_is_said(file: Path) -> None:
     with pytest.raises(
-        measuring.RunError, match=r"^nothing was measured: mujoco came to no end with ball .*--all"
+        measuring.RunError, match=r"^nothing was measured: mujoco did not finish ball .*--all"
     ):
         _looked(file, 1e-9)

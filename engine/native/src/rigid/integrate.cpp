@@ -22,7 +22,7 @@ void RigidSystem::integrate() {
         deliver();
         return find_whirling({&body, 1});
     }
-    // Beside contacts an impact, too, turns a body by a radian, for a step or two: then it is tension that joints' work shows.
+    // With contacts an impact can turn a body by a radian in a step as well: then only the joints' work tells tension from it.
     if (!mixed_.touching() || scratch_.led_by_joints) find_whirling(model_.constrained);
     if (!bilateral_.take_moved())
         for (int i : model_.constrained)
