@@ -227,7 +227,7 @@ double MixedRows::leading_work(std::size_t k) const {
     return work;
 }
 
-/// Whether that of some island's joints is more than all its bodies move with, and far more than it would take without the
+/// Whether that of some island's joints is a thousand times what its bodies move with, and far more than it would take without the
 /// others: these are jammed, or a light one would have to go far round. What has opened stays so until the island has moved on,
 /// and the impulses met so far, which jams multiply, are forgotten. Asked of the first solve that settles.
 bool MixedRows::leave_open() {
@@ -241,7 +241,7 @@ bool MixedRows::leave_open() {
             for (int a = 0; a < 3; ++a)
                 energy += 0.5 * system.momentum[b][a] * system.momentum[b][a] / system.mass[b][0];
     scratch_.led_by_joints = work > led_share * energy;
-    if (!(work > energy)) return false;
+    if (!(work > jammed * energy)) return false;
     const Islands& islands = scratch_.finder.find(system);
     std::vector<double>& spare = scratch_.dissipated;
     spare.assign(islands.count, 0.0);
