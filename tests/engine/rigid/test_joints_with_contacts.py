@@ -19,14 +19,18 @@ from spook_tracker.engine import (
     Motor,
     Penetration,
     Plane,
+    Position,
     Prismatic,
     RigidBody,
     Scene,
+    Trace,
     Velocity,
     simulate,
     start,
 )
+from spook_tracker.scalar_tests import loose_bearing
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.scalar_tests.heavier import heavier
 
 STEP = 1 / 60
 G = 9.81
@@ -266,3 +270,20 @@ def test_a_driven_slide_pushes_a_box_as_statics_say():
     speed = run["v"]
     assert run.status == "completed"
     assert speed[0] == pytest.approx((force - mu * box * G) / (pusher + box), rel=1e-9)
+
+
+@pytest.mark.parametrize("rate", [60, 240])
+def test_a_motor_moves_any_load_alike_where_it_turns_back(rate: int) -> None:
+    """A slider in a loose bearing: held by its joints, of 10 kg or 1e9, it goes where the crank says. Where it turns back, its
+    joints do far more work than anything moves with, and are no jam."""
+    light, heavy = (
+        simulate(
+            heavier(loose_bearing.scene(1 / rate), mass / loose_bearing.SLIDER, "slider"),
+            time_step=1 / rate,
+            duration=loose_bearing.DURATION,
+            observe={"x": Trace(quantity=Position("slider"))},
+        )["x"][:, 0]
+        for mass in (10.0, 1e9)
+    )
+
+    assert np.abs(heavy - light).max() < 1e-9

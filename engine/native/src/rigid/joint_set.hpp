@@ -74,6 +74,10 @@ public:
         const bool one_sided = joint.general >= 0 && generals_[joint.general].one_sided;
         return !block.axial && !one_sided && !gives_way(joint.constants.kind) && !states[block.joint].broken;
     }
+    /// Whether a motor drives a block: it does whatever work that takes.
+    bool has_motor(const JointBlock& block) const noexcept {
+        return block.axial && drives_.of(block.joint)->has_motor;
+    }
     /// Whether a block has a row that only pushes one way.
     bool may_stop(const JointBlock& block) const noexcept {
         const Joint& joint = joints_[block.joint];

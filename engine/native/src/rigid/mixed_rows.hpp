@@ -81,6 +81,7 @@ private:
     static RowBlock other_end(const RowBlock& block);
     bool find_other_ends();
     double leading_work(std::size_t block) const;
+    bool is_driven(const JointBlock& block) const;
     bool leave_open();
     void take_velocities(bool angular_too, const std::function<bool(int)>& untouched);
     void take_multipliers();

@@ -227,8 +227,17 @@ double MixedRows::leading_work(std::size_t k) const {
     return work;
 }
 
-/// Whether that of some island's joints is a thousand times what its bodies move with, and far more than it would take without the
-/// others: these are jammed, or a light one would have to go far round. What has opened stays so until the island has moved on,
+/// Whether a motor or a kinematic body moves a joint.
+bool MixedRows::is_driven(const JointBlock& block) const {
+    const auto moves = [&](int body) {
+        return std::ranges::find(model_.driven, body) != model_.driven.end();
+    };
+    return joints_.has_motor(block) || moves(block.first) || moves(block.second);
+}
+
+/// Whether that of some island's joints is more than all its bodies move with, and far more than it would take without the
+/// others: these are jammed, or a light one would have to go far round. Not where something drives the island: a heavy load that
+/// turns back takes as much of them. What has opened stays so until the island has moved on,
 /// and the impulses met so far, which jams multiply, are forgotten. Asked of the first solve that settles.
 bool MixedRows::leave_open() {
     std::vector<char>& open = scratch_.left_open;
@@ -241,7 +250,7 @@ bool MixedRows::leave_open() {
             for (int a = 0; a < 3; ++a)
                 energy += 0.5 * system.momentum[b][a] * system.momentum[b][a] / system.mass[b][0];
     scratch_.led_by_joints = work > led_share * energy;
-    if (!(work > jammed * energy)) return false;
+    if (!(work > energy)) return false;
     const Islands& islands = scratch_.finder.find(system);
     std::vector<double>& spare = scratch_.dissipated;
     spare.assign(islands.count, 0.0);
@@ -257,7 +266,8 @@ bool MixedRows::leave_open() {
         for (int i = 0; i < block.size && joints_.always_holds(joints_.blocks()[k]); ++i)
             if (const double own = own_inertia(system, block, i); own > 0.0)
                 alone += 0.5 * block.right[i] * block.right[i] / own;
-        spare[islands.of(block)] += most_of_alone * alone - leading_work(k);
+        spare[islands.of(block)] +=
+            is_driven(joints_.blocks()[k]) ? unbounded : most_of_alone * alone - leading_work(k);
     }
     bool any = false;
     for (std::size_t k = 0; k < open.size(); ++k) {

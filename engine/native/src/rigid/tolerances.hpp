@@ -136,8 +136,6 @@ inline constexpr double far = 1e3;  // m: as far out may a sleeper lie on a plan
 namespace tolerances::solve_velocities {
 inline constexpr double led_share =
     0.1;  // of the kinetic energy: a step in which joints do more work leads bodies
-inline constexpr double jammed =
-    1e3;  // of the kinetic energy: the work of joints in a jam; a slider of any mass that turns back in its bearing needs less
 inline constexpr double most_of_alone =
     100.0;  // times the work of leading each row back by itself: what a chain of bodies may take
 }  // namespace tolerances::solve_velocities
