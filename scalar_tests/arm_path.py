@@ -9,33 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    ConstraintForce,
-    Final,
-    Hinge,
-    JointCoordinate,
-    Load,
-    Method,
-    Motor,
-    Result,
-    Scene,
-    Sinusoid,
-    Table,
-    Trace,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.robot_arm import POSES, inverse_dynamics, kinematics
@@ -67,10 +44,10 @@ def path(time: float) -> tuple[Any, Any, Any]:
     )
 
 
-def drives(motors: list[Motor | None], pose: Any = POSES[0], speeds: Any = STILL) -> Scene:
+def drives(motors: list[engine.Motor | None], pose: Any = POSES[0], speeds: Any = STILL) -> engine.Scene:
     """The arm of the other question in a pose, its joints turning at these speeds, with these drives."""
     still = driven(pose, speeds)
-    joints = (joint for joint in still.constraints if isinstance(joint, Hinge))
+    joints = (joint for joint in still.constraints if isinstance(joint, engine.Hinge))
     return replace(
         still,
         constraints=tuple(replace(joint, motor=one) for joint, one in zip(joints, motors, strict=True)),
@@ -78,7 +55,7 @@ def drives(motors: list[Motor | None], pose: Any = POSES[0], speeds: Any = STILL
 
 
 @functools.cache
-def led() -> Scene:
+def led() -> engine.Scene:
     """No drives: the torques of inverse dynamics along the path as loads; what drives a joint pushes back the link before."""
     times = [DURATION * k / KNOTS for k in range(KNOTS + 1)]
     pushes = np.zeros((len(times), 6, 3))
@@ -89,11 +66,11 @@ def led() -> Scene:
             if k > 0:
                 row[k - 1] -= torques[k] * axis
     loads = tuple(
-        Load(
+        engine.Load(
             name=f"torque {k + 1} {'xyz'[c]}",
             body=f"link {k + 1}",
             torque=(float(c == 0), float(c == 1), float(c == 2)),
-            factor=Table(tuple(times), tuple(pushes[:, k, c])),
+            factor=engine.Table(tuple(times), tuple(pushes[:, k, c])),
         )
         for k in JOINTS
         for c in range(3)
@@ -102,43 +79,48 @@ def led() -> Scene:
 
 
 @functools.cache
-def guided() -> Scene:
+def guided() -> engine.Scene:
     """Drives that follow the speeds of the path."""
     return drives(
-        [Motor(speed=Sinusoid(amplitude=a * RATE, frequency=RATE / (2.0 * math.pi))) for a in AMPLITUDE]
+        [
+            engine.Motor(speed=engine.Sinusoid(amplitude=a * RATE, frequency=RATE / (2.0 * math.pi)))
+            for a in AMPLITUDE
+        ]
     )
 
 
 @functools.cache
-def falling(share: float = 1.0) -> Scene:
+def falling(share: float = 1.0) -> engine.Scene:
     """Held in the second pose by drives of which two are too weak, and may carry `share` of their bounds."""
     bounds = {k: share * bound for k, bound in WEAK.items()}
-    return drives([Motor(speed=0.0, max_force=bounds.get(k)) for k in JOINTS], POSES[1])
+    return drives([engine.Motor(speed=0.0, max_force=bounds.get(k)) for k in JOINTS], POSES[1])
 
 
-ANGLES: dict[str, Observable] = {f"q{k}": Trace(quantity=JointCoordinate(f"joint {k + 1}")) for k in JOINTS}
+ANGLES: dict[str, Observable] = {
+    f"q{k}": engine.Trace(quantity=engine.JointCoordinate(f"joint {k + 1}")) for k in JOINTS
+}
 
 
-def angles(result: Result) -> Any:
+def angles(result: engine.Result) -> Any:
     """Of the joints, at every sample [rad]."""
     return np.stack([result[f"q{k}"] for k in JOINTS], axis=1)
 
 
-def strays(simulate: Simulate, time_step: float, method: Method = PLAIN) -> Any:
+def strays(simulate: case.Simulate, time_step: float, method: engine.Method = engine.PLAIN) -> Any:
     """How far every joint is from the path, at every step [rad]."""
     result = simulate(led(), time_step=time_step, duration=DURATION, method=method, observe=ANGLES)
     return angles(result) - np.array([path(time)[0] for time in result.sample_times["q0"]])
 
 
-def lead(simulate: Simulate) -> dict[str, float]:
+def lead(simulate: case.Simulate) -> dict[str, float]:
     """Half a second along the path by torques alone."""
     return {"path_error": float(np.abs(strays(simulate, TIME_STEP)).max())}
 
 
-def guide(simulate: Simulate) -> dict[str, float]:
+def guide(simulate: case.Simulate) -> dict[str, float]:
     """The drives' torques on the path, which speeds up and slows down."""
     observe: dict[str, Observable] = {
-        f"{k}": Trace(quantity=ConstraintForce(f"joint {k + 1}")) for k in JOINTS
+        f"{k}": engine.Trace(quantity=engine.ConstraintForce(f"joint {k + 1}")) for k in JOINTS
     }
     result = simulate(guided(), time_step=FINE, duration=max(READ), observe=observe)
     worst = 0.0
@@ -159,10 +141,10 @@ def late() -> float:
     return worst
 
 
-def released(simulate: Simulate, share: float = 1.0) -> tuple[Any, float]:
+def released(simulate: case.Simulate, share: float = 1.0) -> tuple[Any, float]:
     """Angles in a quarter of a second with two drives at so much of their bounds, and how far their torques are from that,
     relative to it."""
-    observe = ANGLES | {f"{k}": Trace(quantity=ConstraintForce(f"joint {k + 1}")) for k in WEAK}
+    observe = ANGLES | {f"{k}": engine.Trace(quantity=engine.ConstraintForce(f"joint {k + 1}")) for k in WEAK}
     result = simulate(falling(share), time_step=TIME_STEP, steps=FALL, observe=observe)
     turned, worst = angles(result), 0.0
     for step in range(1, FALL + 1):
@@ -173,7 +155,7 @@ def released(simulate: Simulate, share: float = 1.0) -> tuple[Any, float]:
     return turned, worst
 
 
-def fall(simulate: Simulate) -> dict[str, float]:
+def fall(simulate: case.Simulate) -> dict[str, float]:
     """The drives' torques, and how far their joints and the others have turned."""
     turned, worst = released(simulate)
     held = [k for k in JOINTS if k not in WEAK]
@@ -214,22 +196,22 @@ def held_limit() -> float:
     return 1.25 * (TIME_STEP * float(np.abs(fallen()[1]).sum())) ** 2
 
 
-def corrected(pose: Any, speeds: Any, rate: float) -> Scene:
+def corrected(pose: Any, speeds: Any, rate: float) -> engine.Scene:
     """The arm on its way back to the second pose: torques that inverse dynamics gives for e'' = −ω² e − 2 ω e'."""
     torques, _, _ = inverse_dynamics(pose, speeds, -(rate**2) * (pose - POSES[1]) - 2.0 * rate * speeds)
     pushes = [*(t * axis for t, (_, axis, _, _) in zip(torques, kinematics(pose), strict=True)), np.zeros(3)]
     loads = tuple(
-        Load(name=f"torque {k + 1}", body=f"link {k + 1}", torque=tuple(pushes[k] - pushes[k + 1]))
+        engine.Load(name=f"torque {k + 1}", body=f"link {k + 1}", torque=tuple(pushes[k] - pushes[k + 1]))
         for k in JOINTS
     )
     return replace(drives([None] * 6, pose, speeds), forces=loads)
 
 
-def comes_back(simulate: Simulate, rate: float) -> bool:
+def comes_back(simulate: case.Simulate, rate: float) -> bool:
     """Whether no joint is further from the second pose after some steps, each with the torques of the angles at its start and
     of how far they came in the step before; begun on the swing from side to side that breaks first."""
     observe: dict[str, Observable] = {
-        f"{k}": Final(quantity=JointCoordinate(f"joint {k + 1}")) for k in JOINTS
+        f"{k}": engine.Final(quantity=engine.JointCoordinate(f"joint {k + 1}")) for k in JOINTS
     }
     off, turned = np.full(6, NUDGE), np.full(6, 2.0 * NUDGE)
     for _ in range(SWINGS):
@@ -242,28 +224,28 @@ def comes_back(simulate: Simulate, rate: float) -> bool:
     return float(np.abs(off).max()) <= NUDGE
 
 
-def stiffest(simulate: Simulate) -> BreakPoint:
+def stiffest(simulate: case.Simulate) -> case.BreakPoint:
     """The fastest correction that leads the arm back."""
     return break_point(
         functools.partial(comes_back, simulate), 0.3 * FASTEST, 3.0 * FASTEST, resolution=1e-3, walk=4
     )
 
 
-def bounded(simulate: Simulate, share: float) -> bool:
+def bounded(simulate: case.Simulate, share: float) -> bool:
     """Whether drives of so small a share of their bounds carry that, to 1e-9, while the arm falls."""
     return released(simulate, share)[1] < 1e-9
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest distance of a joint from the path [rad]."""
     return float(np.abs(strays(simulate, time_step, method)).max())
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Every joint's distance from the path at 1/60 s."""
     off = strays(simulate, TIME_STEP)
     times = TIME_STEP * np.arange(len(off))
-    return Drawing(
+    return case.Drawing(
         curves=tuple(line(f"joint {k + 1}", times, off[:, k]) for k in JOINTS),
         x_label="time [s]",
         y_label="angle less that of the path [rad]",
@@ -274,7 +256,7 @@ def draw(simulate: Simulate) -> Drawing:
 
 PATH_LIMIT, FALL_LIMIT = 0.1055, 0.0295  # rad, by the steps of joint coordinates; the test finds them again
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Robot arm along a path",
     question="Do torques computed from a path lead a six-joint arm along it, and do weak drives let it fall as they must?",
     why="Computed torque is how robots are controlled: the model's torques are sent to the arm. An engine whose arm answers "
@@ -364,10 +346,10 @@ TEST = ScalarTest(
             "weak",
         ),
     ),
-    example=lambda: Example(scene=led(), time_step=TIME_STEP, duration=DURATION),
-    figures=(Figure(name="path", title="Distance from the path", draw=draw),),
+    example=lambda: case.Example(scene=led(), time_step=TIME_STEP, duration=DURATION),
+    figures=(case.Figure(name="path", title="Distance from the path", draw=draw),),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="stiffest",
             title="Fastest critical correction that computed torque may ask for at 1/60 s",
             configuration="plain",
@@ -392,7 +374,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="path",
             description="largest distance of a joint from the path in half a second",
             unit="rad",

@@ -7,18 +7,10 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import AngularVelocity, Final, Plane, RigidBody, Scene, Sphere, Trace, Velocity
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_count, break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.sweep import line
 
@@ -33,24 +25,28 @@ GRIP = ALONG / (3.5 * 2.0 * UP)  # µ (1 + e) u = v/3.5: what turns sliding into
 CASES = {"sliding": (0.05, 0.0), "gripping": (5.0, 0.0), "returning": (5.0, 1.0)}  # friction, psi_t
 
 
-def scene(friction: float, restitution: float = 1.0, tangential: float = 0.0) -> Scene:
+def scene(friction: float, restitution: float = 1.0, tangential: float = 0.0) -> engine.Scene:
     """A ball without spin half-way between floor and ceiling, without gravity."""
     rubber = Material(friction=friction, restitution=restitution, tangential_restitution=tangential)
     walls = [
-        RigidBody(
-            name=name, motion="static", shape=Plane((0.0, 0.0, up)), position=(0.0, 0.0, z), material=rubber
+        engine.RigidBody(
+            name=name,
+            motion="static",
+            shape=engine.Plane((0.0, 0.0, up)),
+            position=(0.0, 0.0, z),
+            material=rubber,
         )
         for name, up, z in (("floor", 1.0, 0.0), ("ceiling", -1.0, ROOM))
     ]
-    ball = RigidBody(
+    ball = engine.RigidBody(
         name="ball",
         mass=1.0,
-        shape=Sphere(RADIUS),
+        shape=engine.Sphere(RADIUS),
         position=(0.0, 0.0, 0.5 * ROOM),
         velocity=(ALONG, 0.0, -UP),
         material=rubber,
     )
-    return Scene(bodies=(*walls, ball))
+    return engine.Scene(bodies=(*walls, ball))
 
 
 def expected(
@@ -68,10 +64,13 @@ def expected(
     return found
 
 
-def _measure(simulate: Simulate) -> dict[str, float]:
+def _measure(simulate: case.Simulate) -> dict[str, float]:
     values = {}
     for name, (friction, tangential) in CASES.items():
-        observe = {"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))}
+        observe = {
+            "v": engine.Final(quantity=engine.Velocity("ball")),
+            "w": engine.Final(quantity=engine.AngularVelocity("ball")),
+        }
         result = simulate(
             scene(friction, tangential=tangential),
             time_step=TIME_STEP,
@@ -84,36 +83,42 @@ def _measure(simulate: Simulate) -> dict[str, float]:
     return values
 
 
-def grips(simulate: Simulate, friction: float) -> bool:
+def grips(simulate: case.Simulate, friction: float) -> bool:
     """Whether the ball leaves the floor rolling: speed along and r ω are alike after the first blow."""
-    observe = {"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))}
+    observe = {
+        "v": engine.Final(quantity=engine.Velocity("ball")),
+        "w": engine.Final(quantity=engine.AngularVelocity("ball")),
+    }
     result = simulate(scene(friction), time_step=TIME_STEP, duration=FLIGHT, observe=observe)
     return result.completed and abs(float(result["v"][0]) - RADIUS * float(result["w"][1])) < 1e-9 * ALONG
 
 
-def bounces(simulate: Simulate, count: int) -> bool:
+def bounces(simulate: case.Simulate, count: int) -> bool:
     """Whether a gripping ball is right after so many blows between floor and ceiling, all within one step."""
-    observe = {"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))}
+    observe = {
+        "v": engine.Final(quantity=engine.Velocity("ball")),
+        "w": engine.Final(quantity=engine.AngularVelocity("ball")),
+    }
     result = simulate(scene(CASES["gripping"][0]), time_step=count * FLIGHT, steps=1, observe=observe)
     along, side = ALONG * 5.0 / 7.0 * (3.0 / 7.0) ** (count - 1), 1.0 if count % 2 else -1.0
     off = (*(result["v"] - (along, 0.0, side * UP)), RADIUS * float(result["w"][1]) - side * along)
     return result.completed and max(map(abs, map(float, off))) < 1e-9 * UP
 
 
-def smoothest(simulate: Simulate) -> BreakPoint:
+def smoothest(simulate: case.Simulate) -> case.BreakPoint:
     """The smallest friction with which the first blow grips."""
     return break_point(functools.partial(grips, simulate), 1.0, 0.01, resolution=1e-3, walk=5)
 
 
-def most_blows(simulate: Simulate) -> BreakPoint:
+def most_blows(simulate: case.Simulate) -> case.BreakPoint:
     """The most blows in one step."""
     return break_count(functools.partial(bounces, simulate), COUNTS)
 
 
-def _draw(simulate: Simulate) -> Drawing:
+def _draw(simulate: case.Simulate) -> case.Drawing:
     curves = []
     for name, (friction, tangential) in CASES.items():
-        observe = {"v": Trace(quantity=Velocity("ball"))}
+        observe = {"v": engine.Trace(quantity=engine.Velocity("ball"))}
         result = simulate(
             scene(friction, tangential=tangential),
             time_step=TIME_STEP,
@@ -129,10 +134,10 @@ def _draw(simulate: Simulate) -> Drawing:
                 "reference",
             )
         )
-    return Drawing(curves=tuple(curves), x_label="time [s]", y_label="speed along the walls [m/s]")
+    return case.Drawing(curves=tuple(curves), x_label="time [s]", y_label="speed along the walls [m/s]")
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Ball between walls",
     question="Does a ball thrown between floor and ceiling lose the speed and take the spin that each blow gives it?",
     why="From the second blow on the ball comes with spin: a wrong lever or sign that one blow hides adds up.",
@@ -175,10 +180,10 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=scene(0.05), time_step=TIME_STEP, duration=1.5),
-    figures=(Figure(name="speed", title="Speed along the walls", draw=_draw),),
+    example=lambda: case.Example(scene=scene(0.05), time_step=TIME_STEP, duration=1.5),
+    figures=(case.Figure(name="speed", title="Speed along the walls", draw=_draw),),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="smoothest",
             title="Smallest friction with which the first blow grips",
             configuration="plain",
@@ -190,7 +195,7 @@ TEST = ScalarTest(
             expected_source="gripping takes v/3.5 of speed, friction can take µ (1 + e) u: µ = 3/28 at 3 m/s along and 4 m/s "
             "across; to the resolution of the search",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="most-blows",
             title="Most blows between floor and ceiling within one step",
             configuration="plain",

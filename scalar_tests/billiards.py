@@ -6,30 +6,10 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import (
-    AngularVelocity,
-    Final,
-    Method,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-    SimulationFailed,
-    Sphere,
-    Velocity,
-)
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import apart, line
@@ -47,30 +27,32 @@ HELD = 1e-6  # of the speed, the error of a shot that still counts as right
 SHOTS = {"follow": (1.0, 0.0), "stun": (0.0, 0.0), "draw": (-1.0, 0.0), "half_ball": (1.0, 0.5)}
 
 
-def table(roll: float, offset: float) -> Scene:
+def table(roll: float, offset: float) -> engine.Scene:
     """Cue ball touching a smooth object ball at SPEED along x, turning `roll` times as fast as it would roll; the
     line of centres is off by asin(offset)."""
     cloth = Material(friction=CLOTH)
     leather = Material(friction=CLOTH, restitution=RESTITUTION)
     along = math.sqrt(1.0 - offset**2)
-    bed = RigidBody(name="bed", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=cloth)
-    cue = RigidBody(
+    bed = engine.RigidBody(
+        name="bed", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=cloth
+    )
+    cue = engine.RigidBody(
         name="cue",
         mass=MASS,
-        shape=Sphere(RADIUS),
+        shape=engine.Sphere(RADIUS),
         position=(0.0, 0.0, RADIUS),
         velocity=(SPEED, 0.0, 0.0),
         angular_velocity=(0.0, roll * SPEED / RADIUS, 0.0),
         material=leather,
     )
-    other = RigidBody(
+    other = engine.RigidBody(
         name="object",
         mass=MASS,
-        shape=Sphere(RADIUS),
+        shape=engine.Sphere(RADIUS),
         position=(2.0 * RADIUS * along, 2.0 * RADIUS * offset, RADIUS),
         material=Material(restitution=RESTITUTION),
     )
-    return Scene(bodies=(bed, cue, other), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(bed, cue, other), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def expected_shot(roll: float, offset: float) -> tuple[np.ndarray, np.ndarray]:
@@ -86,10 +68,13 @@ def expected_shot(roll: float, offset: float) -> tuple[np.ndarray, np.ndarray]:
 
 
 def shot_errors(
-    simulate: Simulate, roll: float, offset: float, time_step: float = TIME_STEP
+    simulate: case.Simulate, roll: float, offset: float, time_step: float = TIME_STEP
 ) -> tuple[float, float, float]:
     """Errors of cue ball and object ball [m/s], and of the cue ball's spin times its radius [m/s]."""
-    observe = {"v": Final(quantity=Velocity()), "w": Final(quantity=AngularVelocity("cue"))}
+    observe = {
+        "v": engine.Final(quantity=engine.Velocity()),
+        "w": engine.Final(quantity=engine.AngularVelocity("cue")),
+    }
     result = simulate(table(roll, offset), time_step=time_step, duration=DURATION, observe=observe)
     cue, other = expected_shot(roll, offset)
     rolls = RADIUS * result["w"] - np.array((-cue[1], cue[0], 0.0))
@@ -100,9 +85,9 @@ def shot_errors(
     )
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """How far it is from where it should have come back to [m]: v0 t + a t²/2 while it slides, then v1 t."""
-    observe = {"x": Final(quantity=Position("cue"))}
+    observe = {"x": engine.Final(quantity=engine.Position("cue"))}
     result = simulate(
         table(-1.0, 0.0), time_step=time_step, duration=DURATION, method=method, observe=observe
     )
@@ -125,7 +110,7 @@ def catching_spin() -> float:
     return (3.5 * rolls - 2.5 * left) / RADIUS
 
 
-def _measure_shots(simulate: Simulate) -> dict[str, float]:
+def _measure_shots(simulate: case.Simulate) -> dict[str, float]:
     values: dict[str, float] = {}
     others, rolls = [], []
     for name, (roll, offset) in SHOTS.items():
@@ -140,7 +125,7 @@ RADII = (0.05, 0.08)  # m
 LINE = (math.sqrt(0.8), 0.4, 0.2)  # of centres at the hit
 
 
-def in_the_air(friction: float, heavier: float = 3.0, faster: float = 1.0) -> Scene:
+def in_the_air(friction: float, heavier: float = 3.0, faster: float = 1.0) -> engine.Scene:
     """Two unequal balls that turn, on their way to a hit off their centres, without gravity; the second is `heavier`
     than the first, which comes at `faster` times 3 m/s."""
     rough = Material(friction=friction, restitution=BALLS)
@@ -148,24 +133,24 @@ def in_the_air(friction: float, heavier: float = 3.0, faster: float = 1.0) -> Sc
     r1, r2 = RADII
     speed, w1, w2 = ARRIVING
     v = (faster * speed[0], 0.0, 0.0)
-    going = RigidBody(
+    going = engine.RigidBody(
         name="going",
         mass=m1,
-        shape=Sphere(r1),
+        shape=engine.Sphere(r1),
         position=(-0.1037 * v[0], 0.0, 0.0),
         velocity=v,
         angular_velocity=w1,
         material=rough,
     )
-    other = RigidBody(
+    other = engine.RigidBody(
         name="other",
         mass=m2,
-        shape=Sphere(r2),
+        shape=engine.Sphere(r2),
         position=tuple((r1 + r2) * n for n in LINE),  # type: ignore[arg-type]
         angular_velocity=w2,
         material=rough,
     )
-    return Scene(bodies=(going, other))
+    return engine.Scene(bodies=(going, other))
 
 
 def expected_hit(friction: float, heavier: float = 3.0, faster: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
@@ -189,7 +174,7 @@ def expected_hit(friction: float, heavier: float = 3.0, faster: float = 1.0) -> 
     )
 
 
-def _measure_hits(simulate: Simulate) -> dict[str, float]:
+def _measure_hits(simulate: case.Simulate) -> dict[str, float]:
     values = {}
     for name, friction in (("sliding", 0.1), ("gripping", 1.0)):
         values[f"{name}_hit_error"], values[f"{name}_spin_error"] = hit_errors(simulate, friction)
@@ -197,48 +182,51 @@ def _measure_hits(simulate: Simulate) -> dict[str, float]:
 
 
 def hit_errors(
-    simulate: Simulate, friction: float, heavier: float = 3.0, faster: float = 1.0
+    simulate: case.Simulate, friction: float, heavier: float = 3.0, faster: float = 1.0
 ) -> tuple[float, float]:
     """Largest errors of a velocity [m/s] and of a spin [rad/s] after the hit in the air."""
-    observe = {"v": Final(quantity=Velocity()), "w": Final(quantity=AngularVelocity())}
+    observe = {
+        "v": engine.Final(quantity=engine.Velocity()),
+        "w": engine.Final(quantity=engine.AngularVelocity()),
+    }
     built = in_the_air(friction, heavier, faster)
     result = simulate(built, time_step=TIME_STEP, duration=0.2, observe=observe)
     speeds, spins = expected_hit(friction, heavier, faster)
     return float(np.abs(result["v"] - speeds).max()), float(np.abs(result["w"] - spins).max())
 
 
-def _hits(simulate: Simulate, friction: float, heavier: float = 3.0, faster: float = 1.0) -> bool:
+def _hits(simulate: case.Simulate, friction: float, heavier: float = 3.0, faster: float = 1.0) -> bool:
     try:
         speed, spin = hit_errors(simulate, friction, heavier, faster)
-    except SimulationFailed:
+    except engine.SimulationFailed:
         return False
     return speed <= HELD * faster * ARRIVING[0][0] and spin * RADII[0] <= HELD * faster * ARRIVING[0][0]
 
 
-def heaviest_hit(simulate: Simulate) -> BreakPoint:
+def heaviest_hit(simulate: case.Simulate) -> case.BreakPoint:
     """Largest mass ratio of two balls that hit each other rightly."""
     return break_point(lambda ratio: _hits(simulate, 0.1, heavier=ratio), 1.0, 1e12, resolution=0.1, walk=13)
 
 
-def fastest_hit(simulate: Simulate) -> BreakPoint:
+def fastest_hit(simulate: case.Simulate) -> case.BreakPoint:
     """Highest speed [m/s] at which two smooth balls hit each other rightly; rough ones would be spun up too fast."""
     speed = ARRIVING[0][0]
     return break_point(lambda v: _hits(simulate, 0.0, faster=v / speed), 1.0, 1e6, resolution=0.1, walk=7)
 
 
-def fastest_spin(simulate: Simulate) -> BreakPoint:
+def fastest_spin(simulate: case.Simulate) -> case.BreakPoint:
     """Largest spin [rad/s] of a cue ball that follows rightly."""
 
     def holds(spin: float) -> bool:
         try:
             return max(shot_errors(simulate, spin * RADIUS / SPEED, 0.0)) <= HELD * SPEED
-        except SimulationFailed:
+        except engine.SimulationFailed:
             return False
 
     return break_point(holds, 1.0, 1e4, resolution=0.01, walk=9)
 
 
-def _draw(simulate: Simulate) -> Drawing:
+def _draw(simulate: case.Simulate) -> case.Drawing:
     rolls = tuple(0.25 * k for k in range(-6, 7))
     after = tuple(
         float(
@@ -246,12 +234,12 @@ def _draw(simulate: Simulate) -> Drawing:
                 table(roll, 0.0),
                 time_step=TIME_STEP,
                 duration=DURATION,
-                observe={"v": Final(quantity=Velocity("cue"))},
+                observe={"v": engine.Final(quantity=engine.Velocity("cue"))},
             )["v"][0]
         )
         for roll in rolls
     )
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("cue ball, rolling again", rolls, after, "points"),
             line(
@@ -267,7 +255,7 @@ def _draw(simulate: Simulate) -> Drawing:
     )
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Billiards",
     question="Do billiard balls leave a hit, and roll on after it, as impulse and friction say?",
     why="Follow and draw live on spin that a hit must leave alone and friction must turn into speed; an engine that "
@@ -340,10 +328,10 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=table(1.0, 0.5), time_step=TIME_STEP, duration=2.0),
-    figures=(Figure(name="follow-and-draw", title="Speed after a full hit against spin", draw=_draw),),
+    example=lambda: case.Example(scene=table(1.0, 0.5), time_step=TIME_STEP, duration=2.0),
+    figures=(case.Figure(name="follow-and-draw", title="Speed after a full hit against spin", draw=_draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="draw",
             description="place of a cue ball with back spin 1.5 s after a full hit, against the closed form",
             unit="m",
@@ -355,7 +343,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="heaviest-hit",
             title="Largest mass ratio of two balls that hit each other",
             configuration="plain",
@@ -365,7 +353,7 @@ TEST = ScalarTest(
             expected=(1e12, 1e12),
             expected_source="one impulse, one row: rounding does not grow with the ratio; the search ends at 1e12",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="fastest-hit",
             title="Fastest smooth ball that hits another at h = 1/60 s",
             configuration="plain",
@@ -375,7 +363,7 @@ TEST = ScalarTest(
             expected=(1e6, 1e6),
             expected_source="the time of the hit decides, whatever the way in a step; the search ends at 1e6 m/s",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="fastest-spin",
             title="Fastest spin of a ball that follows at h = 1/60 s",
             configuration="plain",

@@ -7,32 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from spook_tracker.engine import (
-    AngularVelocity,
-    Box,
-    Final,
-    Plane,
-    RigidBody,
-    Scene,
-    Shape,
-    Sphere,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Curve,
-    Drawing,
-    Example,
-    Figure,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.sweep import line
 
 TIME_STEP = 1.0 / 60.0  # s
@@ -47,19 +25,21 @@ SMALL = 0.05  # m, radius of balls that pass or meet
 SEAM_SPEED = 5.0  # m/s
 
 
-def thrown(friction: float) -> Scene:
+def thrown(friction: float) -> engine.Scene:
     """A ball without spin on its way to a rough floor, without gravity."""
     rough = Material(friction=friction, restitution=RESTITUTION)
-    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
-    ball = RigidBody(
+    floor = engine.RigidBody(
+        name="floor", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=rough
+    )
+    ball = engine.RigidBody(
         name="ball",
         mass=MASS,
-        shape=Sphere(RADIUS),
+        shape=engine.Sphere(RADIUS),
         position=(0.0, 0.0, RADIUS + 0.05),
         velocity=(SLIDE, 0.0, -FALL),
         material=rough,
     )
-    return Scene(bodies=(floor, ball))
+    return engine.Scene(bodies=(floor, ball))
 
 
 def expected_slide(friction: float) -> float:
@@ -68,10 +48,13 @@ def expected_slide(friction: float) -> float:
 
 
 def bounce_errors(
-    simulate: Simulate, friction: float, time_step: float = TIME_STEP
+    simulate: case.Simulate, friction: float, time_step: float = TIME_STEP
 ) -> tuple[float, float, float]:
     """Errors of the speed along the floor and of the rebound [m/s], and of the spin [rad/s]."""
-    observe = {"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))}
+    observe = {
+        "v": engine.Final(quantity=engine.Velocity("ball")),
+        "w": engine.Final(quantity=engine.AngularVelocity("ball")),
+    }
     result = simulate(thrown(friction), time_step=time_step, duration=0.1, observe=observe)
     along = expected_slide(friction)
     return (
@@ -81,7 +64,7 @@ def bounce_errors(
     )
 
 
-def _measure_bounces(simulate: Simulate) -> dict[str, float]:
+def _measure_bounces(simulate: case.Simulate) -> dict[str, float]:
     values: dict[str, float] = {}
     for name, friction in (("sliding", 0.2), ("gripping", 5.0)):
         along, rebound, spin = bounce_errors(simulate, friction)
@@ -89,69 +72,75 @@ def _measure_bounces(simulate: Simulate) -> dict[str, float]:
     return values
 
 
-def balls(offset: float, speed: float, material: Material) -> Scene:
+def balls(offset: float, speed: float, material: Material) -> engine.Scene:
     """Two balls on their way past each other, or to a hit off the centre."""
-    going = RigidBody(
+    going = engine.RigidBody(
         name="going",
         mass=MASS,
-        shape=Sphere(SMALL),
+        shape=engine.Sphere(SMALL),
         position=(-0.5, 0.0, 0.0),
         velocity=(PASSING, 0.0, 0.0),
         material=material,
     )
-    other = RigidBody(
+    other = engine.RigidBody(
         name="other",
         mass=MASS,
-        shape=Sphere(SMALL),
+        shape=engine.Sphere(SMALL),
         position=(0.5, 0.0, offset),
         velocity=(-speed, 0.0, 0.0),
         material=material,
     )
-    return Scene(bodies=(going, other))
+    return engine.Scene(bodies=(going, other))
 
 
-def _measure_near_miss(simulate: Simulate) -> dict[str, float]:
+def _measure_near_miss(simulate: case.Simulate) -> dict[str, float]:
     scene = balls(2.0 * SMALL + GAP, PASSING, Material(restitution=0.5))
-    result = simulate(scene, time_step=TIME_STEP, duration=0.5, observe={"v": Final(quantity=Velocity())})
+    result = simulate(
+        scene, time_step=TIME_STEP, duration=0.5, observe={"v": engine.Final(quantity=engine.Velocity())}
+    )
     before = np.array(((PASSING, 0.0, 0.0), (-PASSING, 0.0, 0.0)))
     return {"miss_change": float(np.abs(result["v"] - before).max())}
 
 
-def _measure_hit(simulate: Simulate) -> dict[str, float]:
+def _measure_hit(simulate: case.Simulate) -> dict[str, float]:
     """Elastic and smooth, half a radius off the centre: the second ball leaves along the line of centres."""
     scene = balls(SMALL, 0.0, Material(restitution=1.0))
-    result = simulate(scene, time_step=TIME_STEP, duration=0.6, observe={"v": Final(quantity=Velocity())})
+    result = simulate(
+        scene, time_step=TIME_STEP, duration=0.6, observe={"v": engine.Final(quantity=engine.Velocity())}
+    )
     normal = np.array((math.sqrt(0.75), 0.0, 0.5))
     given = PASSING * normal[0] * normal
     return {"hit_error": float(np.linalg.norm(result["v"][1] - given))}
 
 
-def seam(shape: Shape, height: float) -> Scene:
+def seam(shape: engine.Shape, height: float) -> engine.Scene:
     """A body sliding on two boxes whose tops lie in one plane."""
     tiles = [
-        RigidBody(name=f"tile{k}", motion="static", shape=Box((2.0, 2.0, 1.0)), position=(2.0 * k, 0.0, -0.5))
+        engine.RigidBody(
+            name=f"tile{k}", motion="static", shape=engine.Box((2.0, 2.0, 1.0)), position=(2.0 * k, 0.0, -0.5)
+        )
         for k in range(2)
     ]
-    slider = RigidBody(
+    slider = engine.RigidBody(
         name="slider", mass=MASS, shape=shape, position=(0.013, 0.0, height), velocity=(SEAM_SPEED, 0.0, 0.0)
     )
-    return Scene(bodies=(*tiles, slider), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(*tiles, slider), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def _measure_seam(simulate: Simulate) -> dict[str, float]:
+def _measure_seam(simulate: case.Simulate) -> dict[str, float]:
     values = {}
-    for name, shape in (("ball", Sphere(SMALL)), ("box", Box((2 * SMALL,) * 3))):
+    for name, shape in (("ball", engine.Sphere(SMALL)), ("box", engine.Box((2 * SMALL,) * 3))):
         result = simulate(
             seam(shape, SMALL),
             time_step=TIME_STEP,
             duration=0.4,
-            observe={"v": Trace(quantity=Velocity("slider"))},
+            observe={"v": engine.Trace(quantity=engine.Velocity("slider"))},
         )
         values[f"seam_{name}_change"] = float(np.abs(result["v"] - (SEAM_SPEED, 0.0, 0.0)).max())
     return values
 
 
-def fastest(simulate: Simulate) -> BreakPoint:
+def fastest(simulate: case.Simulate) -> case.BreakPoint:
     """How many times as fast the ball may be thrown at the floor."""
 
     def bounces(times: float) -> bool:
@@ -159,7 +148,10 @@ def fastest(simulate: Simulate) -> BreakPoint:
         velocity = (times * SLIDE, 0.0, -times * FALL)
         built = replace(thrown(0.2), bodies=(floor, replace(ball, velocity=velocity)))
         result = simulate(
-            built, time_step=TIME_STEP, duration=0.1, observe={"v": Final(quantity=Velocity("ball"))}
+            built,
+            time_step=TIME_STEP,
+            duration=0.1,
+            observe={"v": engine.Final(quantity=engine.Velocity("ball"))},
         )
         right = np.array((expected_slide(0.2), 0.0, RESTITUTION * FALL))
         return float(np.abs(result["v"] / times - right).max()) < 1e-9
@@ -170,7 +162,7 @@ def fastest(simulate: Simulate) -> BreakPoint:
 GRIP = SLIDE / (3.5 * (1.0 + RESTITUTION) * FALL)  # .238: friction that takes 2/7 of the slide
 
 
-def smoothest(simulate: Simulate) -> BreakPoint:
+def smoothest(simulate: case.Simulate) -> case.BreakPoint:
     """The least friction with which the ball leaves the floor rolling."""
 
     def rolls(friction: float) -> bool:
@@ -182,13 +174,13 @@ def smoothest(simulate: Simulate) -> BreakPoint:
     return break_point(rolls, 2.0, 0.02, resolution=1e-3, walk=6)
 
 
-def _draw_friction(simulate: Simulate) -> Drawing:
+def _draw_friction(simulate: case.Simulate) -> case.Drawing:
     coefficients = tuple(0.05 * k for k in range(1, 13))
     after = tuple(bounce_errors(simulate, mu)[0] + expected_slide(mu) for mu in coefficients)
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("speed along the floor after the blow", coefficients, after, "both"),
-            Curve(
+            case.Curve(
                 name="v − μ (1 + e) u, or 5/7 v",
                 x=coefficients,
                 y=tuple(map(expected_slide, coefficients)),
@@ -200,8 +192,10 @@ def _draw_friction(simulate: Simulate) -> Drawing:
     )
 
 
-def _exact(name: str, description: str, unit: str, limit: float, source: str, role: str = "gate") -> Metric:
-    return Metric(
+def _exact(
+    name: str, description: str, unit: str, limit: float, source: str, role: str = "gate"
+) -> case.Metric:
+    return case.Metric(
         name=name,
         description=description,
         unit=unit,
@@ -213,8 +207,8 @@ def _exact(name: str, description: str, unit: str, limit: float, source: str, ro
     )
 
 
-def _ask(measure: object, metrics: tuple[Metric, ...], note: str) -> Measurement:
-    return Measurement(
+def _ask(measure: object, metrics: tuple[case.Metric, ...], note: str) -> case.Measurement:
+    return case.Measurement(
         configuration="plain",
         time_step=TIME_STEP,
         metrics=metrics,
@@ -225,7 +219,7 @@ def _ask(measure: object, metrics: tuple[Metric, ...], note: str) -> Measurement
 
 LAW = "closed form of one impulse; rounding and the solver's tolerance remain"
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Blows",
     question="Does a blow change what it touches by Coulomb's and Newton's laws, and nothing else?",
     why="Engines drop the friction of a rebound, and let bodies collide that only pass each other.",
@@ -270,7 +264,7 @@ TEST = ScalarTest(
         _ask(
             _measure_near_miss,
             (
-                Metric(
+                case.Metric(
                     name="miss_change",
                     description="largest change of a velocity of two balls that pass without touching",
                     unit="m/s",
@@ -306,10 +300,12 @@ TEST = ScalarTest(
             "Edges inside a plane are no obstacles.",
         ),
     ),
-    example=lambda: Example(scene=thrown(0.2), time_step=TIME_STEP),
-    figures=(Figure(name="friction", title="Speed after the blow against friction", draw=_draw_friction),),
+    example=lambda: case.Example(scene=thrown(0.2), time_step=TIME_STEP),
+    figures=(
+        case.Figure(name="friction", title="Speed after the blow against friction", draw=_draw_friction),
+    ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="fastest",
             title="How many times as fast a ball may be thrown at h = 1/60 s",
             configuration="plain",
@@ -319,7 +315,7 @@ TEST = ScalarTest(
             expected=(1e6, 1e6),
             expected_source="the time of the blow decides, whatever the way in a step; the search ends at 1e6",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="smoothest",
             title="Least friction with which a ball leaves the floor rolling",
             configuration="plain",

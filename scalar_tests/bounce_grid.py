@@ -7,28 +7,10 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    Method,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-    Sphere,
-    Trace,
-)
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Example,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.configurations import configured
 
 RADIUS = 0.1  # m
@@ -42,16 +24,20 @@ HIGHEST = 1e4  # m, where the search for the highest drop ends
 MIDDLE, TIME_STEP = 0.5, 1.0 / 240.0  # restitution and step [s] of the ladder and of the search
 
 
-def scene(restitution: float, height: float = HEIGHT) -> Scene:
+def scene(restitution: float, height: float = HEIGHT) -> engine.Scene:
     """A ball so high [m] above a plane."""
     springy = Material(restitution=restitution)
-    floor = RigidBody(
-        name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=springy
+    floor = engine.RigidBody(
+        name="floor", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=springy
     )
-    ball = RigidBody(
-        name="ball", mass=1.0, shape=Sphere(RADIUS), position=(0.0, 0.0, RADIUS + height), material=springy
+    ball = engine.RigidBody(
+        name="ball",
+        mass=1.0,
+        shape=engine.Sphere(RADIUS),
+        position=(0.0, 0.0, RADIUS + height),
+        material=springy,
     )
-    return Scene(bodies=(floor, ball), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(floor, ball), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def flight(restitution: float, height: float = HEIGHT) -> tuple[float, float]:
@@ -63,48 +49,48 @@ def flight(restitution: float, height: float = HEIGHT) -> tuple[float, float]:
 
 
 def height_error(
-    simulate: Simulate,
+    simulate: case.Simulate,
     restitution: float,
     time_step: float,
-    method: Method = PLAIN,
+    method: engine.Method = engine.PLAIN,
     height: float = HEIGHT,
 ) -> float:
     """How far the height after the second bounce is from e⁴ h, over that."""
     first, last = (round(when / time_step) for when in flight(restitution, height))
     lasts = last * time_step
-    observe = {"place": Trace(quantity=Position("ball"), first=first)}
+    observe = {"place": engine.Trace(quantity=engine.Position("ball"), first=first)}
     built = scene(restitution, height)
     place = simulate(built, time_step=time_step, duration=lasts, method=method, observe=observe)["place"]
     return float(np.max(place[:, 2]) - RADIUS) / (height * restitution ** (2 * BOUNCES)) - 1.0
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     return abs(height_error(simulate, MIDDLE, time_step, method))
 
 
-def comes_back(simulate: Simulate, height: float) -> bool:
+def comes_back(simulate: case.Simulate, height: float) -> bool:
     """Whether the second bounce of a drop from so high [m] is right."""
     return abs(height_error(simulate, MIDDLE, TIME_STEP, height=height)) <= RIGHT
 
 
-def lowest(simulate: Simulate) -> BreakPoint:
+def lowest(simulate: case.Simulate) -> case.BreakPoint:
     """The lowest drop [m] whose second bounce is right."""
     return break_point(functools.partial(comes_back, simulate), HEIGHT, 1e-6, resolution=0.05, walk=12)
 
 
-def highest(simulate: Simulate) -> BreakPoint:
+def highest(simulate: case.Simulate) -> case.BreakPoint:
     """The highest one [m]."""
     return break_point(functools.partial(comes_back, simulate), HEIGHT, HIGHEST, resolution=0.05, walk=4)
 
 
-def _at(restitution: float, per_second: int) -> Measurement:
+def _at(restitution: float, per_second: int) -> case.Measurement:
     time_step = 1.0 / per_second
-    return Measurement(
+    return case.Measurement(
         configuration="plain",
         time_step=time_step,
         parameters={"e": restitution},
         metrics=(
-            Metric(
+            case.Metric(
                 name="height_error",
                 description="height after the second bounce against e⁴ h, over that",
                 unit="1",
@@ -121,7 +107,7 @@ def _at(restitution: float, per_second: int) -> Measurement:
     )
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Grid of bounces",
     question="Does a ball come back as high as its restitution says, whatever that is and whatever the step?",
     why="A restitution that is a spring's damping, or is lost where a step ends beside the impact, is right at one step only.",
@@ -137,9 +123,9 @@ TEST = ScalarTest(
     conclusion="Green: a ball bounces by its restitution. Red: by its step, or not at all.",
     source="ours; asked for by users of several engines (newton-physics/newton#2549)",
     measurements=tuple(_at(e, n) for e in RESTITUTIONS for n in STEPS_A_SECOND),
-    example=lambda: Example(scene=scene(MIDDLE), time_step=TIME_STEP, duration=3.0),
+    example=lambda: case.Example(scene=scene(MIDDLE), time_step=TIME_STEP, duration=3.0),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="second",
             description="height after the second bounce against e⁴ h, over that, e = 0.5",
             unit="1",
@@ -151,7 +137,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="lowest",
             title="Lowest drop that comes back to its height",
             configuration="plain",
@@ -161,7 +147,7 @@ TEST = ScalarTest(
             better="smaller",
             expected_source="none: how much of a flight of a few steps is seen hangs on where in a step it begins",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="highest",
             title="Highest drop that comes back to its height",
             configuration="plain",

@@ -7,36 +7,10 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    Box,
-    Energy,
-    Final,
-    Maximum,
-    Method,
-    Minimum,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-    Sphere,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line
 
@@ -57,32 +31,41 @@ TAIL = math.sqrt(8.0 * RESTING_GAP / GRAVITY) / (1.0 - RESTITUTION)
 SAG = GRAVITY * TIME_STEP**2 / 8.0  # m, of the path under its chord in a step
 
 
-def scene(gap: float = HEIGHT, speed: float = 0.0) -> Scene:
+def scene(gap: float = HEIGHT, speed: float = 0.0) -> engine.Scene:
     """A ball `gap` [m] above a plane, falling at `speed` [m/s]."""
     rubber = Material(restitution=RESTITUTION)
-    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rubber)
-    ball = RigidBody(
+    floor = engine.RigidBody(
+        name="floor", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=rubber
+    )
+    ball = engine.RigidBody(
         name="ball",
         mass=MASS,
-        shape=Sphere(RADIUS),
+        shape=engine.Sphere(RADIUS),
         position=(0.0, 0.0, RADIUS + gap),
         velocity=(0.0, 0.0, -speed),
         material=rubber,
     )
-    return Scene(bodies=(floor, ball), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(floor, ball), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def gaps(
-    simulate: Simulate, time_step: float, duration: float, method: Method = PLAIN, height: float = HEIGHT
+    simulate: case.Simulate,
+    time_step: float,
+    duration: float,
+    method: engine.Method = engine.PLAIN,
+    height: float = HEIGHT,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and gap [m] between a ball dropped from `height` [m] and the floor."""
-    observe = {"place": Trace(quantity=Position("ball"))}
+    observe = {"place": engine.Trace(quantity=engine.Position("ball"))}
     result = simulate(scene(height), time_step=time_step, duration=duration, method=method, observe=observe)
     return result.sample_times["place"], result["place"][:, 2] - RADIUS
 
 
 def bounce_heights(
-    simulate: Simulate, time_step: float = TIME_STEP, method: Method = PLAIN, height: float = HEIGHT
+    simulate: case.Simulate,
+    time_step: float = TIME_STEP,
+    method: engine.Method = engine.PLAIN,
+    height: float = HEIGHT,
 ) -> np.ndarray:
     """(BOUNCES,) peak gap [m] after each bounce."""
     _, gap = gaps(simulate, time_step, 0.95 * STOP, method, height)
@@ -99,40 +82,43 @@ def expected_heights() -> np.ndarray:
     return np.asarray(HEIGHT * RESTITUTION ** (2.0 * np.arange(1, BOUNCES + 1)))
 
 
-def _measure_heights(simulate: Simulate) -> dict[str, float]:
+def _measure_heights(simulate: case.Simulate) -> dict[str, float]:
     return {"height_error": float(np.abs(bounce_heights(simulate) / expected_heights() - 1.0).max())}
 
 
-def _measure_stop(simulate: Simulate) -> dict[str, float]:
+def _measure_stop(simulate: case.Simulate) -> dict[str, float]:
     times, gap = gaps(simulate, TIME_STEP, 2.0 * STOP)
     moving = np.nonzero(gap > RESTING_GAP)[0]
     stop = times[moving[-1] + 1] if moving[-1] + 1 < len(times) else math.inf
     return {"stop_time_error": float(stop) / STOP - 1.0, "rest_gap": float(gap[-1])}
 
 
-def _measure_energy(simulate: Simulate) -> dict[str, float]:
+def _measure_energy(simulate: case.Simulate) -> dict[str, float]:
     result = simulate(
         scene(),
         time_step=TIME_STEP,
         duration=2.0 * STOP,
-        observe={"energy": Maximum(quantity=Energy(), from_start=True)},
+        observe={"energy": engine.Maximum(quantity=engine.Energy(), from_start=True)},
     )
     return {"energy_gain": float(result["energy"]) / (MASS * GRAVITY * HEIGHT)}
 
 
-def _measure_rebound(simulate: Simulate) -> dict[str, float]:
+def _measure_rebound(simulate: case.Simulate) -> dict[str, float]:
     touching = scene(gap=0.0, speed=IMPACT_SPEED)
     result = simulate(
-        touching, time_step=TIME_STEP, steps=1, observe={"speed": Final(quantity=Velocity("ball"))}
+        touching,
+        time_step=TIME_STEP,
+        steps=1,
+        observe={"speed": engine.Final(quantity=engine.Velocity("ball"))},
     )
     rebound = float(result["speed"][2]) + GRAVITY * TIME_STEP  # the step that bounces also falls for one step
     return {"rebound_error": rebound / (RESTITUTION * IMPACT_SPEED) - 1.0}
 
 
-def _draw_heights(simulate: Simulate) -> Drawing:
+def _draw_heights(simulate: case.Simulate) -> case.Drawing:
     times, gap = gaps(simulate, TIME_STEP, 1.2 * STOP)
     every = slice(None, None, 5)
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("gap", times[every], gap[every]),
             line("stop time t₀(1+e)/(1−e)", (STOP, STOP), (0.0, HEIGHT), "reference"),
@@ -142,10 +128,10 @@ def _draw_heights(simulate: Simulate) -> Drawing:
     )
 
 
-def _draw_order(simulate: Simulate) -> Drawing:
+def _draw_order(simulate: case.Simulate) -> case.Drawing:
     steps = (4e-3, 2e-3, 1e-3, 5e-4)
-    errors = tuple(ladder_error(simulate, h, PLAIN) for h in steps)
-    return Drawing(
+    errors = tuple(ladder_error(simulate, h, engine.PLAIN) for h in steps)
+    return case.Drawing(
         curves=(
             line("largest error of five heights", steps, errors, "both"),
             line("second order", steps, (errors[0] * (h / steps[0]) ** 2 for h in steps), "reference"),
@@ -158,7 +144,7 @@ def _draw_order(simulate: Simulate) -> Drawing:
     )
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest relative error of the first five heights, root mean square of DROPS that meet the floor anywhere in a step."""
     heights = HEIGHT * (1.0 + 0.01 * np.arange(DROPS))
     worst = [
@@ -170,42 +156,45 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(np.sqrt(np.mean(np.square(worst))))
 
 
-def fastest_impact(simulate: Simulate) -> BreakPoint:
+def fastest_impact(simulate: case.Simulate) -> case.BreakPoint:
     """Highest speed [m/s] at which the ball does not pass a plate of PLATE [m], at h = 1/60 s."""
 
     def holds(speed: float) -> bool:
-        plate = RigidBody(
-            name="plate", motion="static", shape=Box((10.0, 10.0, PLATE)), position=(0.0, 0.0, -0.5 * PLATE)
+        plate = engine.RigidBody(
+            name="plate",
+            motion="static",
+            shape=engine.Box((10.0, 10.0, PLATE)),
+            position=(0.0, 0.0, -0.5 * PLATE),
         )
-        ball = RigidBody(
+        ball = engine.RigidBody(
             name="ball",
             mass=MASS,
-            shape=Sphere(RADIUS),
+            shape=engine.Sphere(RADIUS),
             position=(0.0, 0.0, RADIUS + HEIGHT),
             velocity=(0.0, 0.0, -speed),
         )
-        shot = Scene(bodies=(plate, ball), gravity=(0.0, 0.0, -GRAVITY))
-        observe = {"place": Minimum(quantity=Position("ball"))}
+        shot = engine.Scene(bodies=(plate, ball), gravity=(0.0, 0.0, -GRAVITY))
+        observe = {"place": engine.Minimum(quantity=engine.Position("ball"))}
         result = simulate(shot, time_step=1.0 / 60.0, steps=120, observe=observe)
         return result.completed and float(result["place"][2]) > 0.0
 
     return break_point(holds, 0.1, 1e6, resolution=0.05, walk=15)
 
 
-def leaves(simulate: Simulate, speed: float) -> bool:
+def leaves(simulate: case.Simulate, speed: float) -> bool:
     """Whether a ball that touches the floor at `speed` [m/s] is on its way up after a step."""
-    observe = {"speed": Final(quantity=Velocity("ball"))}
+    observe = {"speed": engine.Final(quantity=engine.Velocity("ball"))}
     result = simulate(scene(gap=0.0, speed=speed), time_step=TIME_STEP, steps=1, observe=observe)
     return result.completed and float(result["speed"][2]) > 0.0
 
 
-def gentlest_impact(simulate: Simulate) -> BreakPoint:
+def gentlest_impact(simulate: case.Simulate) -> case.BreakPoint:
     """Lowest speed [m/s] from which a ball rebounds."""
     return break_point(functools.partial(leaves, simulate), 1.0, 1e-6, resolution=1e-3, walk=7)
 
 
 GENTLEST = GRAVITY * TIME_STEP / RESTITUTION  # m/s: what is left of it, gravity takes in the same step
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Bouncing ball",
     question="Does a ball bounce as high as its restitution allows, and come to rest in time?",
     why="Impacts are where engines gain or lose energy by accident, and where a ball may jitter for ever.",
@@ -226,11 +215,11 @@ TEST = ScalarTest(
     conclusion="Green: impacts neither gain nor lose. Red: penetration turns into speed, or restitution depends on phase.",
     source="thesis, section 5.4 (asked for)",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="height_error",
                     description="largest relative error of the first five heights",
                     unit="1",
@@ -245,11 +234,11 @@ TEST = ScalarTest(
             measure=_measure_heights,
             note="Impact stage with restitution, resting stage after it.",
         ),
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="rebound_error",
                     description="relative error of the speed after an impact of a ball that just touches",
                     unit="1",
@@ -263,11 +252,11 @@ TEST = ScalarTest(
             measure=_measure_rebound,
             note="Impact stage alone.",
         ),
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="stop_time_error",
                     description="relative error of the time at which the gap stays under 1e-4 m",
                     unit="1",
@@ -277,7 +266,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-9,
                 ),
-                Metric(
+                case.Metric(
                     name="rest_gap",
                     description="gap at the end: the ball rests on the floor",
                     unit="m",
@@ -291,11 +280,11 @@ TEST = ScalarTest(
             measure=_measure_stop,
             note="Twice the time the bounces should take.",
         ),
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="energy_gain",
                     description="largest energy above the start, over m g h₀",
                     unit="1",
@@ -311,13 +300,13 @@ TEST = ScalarTest(
             note="Twice the time the bounces should take.",
         ),
     ),
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP),
     figures=(
-        Figure(name="heights", title="Bounces", draw=_draw_heights),
-        Figure(name="order", title="Error of the heights against the time step", draw=_draw_order),
+        case.Figure(name="heights", title="Bounces", draw=_draw_heights),
+        case.Figure(name="order", title="Error of the heights against the time step", draw=_draw_order),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="heights",
             description="largest relative error of the first five heights, of 16 drops",
             unit="1",
@@ -329,7 +318,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="fastest-impact",
             title="Fastest ball that does not pass a plate of 2 cm at h = 1/60 s",
             configuration="plain",
@@ -339,7 +328,7 @@ TEST = ScalarTest(
             expected=(1e6, 1e6),
             expected_source="contacts are looked for as far away as a body gets in one step, so no speed passes; the search ends at 1e6 m/s",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="gentlest-impact",
             title="Slowest ball that rebounds at h = 1e-3 s",
             configuration="plain",

@@ -7,32 +7,10 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import (
-    AngularVelocity,
-    Final,
-    Material,
-    Maximum,
-    Method,
-    Position,
-    RigidBody,
-    Scene,
-    Sphere,
-    Trace,
-    TriangleMesh,
-    Velocity,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
@@ -55,7 +33,7 @@ def facet(count: int) -> tuple[float, float]:
 
 
 @functools.cache
-def scene(count: int = FACETS, friction: float = FRICTION, push: float = 0.0) -> Scene:
+def scene(count: int = FACETS, friction: float = FRICTION, push: float = 0.0) -> engine.Scene:
     """A trough whose cross-section is an arc of chords, and a ball on one of them, at rest or rolling up it by `push` [m/s]."""
     width, angle = facet(count)
     arc = [
@@ -67,25 +45,25 @@ def scene(count: int = FACETS, friction: float = FRICTION, push: float = 0.0) ->
     faces = tuple(
         face for k in range(count) for face in ((k, k + 1, back + k + 1), (k, back + k + 1, back + k))
     )
-    rough = Material(friction=friction)
+    rough = engine.Material(friction=friction)
     path = BOWL * math.cos(0.5 * width) - BALL  # m, from the bowl's axis to the way of the ball's centre
-    bowl = RigidBody(
+    bowl = engine.RigidBody(
         name="bowl",
         motion="static",
-        shape=TriangleMesh(corners, faces),
+        shape=engine.TriangleMesh(corners, faces),
         position=(0.0, 0.0, 0.0),
         material=rough,
     )
-    ball = RigidBody(
+    ball = engine.RigidBody(
         name="ball",
         mass=MASS,
-        shape=Sphere(BALL),
+        shape=engine.Sphere(BALL),
         position=(path * math.sin(angle), 0.0, BOWL - path * math.cos(angle)),
         velocity=(push * math.cos(angle), 0.0, push * math.sin(angle)),
         angular_velocity=(0.0, push / BALL, 0.0),
         material=rough,
     )
-    return Scene(bodies=(bowl, ball), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(bowl, ball), gravity=(0.0, 0.0, -GRAVITY))
 
 
 LEAST = (
@@ -93,11 +71,11 @@ LEAST = (
 )  # µ of the first facet: 2/7 of the slope's pull spin the ball up
 
 
-def rolls(simulate: Simulate, friction: float) -> bool:
+def rolls(simulate: case.Simulate, friction: float) -> bool:
     """Whether the ball rolls down half of its first facet without slip."""
     observe: dict[str, Observable] = {
-        "v": Final(quantity=Velocity("ball")),
-        "w": Final(quantity=AngularVelocity("ball")),
+        "v": engine.Final(quantity=engine.Velocity("ball")),
+        "w": engine.Final(quantity=engine.AngularVelocity("ball")),
     }
     result = simulate(scene(friction=friction), time_step=TIME_STEP, steps=100, observe=observe)
     if not result.completed:
@@ -106,7 +84,7 @@ def rolls(simulate: Simulate, friction: float) -> bool:
     return bool(abs(float(slip)) < 1e-6)
 
 
-def slippery(simulate: Simulate) -> BreakPoint:
+def slippery(simulate: case.Simulate) -> case.BreakPoint:
     """The least friction on which the ball rolls."""
     return break_point(functools.partial(rolls, simulate), 4.0 * LEAST, 0.3 * LEAST, resolution=1e-3)
 
@@ -128,13 +106,13 @@ PUSH, PUSH_STEP = hardest_push(), 1.0 / 480.0  # m/s, s
 CORNERED = FALL * (REACH - START) * PUSH_STEP  # m/s
 
 
-def hardest(simulate: Simulate) -> BreakPoint:
+def hardest(simulate: case.Simulate) -> case.BreakPoint:
     """The hardest push that leaves the ball in the bowl."""
     width, _ = facet(FACETS)
     rim = BOWL * math.sin(REACH) - BALL * math.sin(REACH - 0.5 * width)
 
     def stays(push: float) -> bool:
-        observe = {"x": Maximum(quantity=Position("ball"))}
+        observe = {"x": engine.Maximum(quantity=engine.Position("ball"))}
         result = simulate(scene(push=push), time_step=PUSH_STEP, duration=0.4, observe=observe)
         return result.completed and float(result["x"][0]) < rim
 
@@ -192,12 +170,12 @@ def half_period(times: np.ndarray, x: np.ndarray) -> float:
     return float(second - first)
 
 
-def measure(simulate: Simulate) -> dict[str, float]:
+def measure(simulate: case.Simulate) -> dict[str, float]:
     """A swing to the other side and back."""
     observe: dict[str, Observable] = {
-        "x": Trace(quantity=Position("ball")),
-        "v": Trace(quantity=Velocity("ball")),
-        "w": Trace(quantity=AngularVelocity("ball")),
+        "x": engine.Trace(quantity=engine.Position("ball")),
+        "v": engine.Trace(quantity=engine.Velocity("ball")),
+        "w": engine.Trace(quantity=engine.AngularVelocity("ball")),
     }
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=observe)
     times, x = result.sample_times["x"], result["x"][:, 0]
@@ -212,18 +190,18 @@ def measure(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest distance [m] to where it should be in two seconds."""
-    observe = {"x": Trace(quantity=Position("ball"))}
+    observe = {"x": engine.Trace(quantity=engine.Position("ball"))}
     result = simulate(scene(), time_step=time_step, duration=DURATION, method=method, observe=observe)
     return float(np.abs(result["x"][:, 0] - rolled(result.sample_times["x"])).max())
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Place of the ball, over five and over thirty-one facets."""
     curves, lasts = [], []
     for count in (5, FACETS):
-        observe = {"x": Trace(quantity=Position("ball"), every=32)}
+        observe = {"x": engine.Trace(quantity=engine.Position("ball"), every=32)}
         result = simulate(scene(count), time_step=TIME_STEP, duration=2.0 * DURATION, observe=observe)
         times = result.sample_times["x"]
         curves.append(line(f"{count} facets", times, 1000.0 * result["x"][:, 0], "points"))
@@ -236,7 +214,7 @@ def draw(simulate: Simulate) -> Drawing:
                 "reference",
             )
         )
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="time [s]",
         y_label="place [mm]",
@@ -253,7 +231,7 @@ PLACE = (
 ) / START
 CORNERS = "a corner that is met a step early or late leaves 5/7 g Δ h of speed, Δ its angle; the bound has all of them on one side"
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Ball in a bowl",
     question="Does a ball in a bowl roll back and forth with the period of mechanics?",
     why="Rolling in a hollow joins contact, friction and inertia, and the hollow is a mesh: at each of its inner edges the "
@@ -310,10 +288,10 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP, duration=4.0),
-    figures=(Figure(name="swing", title="A ball in a bowl", draw=draw),),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP, duration=4.0),
+    figures=(case.Figure(name="swing", title="A ball in a bowl", draw=draw),),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="least-friction",
             title="Least friction on which the ball rolls down its first facet",
             configuration="plain",
@@ -325,7 +303,7 @@ TEST = ScalarTest(
             expected_source="2/7 of the pull along the slope spins the ball up: µ = 2/7 tan α = 0.0277, to the resolution of the "
             "search",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="hardest-push",
             title="Hardest push that leaves the ball in the bowl",
             configuration="plain",
@@ -338,7 +316,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="place",
             description="largest error of the place in two seconds",
             unit="m",

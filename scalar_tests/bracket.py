@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import Result
-from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityStudy
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 
 WALK = 12  # grid values between easy and hard
 GROWTH = 2.0  # a quantity that doubles from the middle third of a run to the last is growing
@@ -21,7 +21,7 @@ GROWTH = 2.0  # a quantity that doubles from the middle third of a run to the la
 
 def break_point(
     holds: Callable[[float], bool], easy: float, hard: float, *, resolution: float = 0.01, walk: int = WALK
-) -> BreakPoint:
+) -> case.BreakPoint:
     """The last value that holds on the way from `easy` to `hard`, both above zero, to a relative `resolution`.
 
     `hard` itself if everything holds; NaN if not even `easy` does.
@@ -35,7 +35,7 @@ def break_point(
             break
         good = value
     if math.isnan(good) or math.isnan(bad):
-        return BreakPoint(value=good, resolution=resolution, evaluations=asked)
+        return case.BreakPoint(value=good, resolution=resolution, evaluations=asked)
     while abs(math.log(bad / good)) > resolution:
         middle = math.sqrt(good * bad)
         asked += 1
@@ -43,11 +43,11 @@ def break_point(
             good = middle
         else:
             bad = middle
-    return BreakPoint(value=good, resolution=resolution, evaluations=asked)
+    return case.BreakPoint(value=good, resolution=resolution, evaluations=asked)
 
 
 def unbroken(
-    holds: Callable[[Simulate, float], bool],
+    holds: Callable[[case.Simulate, float], bool],
     easy: float,
     hard: float,
     *,
@@ -58,13 +58,13 @@ def unbroken(
     unit: str,
     configuration: str = "plain",
     walk: int = 6,
-) -> StabilityStudy:
+) -> case.StabilityStudy:
     """The break point of what by theory holds all the way to `hard`, where the search ends; `source` says why it does."""
 
-    def study(simulate: Simulate) -> BreakPoint:
+    def study(simulate: case.Simulate) -> case.BreakPoint:
         return break_point(lambda value: holds(simulate, value), easy, hard, walk=walk)
 
-    return StabilityStudy(
+    return case.StabilityStudy(
         name=name,
         title=title,
         configuration=configuration,
@@ -77,7 +77,7 @@ def unbroken(
     )
 
 
-def break_count(holds: Callable[[int], bool], counts: Sequence[int]) -> BreakPoint:
+def break_count(holds: Callable[[int], bool], counts: Sequence[int]) -> case.BreakPoint:
     """The same for whole numbers: walks `counts` upwards, then halves the gap to single counts."""
     good, bad, asked = 0, 0, 0
     for count in counts:
@@ -93,12 +93,12 @@ def break_count(holds: Callable[[int], bool], counts: Sequence[int]) -> BreakPoi
             good = middle
         else:
             bad = middle
-    return BreakPoint(
+    return case.BreakPoint(
         value=float(good) if good else math.nan, resolution=1.0 / max(1, good), evaluations=asked
     )
 
 
-def cell(result: Result, history: Any, *, bound: float, rest: float = 0.0) -> str:
+def cell(result: engine.Result, history: Any, *, bound: float, rest: float = 0.0) -> str:
     """settled, bounded, growing, diverged or not_finite.
 
     `history` is a magnitude at every sample, scaled so that 1 means as large as the scene itself: `bound` is

@@ -7,37 +7,10 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import (
-    WORLD,
-    ConstraintForce,
-    Cylinder,
-    Energy,
-    Final,
-    Hinge,
-    Maximum,
-    MaximumAbsolute,
-    Method,
-    Motor,
-    Particle,
-    Position,
-    RigidBody,
-    Scene,
-    Trace,
-    Velocity,
-    Wire,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
@@ -55,15 +28,15 @@ SPEED, TORQUE = 2.0, 15.0  # rad/s, N m: less than holds the load
 SINKS = (LOAD * GRAVITY * DRUM - TORQUE) / (LOAD * DRUM + MOMENT / DRUM)  # m/s²
 
 
-def bollard(heavy: float = HEAVY, turns: float = TURNS) -> Scene:
+def bollard(heavy: float = HEAVY, turns: float = TURNS) -> engine.Scene:
     """Two weights on a wire round a fixed bar."""
     ends = {"light": (0.0, 0.0, -1.0), "heavy": (0.1, 0.0, -0.5)}
-    wire = Wire(
+    wire = engine.Wire(
         name="wire",
         through=(
             ("light", ends["light"]),
-            (WORLD, (0.0, 0.0, 5.0)),
-            (WORLD, (0.1, 0.0, 5.0)),
+            (engine.WORLD, (0.0, 0.0, 5.0)),
+            (engine.WORLD, (0.1, 0.0, 5.0)),
             ("heavy", ends["heavy"]),
         ),
         friction=FRICTION,
@@ -71,51 +44,53 @@ def bollard(heavy: float = HEAVY, turns: float = TURNS) -> Scene:
         compliance=0.0,
     )
     weights = (
-        Particle(name="light", mass=LIGHT, position=ends["light"]),
-        Particle(name="heavy", mass=heavy, position=ends["heavy"]),
+        engine.Particle(name="light", mass=LIGHT, position=ends["light"]),
+        engine.Particle(name="heavy", mass=heavy, position=ends["heavy"]),
     )
-    return Scene(bodies=weights, constraints=(wire,), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=weights, constraints=(wire,), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def winch(max_force: float | None = None) -> Scene:
+def winch(max_force: float | None = None) -> engine.Scene:
     """A load on a drum with a motor."""
     top = (DRUM, 0.0, 5.0)
-    drum = RigidBody(
+    drum = engine.RigidBody(
         name="drum",
         mass=4.0,
         inertia=(MOMENT, MOMENT, MOMENT),
-        shape=Cylinder(DRUM, 0.3),
+        shape=engine.Cylinder(DRUM, 0.3),
         orientation=(math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0),
         position=(0.0, 0.0, 5.0),
     )
-    load = Particle(name="load", mass=LOAD, position=(DRUM, 0.0, 0.0))
-    axle = Hinge(
+    load = engine.Particle(name="load", mass=LOAD, position=(DRUM, 0.0, 0.0))
+    axle = engine.Hinge(
         name="axle",
-        between=(WORLD, "drum"),
+        between=(engine.WORLD, "drum"),
         axis=(0.0, 1.0, 0.0),
         compliance=0.0,
-        motor=Motor(speed=SPEED, max_force=max_force),
+        motor=engine.Motor(speed=SPEED, max_force=max_force),
     )
-    wire = Wire(
+    wire = engine.Wire(
         name="wire",
-        through=(("load", load.position), (WORLD, top)),
+        through=(("load", load.position), (engine.WORLD, top)),
         wound=(("axle", DRUM),),
         compliance=0.0,
     )
-    return Scene(bodies=(drum, load), constraints=(axle, wire), gravity=(0.0, 0.0, -GRAVITY), contacts=False)
+    return engine.Scene(
+        bodies=(drum, load), constraints=(axle, wire), gravity=(0.0, 0.0, -GRAVITY), contacts=False
+    )
 
 
-def slip(simulate: Simulate) -> dict[str, float]:
+def slip(simulate: case.Simulate) -> dict[str, float]:
     """The heavy weight slips down, and the two pulls."""
     observe: dict[str, Observable] = {
-        "v": Trace(quantity=Velocity("heavy")),
-        "pull": Final(quantity=ConstraintForce("wire")),
-        "energy": Trace(quantity=Energy()),
+        "v": engine.Trace(quantity=engine.Velocity("heavy")),
+        "pull": engine.Final(quantity=engine.ConstraintForce("wire")),
+        "energy": engine.Trace(quantity=engine.Energy()),
     }
     result = simulate(bollard(), time_step=TIME_STEP, duration=DURATION, observe=observe)
     fallen = -np.diff(result["v"][:, 2]) / TIME_STEP
     behind = HEAVY * (GRAVITY - fallen[-1])
-    held: dict[str, Observable] = {"v": MaximumAbsolute(quantity=Velocity())}
+    held: dict[str, Observable] = {"v": engine.MaximumAbsolute(quantity=engine.Velocity())}
     rests = simulate(bollard(0.99 * HOLDS * LIGHT), time_step=TIME_STEP, duration=DURATION, observe=held)
     return {
         "acceleration_error": float(np.abs(fallen / SLIPS - 1.0).max()),
@@ -125,11 +100,11 @@ def slip(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def lift(simulate: Simulate) -> dict[str, float]:
+def lift(simulate: case.Simulate) -> dict[str, float]:
     """The winch at its speed, and with less torque than holds the load."""
     observe: dict[str, Observable] = {
-        "v": Final(quantity=Velocity("load")),
-        "pull": Final(quantity=ConstraintForce("wire")),
+        "v": engine.Final(quantity=engine.Velocity("load")),
+        "pull": engine.Final(quantity=engine.ConstraintForce("wire")),
     }
     lifts = simulate(winch(), time_step=TIME_STEP, duration=1.0, observe=observe)
     sinks = simulate(winch(TORQUE), time_step=TIME_STEP, duration=1.0, observe=observe)
@@ -141,14 +116,14 @@ def lift(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def holds(simulate: Simulate, heavy: float) -> bool:
+def holds(simulate: case.Simulate, heavy: float) -> bool:
     """Whether a weight of `heavy` [kg] is held."""
-    observe = {"v": Maximum(quantity=Velocity("light"))}
+    observe = {"v": engine.Maximum(quantity=engine.Velocity("light"))}
     result = simulate(bollard(heavy), time_step=TIME_STEP, duration=0.1, observe=observe)
     return result.completed and float(result["v"][2]) < 1e-9
 
 
-def heaviest(simulate: Simulate) -> BreakPoint:
+def heaviest(simulate: case.Simulate) -> case.BreakPoint:
     """The heaviest weight that one kilogram holds."""
     return break_point(
         functools.partial(holds, simulate), 0.5 * HOLDS * LIGHT, 2.0 * HOLDS * LIGHT, resolution=1e-4
@@ -158,42 +133,42 @@ def heaviest(simulate: Simulate) -> BreakPoint:
 LIFTS = LOAD * GRAVITY * DRUM  # N m
 
 
-def lifted(simulate: Simulate, torque: float) -> bool:
+def lifted(simulate: case.Simulate, torque: float) -> bool:
     """Whether a motor of that torque [N m] has its load on the way up after half a second."""
-    observe = {"v": Final(quantity=Velocity("load"))}
+    observe = {"v": engine.Final(quantity=engine.Velocity("load"))}
     result = simulate(winch(torque), time_step=TIME_STEP, steps=30, observe=observe)
     return result.completed and float(result["v"][2]) > 0.0
 
 
-def weakest(simulate: Simulate) -> BreakPoint:
+def weakest(simulate: case.Simulate) -> case.BreakPoint:
     """The least torque that lifts the load."""
     return break_point(
         functools.partial(lifted, simulate), 3.0 * LIFTS, 0.25 * LIFTS, resolution=1e-4, walk=5
     )
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Place of the heavy weight after half a second against ½ a t² [m]."""
-    observe = {"x": Final(quantity=Position("heavy"))}
+    observe = {"x": engine.Final(quantity=engine.Position("heavy"))}
     result = simulate(bollard(), time_step=time_step, duration=DURATION, method=method, observe=observe)
     return -0.5 - float(result["x"][2]) - 0.5 * SLIPS * DURATION**2
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Pull behind over pull before while the wire slips, against the angle round the bar."""
     turns = [0.0, 0.25, 0.5, 0.75, 1.0, 1.25, 1.5]
     found = []
     for turn in turns:
         heavy = 1.2 * math.exp(FRICTION * (math.pi + 2.0 * math.pi * turn)) * LIGHT
         observe: dict[str, Observable] = {
-            "v": Trace(quantity=Velocity("heavy")),
-            "pull": Final(quantity=ConstraintForce("wire")),
+            "v": engine.Trace(quantity=engine.Velocity("heavy")),
+            "pull": engine.Final(quantity=engine.ConstraintForce("wire")),
         }
         result = simulate(bollard(heavy, turn), time_step=TIME_STEP, duration=0.1, observe=observe)
         fallen = -float(result["v"][-1, 2] - result["v"][-2, 2]) / TIME_STEP
         found.append(heavy * (GRAVITY - fallen) / float(result["pull"]))
     angle = np.linspace(1.0, 13.0, 61)
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("slipping wire", (math.pi + 2.0 * math.pi * turn for turn in turns), found, "points"),
             line("e^(µφ)", angle, np.exp(FRICTION * angle), "reference"),
@@ -210,7 +185,7 @@ STEADY = (
     "a steady force is exact in the velocities of the discrete step; the bound is found to 1e-11 of the pull"
 )
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Capstan and winch",
     question="Does a wire round a bar hold e^(µφ) times the pull in front, and does a winch lift what its torque can?",
     why="Ships are moored and loads are lowered by a few turns of rope. The pull grows exponentially along the wrap: a friction "
@@ -299,9 +274,9 @@ TEST = ScalarTest(
             "winch",
         ),
     ),
-    example=lambda: Example(scene=winch(), time_step=TIME_STEP, duration=2.0),
+    example=lambda: case.Example(scene=winch(), time_step=TIME_STEP, duration=2.0),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="holding",
             title="Heaviest weight that a kilogram holds",
             configuration="plain",
@@ -311,7 +286,7 @@ TEST = ScalarTest(
             expected=(0.9999 * HOLDS * LIGHT, 1.0001 * HOLDS * LIGHT),
             expected_source="e^(0.3 · 3π) = 16.90 kg; the search ends within a part in ten thousand",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="weakest",
             title="Least torque of a winch that lifts its load",
             configuration="winch",
@@ -323,9 +298,9 @@ TEST = ScalarTest(
             expected_source="m g r = 19.62 N m; the search ends within a part in ten thousand",
         ),
     ),
-    figures=(Figure(name="ratio", title="Pull behind over pull in front", draw=draw),),
+    figures=(case.Figure(name="ratio", title="Pull behind over pull in front", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="slip",
             description="way of the heavy weight in half a second against ½ a t²",
             unit="m",

@@ -8,30 +8,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from spook_tracker.engine import (
-    Box,
-    ContactForce,
-    Final,
-    Material,
-    MaximumAbsolute,
-    Method,
-    Position,
-    RigidBody,
-    Scene,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests import leaning_cards as cards
 from spook_tracker.scalar_tests.bracket import break_count, break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
@@ -57,15 +38,15 @@ def need(storeys: int) -> float:
     return (0.5 * weight + above) * ARM / ((weight + above) * (end + RISE) + above * end)
 
 
-def scene(storeys: int = STOREYS, friction: float = FRICTION) -> Scene:
+def scene(storeys: int = STOREYS, friction: float = FRICTION) -> engine.Scene:
     """Pairs of leaning boards, a deck on each pair but the highest."""
-    rough = Material(friction=friction)
+    rough = engine.Material(friction=friction)
     ground = cards.scene(friction=friction)
     table, *pair = ground.bodies
-    deck = RigidBody(
+    deck = engine.RigidBody(
         name="deck",
         mass=DECK_MASS,
-        shape=Box((2.0 * (cards.THICK + ARM), 1.2 * cards.WIDE, DECK)),
+        shape=engine.Box((2.0 * (cards.THICK + ARM), 1.2 * cards.WIDE, DECK)),
         position=(0.0, 0.0, STOREY - 0.5 * DECK),
         material=rough,
     )
@@ -79,12 +60,12 @@ def scene(storeys: int = STOREYS, friction: float = FRICTION) -> Scene:
     return replace(ground, bodies=(table, *raised[:-1]))
 
 
-def measure(simulate: Simulate) -> dict[str, float]:
+def measure(simulate: case.Simulate) -> dict[str, float]:
     """A quarter of a second at rest, and what the lowest feet carry."""
     observe: dict[str, Observable] = {
-        "x": MaximumAbsolute(quantity=Position(), from_start=True),
-        "left": Final(quantity=ContactForce("left 0", other="table")),
-        "right": Final(quantity=ContactForce("right 0", other="table")),
+        "x": engine.MaximumAbsolute(quantity=engine.Position(), from_start=True),
+        "left": engine.Final(quantity=engine.ContactForce("left 0", other="table")),
+        "right": engine.Final(quantity=engine.ContactForce("right 0", other="table")),
     }
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=observe)
     carried = cards.CARD * cards.GRAVITY + load(STOREYS)
@@ -96,37 +77,37 @@ def measure(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def stands(simulate: Simulate, storeys: int, friction: float) -> bool:
+def stands(simulate: case.Simulate, storeys: int, friction: float) -> bool:
     """Whether nothing has moved by a tenth of a millimetre in a quarter of a second."""
-    observe = {"x": MaximumAbsolute(quantity=Position(), from_start=True)}
+    observe = {"x": engine.MaximumAbsolute(quantity=engine.Position(), from_start=True)}
     result = simulate(scene(storeys, friction), time_step=TIME_STEP, duration=DURATION, observe=observe)
     return result.completed and float(np.abs(result["x"]).max()) < 1e-4
 
 
-def least(simulate: Simulate, storeys: int = 3, resolution: float = 0.002) -> BreakPoint:
+def least(simulate: case.Simulate, storeys: int = 3, resolution: float = 0.002) -> case.BreakPoint:
     """The least friction on which so many storeys stand."""
     asked = functools.partial(stands, simulate, storeys)
     return break_point(asked, 1.2 * need(storeys), 0.8 * need(storeys), resolution=resolution)
 
 
-def tallest(simulate: Simulate) -> BreakPoint:
+def tallest(simulate: case.Simulate) -> case.BreakPoint:
     """The most storeys that stand with SMOOTHER."""
     return break_count(functools.partial(stands, simulate, friction=SMOOTHER), (1, 2, 3, 4, 5))
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Relative error of the load of a lowest foot."""
-    observe = {"left": Final(quantity=ContactForce("left 0", other="table"))}
+    observe = {"left": engine.Final(quantity=engine.ContactForce("left 0", other="table"))}
     result = simulate(scene(), time_step=time_step, duration=DURATION, method=method, observe=observe)
     return float(result["left"][2]) / (cards.CARD * cards.GRAVITY + load(STOREYS)) - 1.0
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """The least friction against the number of storeys."""
     storeys = [1, 2, 3, 4]
     found = [least(simulate, n, 0.01).value for n in storeys]
     every = list(range(1, 13))
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("found", storeys, found, "points"),
             line("statics", every, [need(n) for n in every], "reference"),
@@ -140,7 +121,7 @@ def draw(simulate: Simulate) -> Drawing:
 
 RESTING = "forces at rest are exact; rounding of the places where they touch remains"
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="House of cards",
     question="How high may a house of cards be built on a table of given roughness?",
     why="Every storey leans on the friction of the one below, and what lies on top decides what the lowest feet need. A "
@@ -209,9 +190,9 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=scene(4, 0.97 * need(4)), time_step=TIME_STEP, duration=1.2),
+    example=lambda: case.Example(scene=scene(4, 0.97 * need(4)), time_step=TIME_STEP, duration=1.2),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="least-friction",
             title="Least friction on which five storeys stand",
             configuration="plain",
@@ -221,7 +202,7 @@ TEST = ScalarTest(
             expected=(0.997 * need(5), 1.003 * need(5)),
             expected_source=f"statics: {told(need(5), 4)}; the search ends within 0.2 %",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="tallest",
             title="Most storeys that stand with µ = 0.4",
             configuration="plain",
@@ -233,7 +214,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="load",
             description="relative error of the load of a lowest foot after a quarter of a second",
             unit="1",
@@ -244,5 +225,5 @@ TEST = ScalarTest(
             target_seconds=0.1,
         ),
     ),
-    figures=(Figure(name="storeys", title="Friction a house of cards needs", draw=draw),),
+    figures=(case.Figure(name="storeys", title="Friction a house of cards needs", draw=draw),),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from importlib import import_module
 
-from spook_tracker.scalar_tests.case import ScalarTest
+from spook_tracker.scalar_tests import case
 
 QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as TEST
     # the thesis' seven continuous tests, in its order
@@ -102,11 +102,11 @@ QUESTIONS: dict[str, str] = {  # name of the test: the module that holds it as T
 }
 
 
-class Catalogue(Mapping[str, ScalarTest]):
+class Catalogue(Mapping[str, case.ScalarTest]):
     """The table; a test is imported when it is asked for, so that a few are had without what all the others need."""
 
-    def __getitem__(self, name: str) -> ScalarTest:
-        test: ScalarTest = import_module(f"{__package__}.{QUESTIONS[name]}").TEST
+    def __getitem__(self, name: str) -> case.ScalarTest:
+        test: case.ScalarTest = import_module(f"{__package__}.{QUESTIONS[name]}").TEST
         return test
 
     def __iter__(self) -> Iterator[str]:

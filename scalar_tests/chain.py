@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import eigh
 from scipy.special import roots_laguerre
 
-from spook_tracker.engine import Distance, Particle, Scene
+from spook_tracker import engine
 
 GRAVITY = 9.81  # m/s²
 LENGTH = 1.0  # m, each link
@@ -18,7 +18,7 @@ MASS = 1.0  # kg, each sphere
 COMPLIANCE = 1e-13  # m/N
 
 
-def level_chain(count: int, damping: float, *, compliance: float = COMPLIANCE) -> Scene:
+def level_chain(count: int, damping: float, *, compliance: float = COMPLIANCE) -> engine.Scene:
     """`count` spheres in a level row from the pivot at the origin along x, at rest; damping in s."""
     return chain([(float(i + 1) * LENGTH, 0.0, 0.0) for i in range(count)], damping, compliance=compliance)
 
@@ -31,7 +31,7 @@ def hanging_chain(
     compliance: float = COMPLIANCE,
     tilt: float = 0.0,
     zigzag: float = 0.0,
-) -> Scene:
+) -> engine.Scene:
     """`count` spheres below the pivot, the last of mass `load` [kg]; `tilt` [rad] leans the chain, `zigzag`
     [m] pushes its spheres left and right in turn."""
     x, z = np.sin(tilt), -np.cos(tilt)
@@ -42,11 +42,11 @@ def hanging_chain(
     return chain(places, damping, compliance=compliance, load=load)
 
 
-def chain(places: Any, damping: float, *, compliance: float = COMPLIANCE, load: float = MASS) -> Scene:
+def chain(places: Any, damping: float, *, compliance: float = COMPLIANCE, load: float = MASS) -> engine.Scene:
     """Spheres at `places`, each tied to the one before and the first to the origin by a link of 1 m."""
     count = len(places)
     spheres = tuple(
-        Particle(
+        engine.Particle(
             name=f"sphere {i + 1}",
             position=(float(place[0]), float(place[1]), float(place[2])),
             mass=load if i == count - 1 else MASS,
@@ -55,7 +55,7 @@ def chain(places: Any, damping: float, *, compliance: float = COMPLIANCE, load: 
     )
     ends: list[Any] = [(0.0, 0.0, 0.0), *(sphere.name for sphere in spheres)]
     links = tuple(
-        Distance(
+        engine.Distance(
             name=f"link {i + 1}",
             between=(ends[i], ends[i + 1]),
             rest_length=LENGTH,
@@ -64,7 +64,7 @@ def chain(places: Any, damping: float, *, compliance: float = COMPLIANCE, load: 
         )
         for i in range(count)
     )
-    return Scene(bodies=spheres, constraints=links, gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=spheres, constraints=links, gravity=(0.0, 0.0, -GRAVITY))
 
 
 def fall_to_hanging(count: int) -> float:

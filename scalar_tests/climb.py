@@ -7,27 +7,10 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import (
-    AngularVelocity,
-    ContactForce,
-    Final,
-    Method,
-    Position,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import apart, line, told
@@ -58,13 +41,13 @@ def climbing(torque: float = TORQUE) -> float:
     return (2.0 * torque / RADIUS - MASS * GRAVITY * math.sin(TILT)) / (MASS + 4.0 * INERTIA / RADIUS**2)
 
 
-def climb(simulate: Simulate) -> dict[str, float]:
+def climb(simulate: case.Simulate) -> dict[str, float]:
     """Driven up the slope by its rear wheels."""
     observe: dict[str, Observable] = {
-        "v": Trace(quantity=Velocity("chassis")),
-        "w": Trace(quantity=AngularVelocity("front left")),
+        "v": engine.Trace(quantity=engine.Velocity("chassis")),
+        "w": engine.Trace(quantity=engine.AngularVelocity("front left")),
     }
-    observe |= {name: Final(quantity=ContactForce(name, "road")) for name in WHEELS}
+    observe |= {name: engine.Final(quantity=engine.ContactForce(name, "road")) for name in WHEELS}
     asked = scene(-SLOPE, torque=TORQUE)
     result = simulate(asked, time_step=TIME_STEP, duration=DURATION, observe=observe)
     exact = climbing() * result.sample_times["v"]
@@ -94,17 +77,17 @@ def slack(torque: float) -> float:
 SLIPS = TORQUE * slack(0.0) / (slack(0.0) - slack(TORQUE))  # N m
 
 
-def rolls(simulate: Simulate, torque: float) -> bool:
+def rolls(simulate: case.Simulate, torque: float) -> bool:
     """Whether a rear wheel rolls for half a second."""
     observe: dict[str, Observable] = {
-        "v": Final(quantity=Velocity("rear left")),
-        "w": Final(quantity=AngularVelocity("rear left")),
+        "v": engine.Final(quantity=engine.Velocity("rear left")),
+        "w": engine.Final(quantity=engine.AngularVelocity("rear left")),
     }
     result = simulate(scene(-SLOPE, torque=torque), time_step=TIME_STEP, steps=30, observe=observe)
     return result.completed and abs(float(result["v"][0]) - RADIUS * float(result["w"][1])) < 1e-3
 
 
-def hardest(simulate: Simulate) -> BreakPoint:
+def hardest(simulate: case.Simulate) -> case.BreakPoint:
     """The hardest drive of wheels that roll."""
     return break_point(functools.partial(rolls, simulate), 0.4 * SLIPS, 2.0 * SLIPS, resolution=1e-3)
 
@@ -113,39 +96,39 @@ def hardest(simulate: Simulate) -> BreakPoint:
 STALLS = math.tan(math.asin(2.0 * TORQUE / RADIUS / (MASS * GRAVITY)))
 
 
-def goes_up(simulate: Simulate, slope: float) -> bool:
+def goes_up(simulate: case.Simulate, slope: float) -> bool:
     """Whether the vehicle has moved up a slope of that tan θ after half a second."""
-    observe = {"v": Final(quantity=Velocity("chassis"))}
+    observe = {"v": engine.Final(quantity=engine.Velocity("chassis"))}
     result = simulate(scene(-slope, torque=TORQUE), time_step=TIME_STEP, steps=30, observe=observe)
     return result.completed and float(result["v"][0]) > 0.0
 
 
-def steepest(simulate: Simulate) -> BreakPoint:
+def steepest(simulate: case.Simulate) -> case.BreakPoint:
     """The steepest slope that the drives climb."""
     return break_point(
         functools.partial(goes_up, simulate), 0.5 * STALLS, 2.0 * STALLS, resolution=1e-3, walk=5
     )
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Way up the slope in a second against ½ a t² [m]."""
-    observe = {"x": Final(quantity=Position("chassis"))}
+    observe = {"x": engine.Final(quantity=engine.Position("chassis"))}
     asked = scene(-SLOPE, torque=TORQUE)
     result = simulate(asked, time_step=time_step, duration=DURATION, method=method, observe=observe)
     return float(result["x"][0]) - 0.5 * climbing() * DURATION**2
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Acceleration against the torque."""
     torques = tuple(SLIPS * k / 10.0 for k in range(2, 15))
-    observe = {"v": Final(quantity=Velocity("chassis"))}
+    observe = {"v": engine.Final(quantity=engine.Velocity("chassis"))}
     found = [
         float(simulate(scene(-SLOPE, torque=one), time_step=TIME_STEP, steps=30, observe=observe)["v"][0])
         / (30.0 * TIME_STEP)
         for one in torques
     ]
     held = tuple(one for one in torques if one <= SLIPS)
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulation", torques, found, "points"),
             line("(Σ T/r − M g sin θ)/(M + 4 I/r²)", held, map(climbing, held), "reference"),
@@ -160,7 +143,7 @@ def draw(simulate: Simulate) -> Drawing:
 # What the road gives way by under one of a wheel's two points, as a part of its radius, of what drives it.
 DRIVEN = SINK / RADIUS * 2.0 * TORQUE / RADIUS / MASS * DURATION  # m/s
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Climbing vehicle",
     question="Does a vehicle that its rear wheels drive climb as mechanics says, up to where they slip?",
     why="Drive, rolling inertia, friction and load act in one chain: torque lost on the way, or load that does not move to the "
@@ -213,10 +196,10 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=scene(-SLOPE, torque=TORQUE), time_step=TIME_STEP, duration=3.0),
-    figures=(Figure(name="torque", title="Acceleration against torque", draw=draw),),
+    example=lambda: case.Example(scene=scene(-SLOPE, torque=TORQUE), time_step=TIME_STEP, duration=3.0),
+    figures=(case.Figure(name="torque", title="Acceleration against torque", draw=draw),),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="hardest",
             title="Hardest drive of rear wheels that roll",
             configuration="plain",
@@ -227,7 +210,7 @@ TEST = ScalarTest(
             expected_source="friction of the rear wheels, µ times what they carry; all is linear in the torque. The search ends "
             "within a thousandth",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="steepest",
             title="Steepest slope that the drives climb",
             configuration="plain",
@@ -239,7 +222,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="way",
             description="way up the slope in a second against ½ a t²",
             unit="m",

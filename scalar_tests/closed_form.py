@@ -4,16 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from spook_tracker.scalar_tests.case import Measurement, Metric, Role, Simulate
+from spook_tracker.scalar_tests import case
 
 ROUNDING = "closed form; rounding and the solver's tolerance remain"
 
 
 def error(
-    name: str, description: str, unit: str, limit: float, source: str = ROUNDING, role: Role = "gate"
-) -> Metric:
+    name: str, description: str, unit: str, limit: float, source: str = ROUNDING, role: case.Role = "gate"
+) -> case.Metric:
     """An error against a closed form, at most `limit`; a tenth of that is only a change."""
-    return Metric(
+    return case.Metric(
         name=name,
         description=description,
         unit=unit,
@@ -26,13 +26,13 @@ def error(
 
 
 def ask(
-    measure: Callable[[Simulate], Mapping[str, float]],
-    metrics: tuple[Metric, ...],
+    measure: Callable[[case.Simulate], Mapping[str, float]],
+    metrics: tuple[case.Metric, ...],
     note: str,
     time_step: float,
     configuration: str = "plain",
-) -> Measurement:
+) -> case.Measurement:
     """One measurement of plain SPOOK."""
-    return Measurement(
+    return case.Measurement(
         configuration=configuration, time_step=time_step, metrics=metrics, measure=measure, note=note
     )

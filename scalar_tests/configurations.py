@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from spook_tracker.engine.method import PLAIN, Method
-from spook_tracker.scalar_tests.case import Configuration
+from spook_tracker.scalar_tests import case
 
 METHODS = {
     **dict.fromkeys(("plain", "direct"), PLAIN),
@@ -24,10 +24,10 @@ METHODS = {
 
 def configured(
     orders: Mapping[str, float | None], order_range: tuple[float, float] | None = None
-) -> tuple[Configuration, ...]:
+) -> tuple[case.Configuration, ...]:
     """A configuration for each name, with its expected order (None: none is expected) over the same range of steps [s]."""
     return tuple(
-        Configuration(
+        case.Configuration(
             name=name,
             method=METHODS[name],
             expected_order=order,

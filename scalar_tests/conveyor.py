@@ -7,30 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from spook_tracker.engine import (
-    Box,
-    ContactForce,
-    Final,
-    Material,
-    Method,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
@@ -48,24 +27,24 @@ LAG = 0.5 * BELT**2 / (FRICTION * GRAVITY)  # m
 CLIMB = 0.2  # tan of the slope of the climbing belt
 
 
-def scene(slope: float = 0.0, away: float = AWAY) -> Scene:
+def scene(slope: float = 0.0, away: float = AWAY) -> engine.Scene:
     """A box laid at rest on a belt; gravity is tilted by atan(slope) against the belt's way."""
-    rough = Material(friction=FRICTION)
+    rough = engine.Material(friction=FRICTION)
     way = (math.cos(away), math.sin(away))
-    belt = RigidBody(
+    belt = engine.RigidBody(
         name="belt",
         motion="static",
-        shape=Plane(),
+        shape=engine.Plane(),
         position=(0.0, 0.0, 0.0),
         material=rough,
         surface_velocity=(BELT * way[0], BELT * way[1], 0.0),
     )
-    box = RigidBody(
-        name="box", mass=MASS, shape=Box(EDGE), position=(0.0, 0.0, 0.5 * EDGE[2]), material=rough
+    box = engine.RigidBody(
+        name="box", mass=MASS, shape=engine.Box(EDGE), position=(0.0, 0.0, 0.5 * EDGE[2]), material=rough
     )
     tilt = math.atan(slope)
     down = -GRAVITY * math.sin(tilt)
-    return Scene(bodies=(belt, box), gravity=(down * way[0], down * way[1], -GRAVITY * math.cos(tilt)))
+    return engine.Scene(bodies=(belt, box), gravity=(down * way[0], down * way[1], -GRAVITY * math.cos(tilt)))
 
 
 def gain(slope: float) -> float:
@@ -74,11 +53,11 @@ def gain(slope: float) -> float:
     return GRAVITY * (FRICTION * math.cos(tilt) - math.sin(tilt))
 
 
-def ride(simulate: Simulate, slope: float) -> dict[str, float]:
+def ride(simulate: case.Simulate, slope: float) -> dict[str, float]:
     """Speeds along and across the belt, against the recursion of one step, and the force that is left."""
     observe = {
-        "v": Trace(quantity=Velocity("box")),
-        "force": Final(quantity=ContactForce("box", "belt")),
+        "v": engine.Trace(quantity=engine.Velocity("box")),
+        "force": engine.Final(quantity=engine.ContactForce("box", "belt")),
     }
     result = simulate(scene(slope), time_step=TIME_STEP, duration=DURATION, observe=observe)
     along = result["v"][:, 0] * math.cos(AWAY) + result["v"][:, 1] * math.sin(AWAY)
@@ -93,44 +72,44 @@ def ride(simulate: Simulate, slope: float) -> dict[str, float]:
     }
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """How far the box stays behind the belt, against v²/(2 µ g) [m]."""
-    observe = {"x": Final(quantity=Position("box"))}
+    observe = {"x": engine.Final(quantity=engine.Position("box"))}
     result = simulate(scene(), time_step=time_step, duration=0.5, method=method, observe=observe)
     way = float(result["x"][0]) * math.cos(AWAY) + float(result["x"][1]) * math.sin(AWAY)
     return (BELT * 0.5 - way) - LAG
 
 
-def climbs(simulate: Simulate, slope: float) -> bool:
+def climbs(simulate: case.Simulate, slope: float) -> bool:
     """Whether the belt carries the box up after half a second."""
-    observe = {"v": Final(quantity=Velocity("box"))}
+    observe = {"v": engine.Final(quantity=engine.Velocity("box"))}
     result = simulate(scene(slope, 0.0), time_step=TIME_STEP, steps=30, observe=observe)
     return result.completed and float(result["v"][0]) > 0.0
 
 
-def steepest(simulate: Simulate) -> BreakPoint:
+def steepest(simulate: case.Simulate) -> case.BreakPoint:
     """The steepest slope that is climbed, walking from a fifth of µ to three times µ."""
     return break_point(lambda slope: climbs(simulate, slope), 0.2 * FRICTION, 3.0 * FRICTION, resolution=1e-3)
 
 
-def taken_along(simulate: Simulate, speed: float) -> bool:
+def taken_along(simulate: case.Simulate, speed: float) -> bool:
     """Whether a belt of that speed [m/s] gives the box µ g, no more, in ten steps."""
-    observe = {"v": Final(quantity=Velocity("box"))}
+    observe = {"v": engine.Final(quantity=engine.Velocity("box"))}
     asked = scene(away=0.0)
     faster = tuple(
         replace(body, surface_velocity=(speed, 0.0, 0.0)) if body.name == "belt" else body
         for body in asked.bodies
-        if isinstance(body, RigidBody)
+        if isinstance(body, engine.RigidBody)
     )
     result = simulate(replace(asked, bodies=faster), time_step=TIME_STEP, steps=10, observe=observe)
     return result.completed and abs(float(result["v"][0]) / (10.0 * TIME_STEP * gain(0.0)) - 1.0) < 1e-9
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Speed along the belt against time, level and climbing."""
     curves, apart = [], 0.0
     for slope in (0.0, CLIMB):
-        observe = {"v": Trace(quantity=Velocity("box"))}
+        observe = {"v": engine.Trace(quantity=engine.Velocity("box"))}
         result = simulate(scene(slope, 0.0), time_step=TIME_STEP, duration=DURATION, observe=observe)
         time, along = result.sample_times["v"], result["v"][:, 0]
         exact = np.minimum(BELT, gain(slope) * time)
@@ -139,7 +118,7 @@ def draw(simulate: Simulate) -> Drawing:
             line(f"tan θ = {slope:g}", time, along, "points"),
             line(f"closed form, tan θ = {slope:g}", time, exact, "reference"),
         ]
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="time [s]",
         y_label="speed along the belt [m/s]",
@@ -149,7 +128,7 @@ def draw(simulate: Simulate) -> Drawing:
 
 ROUNDED = "constant friction is exact in a step; the solver stops at 1e-10 of the load"
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Conveyor",
     question="Does a conveyor take a box along as Coulomb's law says, in any direction and uphill?",
     why="Belts sort and move most of what factories make. A surface that moves along itself is friction against a "
@@ -213,9 +192,9 @@ TEST = ScalarTest(
             "uphill",
         ),
     ),
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP, duration=DURATION),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP, duration=DURATION),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="slope",
             title="Steepest belt that carries a box up",
             configuration="plain",
@@ -236,9 +215,9 @@ TEST = ScalarTest(
             unit="m/s",
         ),
     ),
-    figures=(Figure(name="speed", title="Speed against time", draw=draw),),
+    figures=(case.Figure(name="speed", title="Speed against time", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="lag",
             description="way the box stays behind the belt, against v²/(2 µ g)",
             unit="m",

@@ -8,33 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from spook_tracker.engine import (
-    WORLD,
-    AngularVelocity,
-    Box,
-    ConstraintForce,
-    Cylinder,
-    Final,
-    Hinge,
-    Method,
-    RigidBody,
-    Scene,
-    Trace,
-    Tyre,
-    Velocity,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
@@ -82,7 +59,7 @@ def yaw(speed: float, front: float = SOFT, rear: float = HARD, steer: float = ST
 
 def scene(
     speed: float, front: float = SOFT, rear: float = HARD, steer: float = STEER, leans: bool = True
-) -> Scene:
+) -> engine.Scene:
     """The vehicle on its tyres, rolling ahead along x; the front axles are turned by `steer`.
 
     Unless it `leans` its chassis cannot roll and pitch, as in the bicycle model.
@@ -93,11 +70,11 @@ def scene(
     sunk = {ahead: load / STIFFNESS for ahead, load in loads.items()}
     slope = (sunk[True] - sunk[False]) / BASE
     level = RADIUS - sunk[False] - slope * REAR
-    chassis = RigidBody(
+    chassis = engine.RigidBody(
         name="chassis",
         mass=CHASSIS,
         inertia=(400.0, 1500.0, UPRIGHT) if leans else (1e9, 1e9, UPRIGHT),
-        shape=Box((3.6, 1.2, 0.4)),
+        shape=engine.Box((3.6, 1.2, 0.4)),
         position=(0.0, 0.0, level + RISE),
         velocity=(speed, 0.0, 0.0),
     )
@@ -107,10 +84,10 @@ def scene(
         axis = (-math.sin(angle), math.cos(angle), 0.0)
         turn = (math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle))
         wheels.append(
-            RigidBody(
+            engine.RigidBody(
                 name=name,
                 mass=WHEEL,
-                shape=Cylinder(RADIUS, WIDTH),
+                shape=engine.Cylinder(RADIUS, WIDTH),
                 position=(x, 0.5 * side * TRACK, RADIUS - sunk[x > 0.0]),
                 # about x by a quarter turn, then about z
                 orientation=(HALF * turn[0], HALF * turn[0], HALF * turn[3], HALF * turn[3]),
@@ -118,11 +95,11 @@ def scene(
                 angular_velocity=tuple(speed / RADIUS * a for a in axis),  # type: ignore[arg-type]
             )
         )
-        axles.append(Hinge(name=f"{name} axle", between=("chassis", name), axis=axis, compliance=0.0))
+        axles.append(engine.Hinge(name=f"{name} axle", between=("chassis", name), axis=axis, compliance=0.0))
         tyres.append(
-            Tyre(
+            engine.Tyre(
                 name=f"{name} tyre",
-                between=(WORLD, name),
+                between=(engine.WORLD, name),
                 axis=axis,
                 radius=RADIUS,
                 stiffness=STIFFNESS,
@@ -131,7 +108,7 @@ def scene(
                 friction=FRICTION,
             )
         )
-    return Scene(
+    return engine.Scene(
         bodies=(chassis, *wheels),
         constraints=(*axles, *tyres),
         gravity=(0.0, 0.0, -GRAVITY),
@@ -139,13 +116,13 @@ def scene(
     )
 
 
-def turn(simulate: Simulate, front: float, rear: float) -> dict[str, float]:
+def turn(simulate: case.Simulate, front: float, rear: float) -> dict[str, float]:
     """The steady bend, seen after it has settled."""
     observe: dict[str, Observable] = {
-        "v": Final(quantity=Velocity("chassis", point=(-BEHIND, 0.0, 0.0))),
-        "w": Final(quantity=AngularVelocity("chassis")),
-        "left": Final(quantity=ConstraintForce("front left tyre")),
-        "right": Final(quantity=ConstraintForce("front right tyre")),
+        "v": engine.Final(quantity=engine.Velocity("chassis", point=(-BEHIND, 0.0, 0.0))),
+        "w": engine.Final(quantity=engine.AngularVelocity("chassis")),
+        "left": engine.Final(quantity=engine.ConstraintForce("front left tyre")),
+        "right": engine.Final(quantity=engine.ConstraintForce("front right tyre")),
     }
     result = simulate(scene(SPEED, front, rear), time_step=TIME_STEP, duration=SETTLED, observe=observe)
     v, rate = result["v"], float(result["w"][2])
@@ -158,12 +135,12 @@ def turn(simulate: Simulate, front: float, rear: float) -> dict[str, float]:
     }
 
 
-def goes_straight(simulate: Simulate, speed: float) -> bool:
+def goes_straight(simulate: case.Simulate, speed: float) -> bool:
     """Whether an oversteering vehicle comes out of a nudge: its yaw dies out."""
     asked = scene(speed, HARD, SOFT, steer=0.0)
-    nudged = Scene(
+    nudged = engine.Scene(
         bodies=tuple(
-            RigidBody(
+            engine.RigidBody(
                 name=body.name,
                 mass=body.mass,
                 inertia=body.inertia,
@@ -173,19 +150,19 @@ def goes_straight(simulate: Simulate, speed: float) -> bool:
                 angular_velocity=body.angular_velocity,
             )
             for body in asked.bodies
-            if isinstance(body, RigidBody)
+            if isinstance(body, engine.RigidBody)
         ),
         constraints=asked.constraints,
         gravity=asked.gravity,
         contacts=False,
     )
-    observe = {"w": Trace(quantity=AngularVelocity("chassis"), first=30, every=30)}
+    observe = {"w": engine.Trace(quantity=engine.AngularVelocity("chassis"), first=30, every=30)}
     result = simulate(nudged, time_step=TIME_STEP, duration=2.0, observe=observe)
     rates = np.abs(result["w"][:, 2])
     return result.completed and bool(rates[-1] < rates[-2])
 
 
-def fastest(simulate: Simulate) -> BreakPoint:
+def fastest(simulate: case.Simulate) -> case.BreakPoint:
     """The fastest that runs straight with the stiff tyres in front."""
     return break_point(
         functools.partial(goes_straight, simulate), 0.7 * CRITICAL, 1.4 * CRITICAL, resolution=0.01, walk=5
@@ -195,22 +172,22 @@ def fastest(simulate: Simulate) -> BreakPoint:
 NEEDED = SPEED * yaw(SPEED) / GRAVITY  # µ of the understeering bend: V r/g, of both axles alike
 
 
-def holds(simulate: Simulate, friction: float) -> bool:
+def holds(simulate: case.Simulate, friction: float) -> bool:
     """Whether the understeering vehicle is in its bend after a second and a half, to one per cent."""
     asked = scene(SPEED)
     tyres = tuple(
-        replace(one, friction=friction) if isinstance(one, Tyre) else one for one in asked.constraints
+        replace(one, friction=friction) if isinstance(one, engine.Tyre) else one for one in asked.constraints
     )
     result = simulate(
         replace(asked, constraints=tyres),
         time_step=2.0 * TIME_STEP,
         steps=90,
-        observe={"w": Final(quantity=AngularVelocity("chassis"))},
+        observe={"w": engine.Final(quantity=engine.AngularVelocity("chassis"))},
     )
     return result.completed and abs(float(result["w"][2]) / yaw(SPEED) - 1.0) < 0.01
 
 
-def slipperiest(simulate: Simulate) -> BreakPoint:
+def slipperiest(simulate: case.Simulate) -> case.BreakPoint:
     """The least friction that holds the bend."""
     return break_point(
         functools.partial(holds, simulate), 4.0 * NEEDED, 0.5 * NEEDED, resolution=5e-3, walk=3
@@ -238,15 +215,15 @@ def linear(time: float) -> float:
     return float((steady + (modes * np.exp(roots * time)) @ parts)[1].real)
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Yaw rate a tenth of a second into the bend against the bicycle model's [rad/s]."""
-    observe = {"w": Final(quantity=AngularVelocity("chassis"))}
+    observe = {"w": engine.Final(quantity=engine.AngularVelocity("chassis"))}
     asked = scene(SPEED, leans=False)
     result = simulate(asked, time_step=time_step, duration=0.1, method=method, observe=observe)
     return float(result["w"][2]) - linear(0.1)
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Yaw rate per steering angle against the speed, of three vehicles."""
     curves, off = [], 0.0
     for name, front, rear in (
@@ -258,7 +235,7 @@ def draw(simulate: Simulate) -> Drawing:
         speeds = np.linspace(5.0, reach, 4)
         rates = []
         for speed in speeds:
-            observe = {"w": Final(quantity=AngularVelocity("chassis"))}
+            observe = {"w": engine.Final(quantity=engine.AngularVelocity("chassis"))}
             asked = scene(float(speed), front, rear)
             result = simulate(asked, time_step=TIME_STEP, duration=2.0, observe=observe)
             rates.append(float(result["w"][2]) / STEER)
@@ -268,7 +245,7 @@ def draw(simulate: Simulate) -> Drawing:
         off = max(off, *(abs(rate / right - 1.0) for rate, right in zip(rates, model, strict=True)))
         exact = [yaw(float(u), front, rear) / STEER for u in smooth]
         curves.append(line(f"{name}, bicycle model", smooth, exact, "reference"))
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="speed [m/s]",
         y_label="yaw rate per steering angle [1/s]",
@@ -291,7 +268,7 @@ def left_out(front: float, rear: float) -> float:
     return 1.1 * SLIPS * abs(turned) / (BASE + turned) + 4.0 * (STEER**2 + inner**2)
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Cornering",
     question="Does a vehicle on tyres go round a bend as the bicycle model says, with its understeer?",
     why="Whether a vehicle follows its wheels, runs wide or spins is decided by the slip of its tyres: the first thing that "
@@ -346,9 +323,9 @@ TEST = ScalarTest(
             ("oversteers, below its critical speed", "oversteer", HARD, SOFT),
         )
     ),
-    example=lambda: Example(scene=scene(SPEED, steer=0.03), time_step=TIME_STEP, duration=3.0),
+    example=lambda: case.Example(scene=scene(SPEED, steer=0.03), time_step=TIME_STEP, duration=3.0),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="critical-speed",
             title="Fastest that runs straight with the soft tyres behind",
             configuration="plain",
@@ -358,7 +335,7 @@ TEST = ScalarTest(
             expected=(0.97 * CRITICAL, 1.03 * CRITICAL),
             expected_source="V² = −L/K; within one per cent of the search and two of V² by the slow motion's start",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="slipperiest",
             title="Least friction that holds the bend",
             configuration="plain",
@@ -371,9 +348,9 @@ TEST = ScalarTest(
             "is asked, and the search's half",
         ),
     ),
-    figures=(Figure(name="gain", title="Yaw rate per steering angle", draw=draw),),
+    figures=(case.Figure(name="gain", title="Yaw rate per steering angle", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="into-the-bend",
             description="yaw rate after a tenth of a second against the bicycle model's; its chassis cannot lean",
             unit="rad/s",

@@ -6,18 +6,10 @@ import functools
 
 import numpy as np
 
-from spook_tracker.engine import Final, Method, RigidBody, Scene, Sphere, Trace, Velocity
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.sweep import line
 
@@ -28,24 +20,26 @@ WAY = 0.1037  # m, to the first blow
 DURATION = 0.5  # s
 COUNT = 5
 CLOSED = 1e-9 * RADIUS  # m: gaps up to a billionth of the larger radius count as closed
-SUCCESSIVE = Method(impacts="successive")
+SUCCESSIVE = engine.Method(impacts="successive")
 
 
-def scene(moving: int, restitution: float = 1.0, gap: float = 0.0, masses: tuple[float, ...] = ()) -> Scene:
+def scene(
+    moving: int, restitution: float = 1.0, gap: float = 0.0, masses: tuple[float, ...] = ()
+) -> engine.Scene:
     """Balls of 1 kg, or of `masses` [kg], in a row with `gap` [m] between; the first `moving` come at SPEED."""
     steel = Material(restitution=restitution)
     balls = tuple(
-        RigidBody(
+        engine.RigidBody(
             name=f"ball {k + 1}",
             mass=masses[k] if masses else 1.0,
-            shape=Sphere(RADIUS),
+            shape=engine.Sphere(RADIUS),
             position=(k * (2.0 * RADIUS + gap) - (WAY if k < moving else 0.0), 0.0, 0.0),
             velocity=(SPEED if k < moving else 0.0, 0.0, 0.0),
             material=steel,
         )
         for k in range(len(masses) or COUNT)
     )
-    return Scene(bodies=balls)
+    return engine.Scene(bodies=balls)
 
 
 def passed_on(moving: int, restitution: float, masses: tuple[float, ...] = (1.0,) * COUNT) -> np.ndarray:
@@ -71,14 +65,14 @@ def all_at_once(moving: int) -> np.ndarray:
     return np.array([SPEED - impulse / come] * come + [impulse / rest] * rest)
 
 
-def speeds(simulate: Simulate, built: Scene, method: Method) -> np.ndarray:
+def speeds(simulate: case.Simulate, built: engine.Scene, method: engine.Method) -> np.ndarray:
     """Speeds along the row after the blow [m/s]."""
-    observe = {"v": Final(quantity=Velocity())}
+    observe = {"v": engine.Final(quantity=engine.Velocity())}
     result = simulate(built, time_step=TIME_STEP, duration=DURATION, method=method, observe=observe)
     return np.asarray(result["v"][:, 0])
 
 
-def _measure_successive(simulate: Simulate) -> dict[str, float]:
+def _measure_successive(simulate: case.Simulate) -> dict[str, float]:
     rows = {
         "one_ball_error": (scene(1), passed_on(1, 1.0)),
         "two_balls_error": (scene(2), passed_on(2, 1.0)),
@@ -91,15 +85,15 @@ def _measure_successive(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def _measure_simultaneous(simulate: Simulate) -> dict[str, float]:
+def _measure_simultaneous(simulate: case.Simulate) -> dict[str, float]:
     apart = scene(1, gap=2.0 * TIME_STEP * SPEED)
     return {
-        "touching_error": float(np.abs(speeds(simulate, scene(1), Method()) - all_at_once(1)).max()),
-        "apart_error": float(np.abs(speeds(simulate, apart, Method()) - passed_on(1, 1.0)).max()),
+        "touching_error": float(np.abs(speeds(simulate, scene(1), engine.Method()) - all_at_once(1)).max()),
+        "apart_error": float(np.abs(speeds(simulate, apart, engine.Method()) - passed_on(1, 1.0)).max()),
     }
 
 
-def most_unequal(simulate: Simulate) -> BreakPoint:
+def most_unequal(simulate: case.Simulate) -> case.BreakPoint:
     """Largest ratio of masses of neighbours among three balls."""
 
     def passes(ratio: float) -> bool:
@@ -110,27 +104,27 @@ def most_unequal(simulate: Simulate) -> BreakPoint:
     return break_point(passes, 1.5, 1e6, resolution=0.1, walk=7)
 
 
-def tells_gaps(simulate: Simulate, gap: float) -> bool:
+def tells_gaps(simulate: case.Simulate, gap: float) -> bool:
     """Whether balls `gap` [m] apart pass a blow on one after the other, though touching ones meet at once."""
-    found = speeds(simulate, scene(1, gap=gap), Method())
+    found = speeds(simulate, scene(1, gap=gap), engine.Method())
     return float(np.abs(found - passed_on(1, 1.0)).max()) < 1e-9
 
 
-def narrowest(simulate: Simulate) -> BreakPoint:
+def narrowest(simulate: case.Simulate) -> case.BreakPoint:
     """The narrowest gap [m] that is told from none."""
     return break_point(functools.partial(tells_gaps, simulate), 1e-3, 1e-14, resolution=1e-2, walk=12)
 
 
-def _draw(simulate: Simulate) -> Drawing:
+def _draw(simulate: case.Simulate) -> case.Drawing:
     curves = []
-    for name, method in (("successive", SUCCESSIVE), ("simultaneous", Method())):
-        observe = {"v": Trace(quantity=Velocity(f"ball {COUNT}"))}
+    for name, method in (("successive", SUCCESSIVE), ("simultaneous", engine.Method())):
+        observe = {"v": engine.Trace(quantity=engine.Velocity(f"ball {COUNT}"))}
         result = simulate(scene(1), time_step=TIME_STEP, duration=DURATION, method=method, observe=observe)
         curves.append(line(name, result.sample_times["v"], result["v"][:, 0]))
-    return Drawing(curves=tuple(curves), x_label="time [s]", y_label="speed of the last ball [m/s]")
+    return case.Drawing(curves=tuple(curves), x_label="time [s]", y_label="speed of the last ball [m/s]")
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Newton's cradle",
     question="Does a blow pass through a row of touching balls as the order of impacts says?",
     why="Newton's law does not say what happens when bodies touch already: a single blow for all and one after the "
@@ -174,10 +168,10 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=scene(2), time_step=TIME_STEP, method=SUCCESSIVE, duration=1.0),
-    figures=(Figure(name="last-ball", title="Speed of the last ball", draw=_draw),),
+    example=lambda: case.Example(scene=scene(2), time_step=TIME_STEP, method=SUCCESSIVE, duration=1.0),
+    figures=(case.Figure(name="last-ball", title="Speed of the last ball", draw=_draw),),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="most-unequal",
             title="Largest ratio of masses of neighbours in a row of three",
             configuration="successive",
@@ -187,7 +181,7 @@ TEST = ScalarTest(
             expected=(1e6, 1e6),
             expected_source="a blow of two bodies is one row: rounding does not grow with the ratio; the search ends at 1e6",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="narrowest",
             title="Narrowest gap between balls that is told from none",
             configuration="simultaneous",

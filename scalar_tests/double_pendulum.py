@@ -9,39 +9,15 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from spook_tracker.engine import (
-    PLAIN,
-    WORLD,
-    AngularMomentum,
-    Hinge,
-    JointCoordinate,
-    MaximumAbsolute,
-    Method,
-    RigidBody,
-    Scene,
-    Trace,
-)
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Body
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-    Unobserved,
-)
 from spook_tracker.scalar_tests.sweep import line
 
-HALF_STEP_CURVED = Method(half_step_velocities=True, corrections=2)
-ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")
-ORDER_8 = Method(composition="order8")
+HALF_STEP_CURVED = engine.Method(half_step_velocities=True, corrections=2)
+ORDER_4, ORDER_6 = engine.Method(composition="order4"), engine.Method(composition="order6")
+ORDER_8 = engine.Method(composition="order8")
 LENGTH, MASS, GRAVITY = 1.0, 1.0, 9.81  # m, kg, m/s²
 ACROSS, ALONG = MASS * LENGTH**2 / 12.0, 1e-3  # kg m²
 TIME_STEP, DURATION = 1e-3, 2.0  # s: before the motion is chaotic enough to hide the order
@@ -53,17 +29,20 @@ DRIFT = (0.3, -0.2, 0.5)  # m/s, of the free pair
 TURN = (0.7, 2.0, -0.4)  # rad/s
 
 
-def scene(time_step: float) -> Scene:
+def scene(time_step: float) -> engine.Scene:
     """Two level rods in a row from a hinge in the world at the origin, along x, at rest; both turn about y."""
-    return Scene(
+    return engine.Scene(
         bodies=tuple(_rod(k) for k in (0, 1)),
-        constraints=(_hinge(WORLD, "rod 1", 0.0, time_step), _hinge("rod 1", "rod 2", LENGTH, time_step)),
+        constraints=(
+            _hinge(engine.WORLD, "rod 1", 0.0, time_step),
+            _hinge("rod 1", "rod 2", LENGTH, time_step),
+        ),
         gravity=(0.0, 0.0, -GRAVITY),
         contacts=False,
     )
 
 
-def free_scene(time_step: float) -> Scene:
+def free_scene(time_step: float) -> engine.Scene:
     """The same pair without the world's hinge and gravity, drifting and turning as one body at the start."""
     rods: list[Body] = []
     for k in (0, 1):
@@ -71,11 +50,11 @@ def free_scene(time_step: float) -> Scene:
         x, y, z = (np.array(DRIFT) + np.cross(TURN, arm)).tolist()
         rods.append(_rod(k, velocity=(x, y, z), turn=TURN))
     hinge = _hinge("rod 1", "rod 2", LENGTH, time_step)
-    return Scene(bodies=tuple(rods), constraints=(hinge,), gravity=(0.0, 0.0, 0.0), contacts=False)
+    return engine.Scene(bodies=tuple(rods), constraints=(hinge,), gravity=(0.0, 0.0, 0.0), contacts=False)
 
 
-def _rod(k: int, velocity: Any = (0.0, 0.0, 0.0), turn: Any = (0.0, 0.0, 0.0)) -> RigidBody:
-    return RigidBody(
+def _rod(k: int, velocity: Any = (0.0, 0.0, 0.0), turn: Any = (0.0, 0.0, 0.0)) -> engine.RigidBody:
+    return engine.RigidBody(
         name=f"rod {k + 1}",
         mass=MASS,
         inertia=(ALONG, ACROSS, ACROSS),
@@ -85,8 +64,8 @@ def _rod(k: int, velocity: Any = (0.0, 0.0, 0.0), turn: Any = (0.0, 0.0, 0.0)) -
     )
 
 
-def _hinge(first: str, second: str, x: float, time_step: float) -> Hinge:
-    return Hinge(
+def _hinge(first: str, second: str, x: float, time_step: float) -> engine.Hinge:
+    return engine.Hinge(
         name=f"{first} to {second}",
         between=(first, second),
         at=(x, 0.0, 0.0),
@@ -96,10 +75,10 @@ def _hinge(first: str, second: str, x: float, time_step: float) -> Hinge:
     )
 
 
-def hanging(time_step: float, heavier: float) -> Scene:
+def hanging(time_step: float, heavier: float) -> engine.Scene:
     """The pair hangs straight down; the lower rod, so many times as heavy, is nudged by NUDGE about its hinge."""
     rods: list[Body] = [
-        RigidBody(
+        engine.RigidBody(
             name=f"rod {k + 1}",
             mass=mass * MASS,
             inertia=(mass * ACROSS, mass * ACROSS, mass * ALONG),
@@ -111,9 +90,9 @@ def hanging(time_step: float, heavier: float) -> Scene:
     ]
     hinges = tuple(
         replace(_hinge(first, second, 0.0, time_step), at=(0.0, 0.0, -k * LENGTH))
-        for k, (first, second) in enumerate(((WORLD, "rod 1"), ("rod 1", "rod 2")))
+        for k, (first, second) in enumerate(((engine.WORLD, "rod 1"), ("rod 1", "rod 2")))
     )
-    return Scene(bodies=tuple(rods), constraints=hinges, gravity=(0.0, 0.0, -GRAVITY), contacts=False)
+    return engine.Scene(bodies=tuple(rods), constraints=hinges, gravity=(0.0, 0.0, -GRAVITY), contacts=False)
 
 
 def fastest_rate(heavier: float) -> float:
@@ -146,10 +125,10 @@ def exact(times: tuple[float, ...]) -> np.ndarray:
     return np.asarray(found.y[:2].T)
 
 
-def angles(simulate: Simulate, time_step: float, method: Method) -> tuple[np.ndarray, np.ndarray]:
+def angles(simulate: case.Simulate, time_step: float, method: engine.Method) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and (time, 2) angles [rad] from level, downwards."""
-    hinges = {"first": f"{WORLD} to rod 1", "second": "rod 1 to rod 2"}
-    observe = {name: Trace(quantity=JointCoordinate(hinge)) for name, hinge in hinges.items()}
+    hinges = {"first": f"{engine.WORLD} to rod 1", "second": "rod 1 to rod 2"}
+    observe = {name: engine.Trace(quantity=engine.JointCoordinate(hinge)) for name, hinge in hinges.items()}
     result = simulate(
         scene(time_step), time_step=time_step, duration=DURATION, method=method, observe=observe
     )
@@ -157,28 +136,30 @@ def angles(simulate: Simulate, time_step: float, method: Method) -> tuple[np.nda
     return result.sample_times["first"], np.stack([first, first + result["second"]], axis=1)
 
 
-def error_after_a_second(simulate: Simulate, time_step: float, method: Method) -> float:
+def error_after_a_second(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest |angle − exact angle| of both rods after 1 s [rad]; the largest on the way jumps from swing to swing."""
     times, found = angles(simulate, time_step, method)
     second = round(1.0 / time_step)
     return float(np.abs(found[second] - exact(tuple(times.tolist()))[second]).max())
 
 
-def angle_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def angle_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest |angle − exact angle| of both rods over 2 s [rad]."""
     times, found = angles(simulate, time_step, method)
     return float(np.abs(found - exact(tuple(times.tolist()))).max())
 
 
-def swings(simulate: Simulate) -> dict[str, float]:
+def swings(simulate: case.Simulate) -> dict[str, float]:
     """Angles against the tight integration."""
-    return {"angle_error": angle_error(simulate, TIME_STEP, PLAIN)}
+    return {"angle_error": angle_error(simulate, TIME_STEP, engine.PLAIN)}
 
 
-def keeps_turning(simulate: Simulate) -> dict[str, float]:
+def keeps_turning(simulate: case.Simulate) -> dict[str, float]:
     """Drift of the free pair's angular momentum about three points, over its size about each."""
     observe = {
-        f"{name} {i}": MaximumAbsolute(quantity=AngularMomentum(about), from_start=name == "drift")
+        f"{name} {i}": engine.MaximumAbsolute(
+            quantity=engine.AngularMomentum(about), from_start=name == "drift"
+        )
         for i, about in enumerate(ABOUT)
         for name in ("drift", "size")
     }
@@ -189,30 +170,30 @@ def keeps_turning(simulate: Simulate) -> dict[str, float]:
     return {"angular_momentum_drift": float(max(drifts))}
 
 
-def hangs(simulate: Simulate, time_step: float, heavier: float = 1.0) -> bool:
+def hangs(simulate: case.Simulate, time_step: float, heavier: float = 1.0) -> bool:
     """Whether the nudged pair swings no wider than a hundred times what the nudge turns in a step, for HUNG_STEPS."""
-    observe = {"turn": MaximumAbsolute(quantity=JointCoordinate("rod 1 to rod 2"))}
+    observe = {"turn": engine.MaximumAbsolute(quantity=engine.JointCoordinate("rod 1 to rod 2"))}
     result = simulate(hanging(time_step, heavier), time_step=time_step, steps=HUNG_STEPS, observe=observe)
     return result.completed and float(result["turn"]) < 100.0 * time_step * NUDGE
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step [s] in which the hanging pair stays."""
     return break_point(functools.partial(hangs, simulate), 0.02, 2.0, resolution=2e-3, walk=5)
 
 
-def heaviest(simulate: Simulate) -> BreakPoint:
+def heaviest(simulate: case.Simulate) -> case.BreakPoint:
     """The heaviest lower rod, over the upper one, that stays at HUNG_STEP."""
     holds = functools.partial(hangs, simulate, HUNG_STEP)
     return break_point(holds, 1.0, HEAVIEST, walk=7)
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Both angles against time."""
-    times, found = angles(simulate, TIME_STEP, PLAIN)
+    times, found = angles(simulate, TIME_STEP, engine.PLAIN)
     times, found = times[::20], found[::20]
     right = exact(tuple(times.tolist()))
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("first rod", times, np.degrees(found[:, 0])),
             line("second rod", times, np.degrees(found[:, 1])),
@@ -225,7 +206,7 @@ def draw(simulate: Simulate) -> Drawing:
 
 
 HANGS = "nudged by 1e-6 rad/s the lower rod turns by no more than a hundred times what that is in a step, in 200 steps"
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Double pendulum of rods",
     question="Does a double pendulum of two rods follow its equations of motion?",
     why="Two hinged bodies are the smallest scene where rotation, joints and gravity all couple, and its path forgets "
@@ -248,11 +229,11 @@ TEST = ScalarTest(
     conclusion="Green: coupled bodies move as they should. Red: a torque, a lever or an inertia is wrong in the joint.",
     source="ours; the multibody library's method of reference",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="angle_error",
                     description="largest |angle − exact| of both rods over 2 s",
                     unit="rad",
@@ -266,11 +247,11 @@ TEST = ScalarTest(
             measure=swings,
             note="the SPOOK step as it stands",
         ),
-        Measurement(
+        case.Measurement(
             configuration="free",
             time_step=FREE_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="angular_momentum_drift",
                     description="largest |L − L₀| over |L| about three points, the worst",
                     unit="1",
@@ -285,43 +266,43 @@ TEST = ScalarTest(
             note="the pair alone in space, plain SPOOK",
         ),
     ),
-    example=lambda: Example(scene=scene(TIME_STEP), time_step=TIME_STEP),
-    figures=(Figure(name="angles", title="Angles of both rods", draw=draw),),
+    example=lambda: case.Example(scene=scene(TIME_STEP), time_step=TIME_STEP),
+    figures=(case.Figure(name="angles", title="Angles of both rods", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="angle",
             description="largest angle error of both rods over 2 s against the tight integration",
             unit="rad",
             time_steps=tuple(1.0 / n for n in (60, 120, 250, 500, 1000, 2000, 4000)),
             configurations=(
-                Configuration(
-                    name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 4000, 1 / 500)
+                case.Configuration(
+                    name="plain", method=engine.PLAIN, expected_order=1.0, order_range=(1 / 4000, 1 / 500)
                 ),
-                Configuration(
+                case.Configuration(
                     name="half-step, curved twice",
                     method=HALF_STEP_CURVED,
                     expected_order=2.0,
                     order_range=(1 / 4000, 1 / 250),
                 ),
-                Configuration(
+                case.Configuration(
                     name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1 / 500, 1 / 60)
                 ),
-                Configuration(
+                case.Configuration(
                     name="order 6", method=ORDER_6, expected_order=6.0, order_range=(1 / 250, 1 / 60)
                 ),
-                Configuration(name="order 8", method=ORDER_8, expected_order=None),
+                case.Configuration(name="order 8", method=ORDER_8, expected_order=None),
             ),
             error=angle_error,
             target_error=0.02,
             target_seconds=0.02,
         ),
-        Ladder(
+        case.Ladder(
             name="high-order",
             description="angle error of both rods after 1 s against the tight integration",
             unit="rad",
             time_steps=tuple(1.0 / n for n in (40, 50, 60, 80)),
             configurations=tuple(
-                Configuration(name=name, method=method, expected_order=order)
+                case.Configuration(name=name, method=method, expected_order=order)
                 for name, method, order in (
                     ("order4", ORDER_4, 4.0),
                     ("order6", ORDER_6, 6.0),
@@ -329,13 +310,13 @@ TEST = ScalarTest(
                 )
             ),
             error=error_after_a_second,
-            run=Unobserved(angle_error),
+            run=case.Unobserved(angle_error),
             target_error=1e-4,
             target_seconds=0.01,
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest step in which the hanging pair stays",
             configuration="plain",
@@ -346,7 +327,7 @@ TEST = ScalarTest(
             expected_source="gravity is taken where a step begins: stable while h ω < 2 for the faster mode; to the resolution of "
             "the search, and what 200 steps tell",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="heaviest-below",
             title="Heaviest lower rod, over the upper one, that hangs still at h = 1/60 s",
             configuration="plain",

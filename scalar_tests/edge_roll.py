@@ -4,30 +4,10 @@ from __future__ import annotations
 
 import math
 
-from spook_tracker.engine import (
-    PLAIN,
-    AngularVelocity,
-    Box,
-    Final,
-    Method,
-    RigidBody,
-    Scene,
-    Sphere,
-    Velocity,
-)
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.sweep import apart, line
 
@@ -46,26 +26,26 @@ KEPT, COARSE = 0.8, 1e-3  # of a rolling ball's spin in flight; s
 SMOOTHEST = (0.2157, 0.2532)
 
 
-def scene(speed: float, rolling: bool, rough: float = ROUGH) -> Scene:
+def scene(speed: float, rolling: bool, rough: float = ROUGH) -> engine.Scene:
     """A ball near the edge of a table, rolling on a `rough` one or sliding on a smooth one."""
     surface = Material(friction=rough if rolling else 0.0)
-    table = RigidBody(
+    table = engine.RigidBody(
         name="table",
         motion="static",
-        shape=Box((1.0, 1.0, 1.0)),
+        shape=engine.Box((1.0, 1.0, 1.0)),
         position=(-0.5, 0.0, -0.5),
         material=surface,
     )
-    ball = RigidBody(
+    ball = engine.RigidBody(
         name="ball",
         mass=MASS,
-        shape=Sphere(RADIUS),
+        shape=engine.Sphere(RADIUS),
         position=(-RUN_UP, 0.0, RADIUS),
         velocity=(speed, 0.0, 0.0),
         angular_velocity=(0.0, speed / RADIUS if rolling else 0.0, 0.0),
         material=surface,
     )
-    return Scene(bodies=(table, ball), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(table, ball), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def departure(speed: float, rolling: bool) -> tuple[float, float]:
@@ -90,17 +70,20 @@ def last_hop(speed: float, rolling: bool, time_step: float = TIME_STEP) -> float
 
 
 def errors(
-    simulate: Simulate, speed: float, rolling: bool, time_step: float = TIME_STEP
+    simulate: case.Simulate, speed: float, rolling: bool, time_step: float = TIME_STEP
 ) -> tuple[float, float]:
     """Errors of the level speed [m/s] and of the spin [rad/s] in flight, which nothing changes any more."""
-    observe = {"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))}
+    observe = {
+        "v": engine.Final(quantity=engine.Velocity("ball")),
+        "w": engine.Final(quantity=engine.AngularVelocity("ball")),
+    }
     result = simulate(scene(speed, rolling), time_step=time_step, duration=DURATION, observe=observe)
     angle, leaving = departure(speed, rolling)
     spin = leaving / RADIUS if rolling else 0.0
     return float(result["v"][0]) - leaving * math.cos(angle), float(result["w"][1]) - spin
 
 
-def _measure(simulate: Simulate) -> dict[str, float]:
+def _measure(simulate: case.Simulate) -> dict[str, float]:
     sliding, _ = errors(simulate, SLOW, False)
     _, rolling = errors(simulate, SLOW, True)
     fast = [errors(simulate, FAST, rolling) for rolling in (False, True)]
@@ -112,9 +95,9 @@ def _measure(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Error of its level speed in flight [m/s]."""
-    observe = {"v": Final(quantity=Velocity("ball"))}
+    observe = {"v": engine.Final(quantity=engine.Velocity("ball"))}
     result = simulate(
         scene(SLOW, False), time_step=time_step, duration=DURATION, method=method, observe=observe
     )
@@ -128,11 +111,11 @@ def gain(speed: float) -> float:
     return leaving * math.cos(angle) / speed - 1.0
 
 
-def fastest_pushed(simulate: Simulate) -> BreakPoint:
+def fastest_pushed(simulate: case.Simulate) -> case.BreakPoint:
     """Highest speed [m/s] at which the edge pushes a smooth ball on by PUSHED of its level speed."""
 
     def is_pushed(speed: float) -> bool:
-        observe = {"v": Final(quantity=Velocity("ball"))}
+        observe = {"v": engine.Final(quantity=engine.Velocity("ball"))}
         result = simulate(scene(speed, False), time_step=TIME_STEP, duration=DURATION, observe=observe)
         return float(result["v"][0]) > speed * (1.0 + PUSHED)
 
@@ -152,12 +135,12 @@ def expected_pushed() -> tuple[float, float]:
     return bounds[0], bounds[1]
 
 
-def smoothest(simulate: Simulate) -> BreakPoint:
+def smoothest(simulate: case.Simulate) -> case.BreakPoint:
     """The least friction with which the edge spins a ball up to KEPT of what rolling does."""
     wanted = KEPT * departure(SLOW, True)[1] / RADIUS
 
     def spun(friction: float) -> bool:
-        observe = {"w": Final(quantity=AngularVelocity("ball"))}
+        observe = {"w": engine.Final(quantity=engine.AngularVelocity("ball"))}
         asked = scene(SLOW, True, friction)
         result = simulate(asked, time_step=COARSE, duration=0.65, observe=observe)
         return result.completed and float(result["w"][1]) > wanted
@@ -165,7 +148,7 @@ def smoothest(simulate: Simulate) -> BreakPoint:
     return break_point(spun, 0.5, 0.1, resolution=0.02, walk=4)
 
 
-def _draw(simulate: Simulate) -> Drawing:
+def _draw(simulate: case.Simulate) -> case.Drawing:
     speeds = tuple(0.1 * k for k in range(1, 13))
     step = 4.0 * TIME_STEP
     found = tuple(
@@ -176,7 +159,7 @@ def _draw(simulate: Simulate) -> Drawing:
     right = tuple(
         math.cos(angle) * leaving for angle, leaving in (departure(speed, False) for speed in speeds)
     )
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("smooth edge", speeds, found, "points"),
             line("closed form", speeds, right, "reference"),
@@ -187,7 +170,7 @@ def _draw(simulate: Simulate) -> Drawing:
     )
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Over the edge",
     question="Does a ball leave the edge of a table where its contact force ends?",
     why="An edge is the place where contacts change their normal in every step; engines catch on it, or let go early.",
@@ -245,17 +228,23 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=scene(SLOW, True), time_step=4.0 * TIME_STEP, duration=DURATION),
-    figures=(Figure(name="speed", title="Level speed in flight against speed on the table", draw=_draw),),
+    example=lambda: case.Example(scene=scene(SLOW, True), time_step=4.0 * TIME_STEP, duration=DURATION),
+    figures=(
+        case.Figure(name="speed", title="Level speed in flight against speed on the table", draw=_draw),
+    ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="sliding",
             description="level speed in flight of a ball that slides off at 0.3 m/s, against the closed form",
             unit="m/s",
             time_steps=(4e-3, 1e-3, 2.5e-4, 6.25e-5),
             configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),  # where the last hop ends
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+                case.Configuration(
+                    name="direct", method=engine.PLAIN, expected_order=None
+                ),  # where the last hop ends
+                case.Configuration(
+                    name="iterative", method=engine.Method(solver="iterative"), expected_order=None
+                ),
             ),
             error=ladder_error,
             target_error=1e-3,
@@ -263,7 +252,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="fastest-pushed",
             title="Fastest smooth ball that the edge pushes on by a hundredth",
             configuration="plain",
@@ -273,7 +262,7 @@ TEST = ScalarTest(
             expected=expected_pushed(),
             expected_source="energy and the end of the contact force; g h of level speed for the last hop, and the half per cent of the search",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="smoothest",
             title="Least friction with which the edge spins a ball up to 0.8 of what rolling does",
             configuration="plain",

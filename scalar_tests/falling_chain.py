@@ -9,38 +9,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    Ball,
-    Capsule,
-    ContactForce,
-    Energy,
-    Final,
-    Material,
-    MaximumAbsolute,
-    Method,
-    Momentum,
-    Penetration,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_count, break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.rope import ragdoll
@@ -54,7 +26,7 @@ FLOOR, DOLL_PUSH = -1.2, (1.0, 0.7, -1.0)  # m, m/s: of the ragdoll
 FRICTION = 0.5
 TIME_STEP = 1.0 / 60.0  # s
 DURATION = 0.75  # s
-ROUGH = Material(friction=FRICTION)
+ROUGH = engine.Material(friction=FRICTION)
 COUNTS = (5, 20, 80, 320)  # links that are let fall flat
 LOW, ALONG, LANDED = 0.05, 3.0, 0.5  # m, m/s, s: from where, how fast ahead, and when it slides on the floor
 DRAWN, NUDGE, SLIDES = 10.0, 1e-7, 40  # m/s, m and steps of a chain that is drawn
@@ -63,15 +35,15 @@ SEARCHED = 4e-3  # the search's resolution
 LONGEST = 0.0607347
 
 
-def floor(height: float) -> RigidBody:
+def floor(height: float) -> engine.RigidBody:
     """Rough and level."""
-    return RigidBody(
-        name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, height), material=ROUGH
+    return engine.RigidBody(
+        name="floor", motion="static", shape=engine.Plane(), position=(0.0, 0.0, height), material=ROUGH
     )
 
 
 @functools.cache
-def chain(count: int = LINKS) -> Scene:
+def chain(count: int = LINKS) -> engine.Scene:
     """Capsules on ball joints in a zigzag over the floor, pushed sideways."""
     links, joints, x, z = [], [], 0.0, DROP
     for k in range(count):
@@ -79,10 +51,10 @@ def chain(count: int = LINKS) -> Scene:
         along, up = LENGTH * math.cos(lean), LENGTH * math.sin(lean)
         turn = 0.5 * (0.5 * math.pi - lean)
         links.append(
-            RigidBody(
+            engine.RigidBody(
                 name=f"link {k}",
                 mass=MASS,
-                shape=Capsule(RADIUS, LENGTH - 2.0 * RADIUS),
+                shape=engine.Capsule(RADIUS, LENGTH - 2.0 * RADIUS),
                 position=(x + 0.5 * along, 0.0, z + 0.5 * up),
                 orientation=(math.cos(turn), 0.0, math.sin(turn), 0.0),
                 velocity=PUSH,
@@ -91,9 +63,9 @@ def chain(count: int = LINKS) -> Scene:
         )
         if k > 0:
             ends = (f"link {k - 1}", f"link {k}")
-            joints.append(Ball(name=f"joint {k}", between=ends, at=(x, 0.0, z), compliance=0.0))
+            joints.append(engine.Ball(name=f"joint {k}", between=ends, at=(x, 0.0, z), compliance=0.0))
         x, z = x + along, z + up
-    return Scene(
+    return engine.Scene(
         bodies=(floor(0.0), *links),
         constraints=tuple(joints),
         gravity=(0.0, 0.0, -GRAVITY),
@@ -101,17 +73,19 @@ def chain(count: int = LINKS) -> Scene:
     )
 
 
-def flat(turns: tuple[float, ...], height: float, speed: float) -> tuple[list[RigidBody], list[Ball]]:
+def flat(
+    turns: tuple[float, ...], height: float, speed: float
+) -> tuple[list[engine.RigidBody], list[engine.Ball]]:
     """Links in a row along −x behind the origin, each turned about the vertical [rad]; the first joint has nothing before it."""
     links, joints, x, y = [], [], 0.0, 0.0
     for k, turn in enumerate(turns):
         along, aside = LENGTH * math.cos(turn), LENGTH * math.sin(turn)
         c, s = math.sqrt(0.5) * math.cos(0.5 * turn), math.sqrt(0.5) * math.sin(0.5 * turn)
         links.append(
-            RigidBody(
+            engine.RigidBody(
                 name=f"link {k}",
                 mass=MASS,
-                shape=Capsule(RADIUS, LENGTH - 2.0 * RADIUS),
+                shape=engine.Capsule(RADIUS, LENGTH - 2.0 * RADIUS),
                 position=(x - 0.5 * along, y - 0.5 * aside, height + RADIUS),
                 orientation=(c, -s, c, s),
                 velocity=(speed, 0.0, 0.0),
@@ -119,16 +93,18 @@ def flat(turns: tuple[float, ...], height: float, speed: float) -> tuple[list[Ri
             )
         )
         ends = (f"link {k - 1}" if k else "head", f"link {k}")
-        joints.append(Ball(name=f"joint {k}", between=ends, at=(x, y, height + RADIUS), compliance=0.0))
+        joints.append(
+            engine.Ball(name=f"joint {k}", between=ends, at=(x, y, height + RADIUS), compliance=0.0)
+        )
         x, y = x - along, y - aside
     return links, joints
 
 
 @functools.cache
-def row(count: int) -> Scene:
+def row(count: int) -> engine.Scene:
     """A straight chain a little above the floor, going ahead along itself."""
     links, joints = flat((0.0,) * count, LOW, ALONG)
-    return Scene(
+    return engine.Scene(
         bodies=(floor(0.0), *links),
         constraints=tuple(joints[1:]),
         gravity=(0.0, 0.0, -GRAVITY),
@@ -137,14 +113,16 @@ def row(count: int) -> Scene:
 
 
 @functools.cache
-def drawn() -> Scene:
+def drawn() -> engine.Scene:
     """A chain on the floor behind a head that draws it on steadily; its joints lie to the left and right of the line."""
     aside = [0.0] + [NUDGE * (-1.0) ** k for k in range(LINKS)]
     turns = tuple(math.asin((one - other) / LENGTH) for one, other in itertools.pairwise(aside))
     links, joints = flat(turns, 0.0, DRAWN)
-    head = RigidBody(name="head", motion="kinematic", position=(0.0, 0.0, RADIUS), velocity=(DRAWN, 0.0, 0.0))
+    head = engine.RigidBody(
+        name="head", motion="kinematic", position=(0.0, 0.0, RADIUS), velocity=(DRAWN, 0.0, 0.0)
+    )
     names = [head.name] + [link.name for link in links]
-    return Scene(
+    return engine.Scene(
         bodies=(floor(0.0), head, *links),
         constraints=tuple(joints),
         gravity=(0.0, 0.0, -GRAVITY),
@@ -153,10 +131,10 @@ def drawn() -> Scene:
 
 
 @functools.cache
-def doll() -> Scene:
+def doll() -> engine.Scene:
     """The ragdoll of the rope's question, tumbling onto the floor; its parts do not touch each other."""
     thrown = ragdoll()
-    still = [body for body in thrown.bodies if isinstance(body, RigidBody)]
+    still = [body for body in thrown.bodies if isinstance(body, engine.RigidBody)]
     mean = np.mean([body.velocity for body in still], axis=0)
     parts = []
     for body in still:
@@ -171,15 +149,19 @@ def doll() -> Scene:
     )
 
 
-def measure(simulate: Simulate, scene: Scene, time_step: float, method: Method = PLAIN) -> dict[str, float]:
+def measure(
+    simulate: case.Simulate, scene: engine.Scene, time_step: float, method: engine.Method = engine.PLAIN
+) -> dict[str, float]:
     """Momentum against all that acts, and the energy of every step."""
-    moving = [body for body in scene.bodies if isinstance(body, RigidBody) and body.motion == "dynamic"]
+    moving = [
+        body for body in scene.bodies if isinstance(body, engine.RigidBody) and body.motion == "dynamic"
+    ]
     observe: dict[str, Observable] = {
-        "p": Trace(quantity=Momentum()),
-        "E": Trace(quantity=Energy()),
-        "deep": MaximumAbsolute(quantity=Penetration()),
+        "p": engine.Trace(quantity=engine.Momentum()),
+        "E": engine.Trace(quantity=engine.Energy()),
+        "deep": engine.MaximumAbsolute(quantity=engine.Penetration()),
     }
-    observe |= {body.name: Trace(quantity=ContactForce(body.name, "floor")) for body in moving}
+    observe |= {body.name: engine.Trace(quantity=engine.ContactForce(body.name, "floor")) for body in moving}
     result = simulate(scene, time_step=time_step, duration=DURATION, method=method, observe=observe)
     weight = np.array(scene.gravity) * math.fsum(body.mass or 0.0 for body in moving)
     pushed = sum(result[body.name][1:] for body in moving)
@@ -193,9 +175,9 @@ def measure(simulate: Simulate, scene: Scene, time_step: float, method: Method =
     }
 
 
-def longest(simulate: Simulate) -> BreakPoint:
+def longest(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step in which a chain is drawn over the floor straight."""
-    observe = {"x": MaximumAbsolute(quantity=Position())}
+    observe = {"x": engine.MaximumAbsolute(quantity=engine.Position())}
 
     def straight(time_step: float) -> bool:
         result = simulate(drawn(), time_step=time_step, steps=SLIDES, observe=observe)
@@ -204,9 +186,12 @@ def longest(simulate: Simulate) -> BreakPoint:
     return break_point(straight, 0.7 * LONGEST, 1.4 * LONGEST, resolution=SEARCHED, walk=2)
 
 
-def most_links(simulate: Simulate) -> BreakPoint:
+def most_links(simulate: case.Simulate) -> case.BreakPoint:
     """The largest number of links that land and slide as one."""
-    observe: dict[str, Observable] = {"v": Final(quantity=Velocity()), "E": Trace(quantity=Energy())}
+    observe: dict[str, Observable] = {
+        "v": engine.Final(quantity=engine.Velocity()),
+        "E": engine.Trace(quantity=engine.Energy()),
+    }
 
     def together(count: int) -> bool:
         result = simulate(row(count), time_step=TIME_STEP, duration=LANDED, observe=observe)
@@ -218,21 +203,21 @@ def most_links(simulate: Simulate) -> BreakPoint:
     return break_count(together, COUNTS)
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Momentum that came from nowhere, of a chain of three, over the largest."""
     return measure(simulate, chain(FEW), time_step, method)["momentum_error"]
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Energy of both, over that at the start."""
     curves, gains = [], []
     for name, scene in (("chain", chain()), ("ragdoll", doll())):
-        observe = {"E": Trace(quantity=Energy())}
+        observe = {"E": engine.Trace(quantity=engine.Energy())}
         result = simulate(scene, time_step=TIME_STEP, duration=DURATION, observe=observe)
         lost = (result["E"] - result["E"][0]) / abs(float(result["E"][0]))
         gains.append(float(np.diff(result["E"]).max()))
         curves.append(line(name, result.sample_times["E"], lost))
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="time [s]",
         y_label="energy less that of the start, over it",
@@ -246,7 +231,7 @@ def swung(height: float, length: float) -> float:
     return 2.0 * GRAVITY * height * TIME_STEP**2 / (4.0 * length)
 
 
-def _asked(configuration: str, scene: Scene, note: str, deep: float) -> Measurement:
+def _asked(configuration: str, scene: engine.Scene, note: str, deep: float) -> case.Measurement:
     return ask(
         functools.partial(measure, scene=scene, time_step=TIME_STEP),
         (
@@ -279,7 +264,7 @@ def _asked(configuration: str, scene: Scene, note: str, deep: float) -> Measurem
     )
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Falling chain",
     question="Do a chain of capsules and a ragdoll that fall on the floor keep the books of momentum, and lose energy only?",
     why="Chains and ragdolls are where contacts and joints act on the same bodies at once: a blow runs through all of them. "
@@ -307,10 +292,10 @@ TEST = ScalarTest(
         _asked("plain", chain(), "a chain of five capsules", swung(DROP + LINKS * LENGTH, LENGTH)),
         _asked("ragdoll", doll(), "a ragdoll of eleven parts", swung(-FLOOR, 0.4)),
     ),
-    example=lambda: Example(scene=doll(), time_step=TIME_STEP, duration=DURATION),
-    figures=(Figure(name="energy", title="Energy over time", draw=draw),),
+    example=lambda: case.Example(scene=doll(), time_step=TIME_STEP, duration=DURATION),
+    figures=(case.Figure(name="energy", title="Energy over time", draw=draw),),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest time step in which a chain of five is drawn over the floor straight",
             configuration="plain",
@@ -322,7 +307,7 @@ TEST = ScalarTest(
             expected_source="h ω = 2 of the fastest swing sideways under the friction of all that is behind, run step by step in its "
             "linear form; friction across, µ m g/v a speed, takes little of it. The search ends 0.4 % short of it at most",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="most-links",
             title="Largest number of links that land flat and slide as one",
             configuration="plain",
@@ -336,7 +321,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="momentum",
             description="momentum of a chain of three that came from nowhere: none is right",
             unit="1",

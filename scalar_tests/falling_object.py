@@ -7,31 +7,11 @@ import math
 from dataclasses import replace
 from typing import Any
 
-from spook_tracker.engine import (
-    PLAIN,
-    Final,
-    Method,
-    Particle,
-    Position,
-    Scene,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.theory import free_fall_error
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
@@ -40,19 +20,22 @@ GRAVITY = 9.81  # m/s²
 DURATION = 20.0  # s
 TIME_STEP = 1.0 / 60.0  # s
 TIME_STEPS = (0.1, 0.05, 0.025, 0.0125, 0.00625)  # s, those of Figs 3.12 and 3.13
-HALF_STEP = Method(half_step_velocities=True)
+HALF_STEP = engine.Method(half_step_velocities=True)
 EXPECTED = free_fall_error(GRAVITY, DURATION, TIME_STEP)  # m: ½ g t h, 1.635
 PRINTED = 4.904  # m, the thesis' limit
 LONGEST = 2.0 * PRINTED / (GRAVITY * DURATION)  # s, .04999: ½ g t h is the limit
 # Places from 2^k to 2^(k+1) m are 2^(k−52) m apart, and a step of g h² is lost if it is less than half of that
 HIGHEST = 2.0 ** (53 + math.floor(math.log2(GRAVITY * TIME_STEP**2)) + 1)  # m, 2^45
-ENDS = {"position": Final(quantity=Position("sphere")), "velocity": Final(quantity=Velocity("sphere"))}
+ENDS = {
+    "position": engine.Final(quantity=engine.Position("sphere")),
+    "velocity": engine.Final(quantity=engine.Velocity("sphere")),
+}
 
 
-def scene() -> Scene:
+def scene() -> engine.Scene:
     """One sphere, at rest at the origin; nothing to hit."""
-    sphere = Particle(name="sphere", position=(0.0, 0.0, 0.0), mass=MASS)
-    return Scene(bodies=(sphere,), gravity=(0.0, 0.0, -GRAVITY))
+    sphere = engine.Particle(name="sphere", position=(0.0, 0.0, 0.0), mass=MASS)
+    return engine.Scene(bodies=(sphere,), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def fallen(time: Any) -> Any:
@@ -60,13 +43,15 @@ def fallen(time: Any) -> Any:
     return 0.5 * GRAVITY * time**2
 
 
-def fall(simulate: Simulate, time_step: float, method: Method = PLAIN) -> tuple[float, float]:
+def fall(
+    simulate: case.Simulate, time_step: float, method: engine.Method = engine.PLAIN
+) -> tuple[float, float]:
     """Depth [m] and speed downwards [m/s] at the end."""
     result = simulate(scene(), time_step=time_step, duration=DURATION, method=method, observe=ENDS)
     return -float(result["position"][2]), -float(result["velocity"][2])
 
 
-def errors(simulate: Simulate, method: Method = PLAIN) -> dict[str, float]:
+def errors(simulate: case.Simulate, method: engine.Method = engine.PLAIN) -> dict[str, float]:
     """Errors at 20 s and h = 1/60; the position also read one sample late, as the printed limit was."""
     depth, speed = fall(simulate, TIME_STEP, method)
     return {
@@ -76,55 +61,55 @@ def errors(simulate: Simulate, method: Method = PLAIN) -> dict[str, float]:
     }
 
 
-def half_step_errors(simulate: Simulate) -> dict[str, float]:
+def half_step_errors(simulate: case.Simulate) -> dict[str, float]:
     """The same with velocities that live at mid-step."""
     return errors(simulate, HALF_STEP)
 
 
-def position_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def position_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Depth minus ½ g t² at 20 s [m]."""
     return fall(simulate, time_step, method)[0] - float(fallen(DURATION))
 
 
-def keeps_limit(simulate: Simulate, time_step: float) -> bool:
+def keeps_limit(simulate: case.Simulate, time_step: float) -> bool:
     """Whether the fall of the whole steps nearest to 20 s keeps the printed limit."""
     steps = round(DURATION / time_step)
     place = simulate(scene(), time_step=time_step, steps=steps, observe=ENDS)["position"]
     return abs(-float(place[2]) - float(fallen(steps * time_step))) < PRINTED
 
 
-def starts(simulate: Simulate, height: float) -> bool:
+def starts(simulate: case.Simulate, height: float) -> bool:
     """Whether a sphere so high [m] is lower after the first step."""
     (sphere,) = scene().bodies
     high = replace(scene(), bodies=(replace(sphere, position=(0.0, 0.0, height)),))
     return float(simulate(high, time_step=TIME_STEP, steps=1, observe=ENDS)["position"][2]) < height
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step [s] that keeps the printed limit."""
     return break_point(functools.partial(keeps_limit, simulate), TIME_STEP, 1.0, resolution=1e-3, walk=6)
 
 
-def highest(simulate: Simulate) -> BreakPoint:
+def highest(simulate: case.Simulate) -> case.BreakPoint:
     """The greatest height [m] from which the sphere starts to fall."""
     return break_point(functools.partial(starts, simulate), 1.0, 1e18, resolution=1e-3, walk=7)
 
 
-def _traced(simulate: Simulate, time_step: float) -> tuple[Any, Any, Any]:
+def _traced(simulate: case.Simulate, time_step: float) -> tuple[Any, Any, Any]:
     """Times, heights, velocities; about 200 samples."""
     every = max(1, round(0.1 / time_step))
     observe: dict[str, Observable] = {
-        "z": Trace(quantity=Position("sphere"), every=every),
-        "v": Trace(quantity=Velocity("sphere"), every=every),
+        "z": engine.Trace(quantity=engine.Position("sphere"), every=every),
+        "v": engine.Trace(quantity=engine.Velocity("sphere"), every=every),
     }
     result = simulate(scene(), time_step=time_step, duration=DURATION, observe=observe)
     return result.sample_times["z"], result["z"][:, 2], result["v"][:, 2]
 
 
-def draw_position(simulate: Simulate) -> Drawing:
+def draw_position(simulate: case.Simulate) -> case.Drawing:
     """Height against time at h = 1/60."""
     time, height, _ = _traced(simulate, TIME_STEP)
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulation, h = 1/60 s", time, height),
             line("−½ g t²", time, -fallen(time), "reference"),
@@ -136,10 +121,10 @@ def draw_position(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_error(simulate: Simulate) -> Drawing:
+def draw_error(simulate: case.Simulate) -> case.Drawing:
     """Position error against time at h = 1/60."""
     time, height, _ = _traced(simulate, TIME_STEP)
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("depth minus ½ g t²", time, -height - fallen(time)),
             line("½ g t h", time, free_fall_error(GRAVITY, time, TIME_STEP), "reference"),
@@ -152,10 +137,10 @@ def draw_error(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_velocity_error(simulate: Simulate) -> Drawing:
+def draw_velocity_error(simulate: case.Simulate) -> case.Drawing:
     """Velocity error against time at h = 1/60."""
     time, _, velocity = _traced(simulate, TIME_STEP)
-    return Drawing(
+    return case.Drawing(
         curves=(line("simulation minus −g t", time, velocity + GRAVITY * time),),
         x_label="time [s]",
         y_label="velocity error [m/s]",
@@ -163,11 +148,11 @@ def draw_velocity_error(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_positions(simulate: Simulate) -> Drawing:
+def draw_positions(simulate: case.Simulate) -> case.Drawing:
     """Height against time for five time steps."""
     traces = [(h, *_traced(simulate, h)) for h in TIME_STEPS]
     time = traces[0][1]
-    return Drawing(
+    return case.Drawing(
         curves=(
             *(line(f"h = {h:g} s", t, height) for h, t, height, _ in traces),
             line("−½ g t²", time, -fallen(time), "reference"),
@@ -177,7 +162,7 @@ def draw_positions(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_errors(simulate: Simulate) -> Drawing:
+def draw_errors(simulate: case.Simulate) -> case.Drawing:
     """Position error against time for five time steps."""
     curves = []
     ends = []
@@ -185,7 +170,7 @@ def draw_errors(simulate: Simulate) -> Drawing:
         time, height, _ = _traced(simulate, h)
         curves.append(line(f"h = {h:g} s", time, -height - fallen(time)))
         ends.append(float((-height - fallen(time))[-1]))
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="time [s]",
         y_label="position error [m]",
@@ -194,7 +179,7 @@ def draw_errors(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_velocity_errors(simulate: Simulate) -> Drawing:
+def draw_velocity_errors(simulate: case.Simulate) -> case.Drawing:
     """Velocity error against time for five time steps."""
     curves = []
     worst = 0.0
@@ -202,7 +187,7 @@ def draw_velocity_errors(simulate: Simulate) -> Drawing:
         time, _, velocity = _traced(simulate, h)
         curves.append(line(f"h = {h:g} s", time, velocity + GRAVITY * time))
         worst = max(worst, float(abs(velocity + GRAVITY * time).max()))
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="time [s]",
         y_label="velocity error [m/s]",
@@ -210,7 +195,7 @@ def draw_velocity_errors(simulate: Simulate) -> Drawing:
     )
 
 
-POSITION_ERROR = Metric(
+POSITION_ERROR = case.Metric(
     name="position_error",
     description="how much deeper than ½ g t² the sphere is after 20 s",
     unit="m",
@@ -224,7 +209,7 @@ POSITION_ERROR = Metric(
     reference_kind="method",
     tolerance=1e-11,
 )
-VELOCITY_ERROR = Metric(
+VELOCITY_ERROR = case.Metric(
     name="velocity_error",
     description="speed minus g t after 20 s",
     unit="m/s",
@@ -234,7 +219,7 @@ VELOCITY_ERROR = Metric(
     reference=0.0,
     tolerance=1e-12,
 )
-READ_LATE = Metric(
+READ_LATE = case.Metric(
     name="position_error_read_late",
     description="the same position against ½ g t² one step earlier, as the printed limit compares",
     unit="m",
@@ -244,7 +229,7 @@ READ_LATE = Metric(
     set_point_source="½ g (t h + 2 t h − h²): step n + 1 held against t(n), n = 1199, gives the limit's digits",
     tolerance=1e-9,
 )
-HALF_STEP_ERROR = Metric(
+HALF_STEP_ERROR = case.Metric(
     name="position_error",
     description="the same when velocities live at mid-step",
     unit="m",
@@ -255,7 +240,7 @@ HALF_STEP_ERROR = Metric(
     tolerance=1e-11,
 )
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Falling object",
     question="How accurate is the integrator when a body falls freely from rest?",
     why="Every other motion is built from this step. Its error is known to the last digit, so whatever differs "
@@ -288,14 +273,14 @@ TEST = ScalarTest(
         "The error is called second order; it is first order at a fixed time: ½ g t h.",
     ),
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(POSITION_ERROR, VELOCITY_ERROR, READ_LATE),
             measure=errors,
             note="the SPOOK step as it stands",
         ),
-        Measurement(
+        case.Measurement(
             configuration="half-step",
             time_step=TIME_STEP,
             metrics=(HALF_STEP_ERROR, VELOCITY_ERROR),
@@ -303,31 +288,31 @@ TEST = ScalarTest(
             note="velocities live at mid-step: half a kick at the start and at the read-out",
         ),
     ),
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP, observe=ENDS),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP, observe=ENDS),
     figures=(
-        Figure(name="position", title="Position against time", draw=draw_position, thesis="Fig 3.10"),
-        Figure(
+        case.Figure(name="position", title="Position against time", draw=draw_position, thesis="Fig 3.10"),
+        case.Figure(
             name="position-error",
             title="Position error against time",
             draw=draw_error,
             thesis="Fig 3.11, upper",
         ),
-        Figure(
+        case.Figure(
             name="velocity-error",
             title="Velocity error against time",
             draw=draw_velocity_error,
             thesis="Fig 3.11, lower",
         ),
-        Figure(
+        case.Figure(
             name="positions", title="Position for five time steps", draw=draw_positions, thesis="Fig 3.12"
         ),
-        Figure(
+        case.Figure(
             name="position-errors",
             title="Position error for five time steps",
             draw=draw_errors,
             thesis="Fig 3.13, upper",
         ),
-        Figure(
+        case.Figure(
             name="velocity-errors",
             title="Velocity error for five time steps",
             draw=draw_velocity_errors,
@@ -335,7 +320,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="position",
             description="position error after 20 s against ½ g t²",
             unit="m",
@@ -347,7 +332,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest step that keeps the printed limit",
             configuration="plain",
@@ -358,7 +343,7 @@ TEST = ScalarTest(
             expected_source="½ g t h = 4.904 m at h = 0.04999 s; t is whole steps, half of one or 1.3e-3 of 20 s off, and a "
             "thousandth is the search's",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="highest",
             title="Greatest height from which a sphere starts to fall",
             configuration="plain",

@@ -8,35 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spook_tracker.engine import (
-    AngularVelocity,
-    Box,
-    Energy,
-    Final,
-    Material,
-    Maximum,
-    Method,
-    Penetration,
-    Plane,
-    RigidBody,
-    Scene,
-    Sphere,
-    Trace,
-)
+from spook_tracker import engine
 from spook_tracker.engine.method import PLAIN
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.pile import energy_rise
 from spook_tracker.scalar_tests.sweep import line
@@ -52,35 +27,37 @@ TIME_STEP = 1.0 / 60.0  # s
 STEPS = 120  # 2 s
 PILES = range(10)  # seeds
 RESTITUTIONS = (0.0, 0.1)
-SWEEPS = Method(solver="iterative", iterations=200)
+SWEEPS = engine.Method(solver="iterative", iterations=200)
 TALLEST = 3  # seed of the ladder's pile
 LADDER_DURATION = 2.0  # s
 FASTEST = 1e4  # m/s, where the search ends: 167 m in a step
 REACH = 0.5 * float(np.linalg.norm(EDGES))  # m, of a box's corners
 
 
-def scene(seed: int, restitution: float, friction: float = FRICTIONS[0]) -> Scene:
+def scene(seed: int, restitution: float, friction: float = FRICTIONS[0]) -> engine.Scene:
     """Six to fourteen bodies one above the other, a little aside: two boxes, a ball, two boxes, ..."""
     draw = random.Random(seed)
     count = draw.randint(6, 14)
-    material = Material(friction=friction, restitution=restitution)
+    material = engine.Material(friction=friction, restitution=restitution)
     bodies = [
-        RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=material)
+        engine.RigidBody(
+            name="floor", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=material
+        )
     ]
     for k in range(count):
         x, y = (0.15 * (turn % 5 - 2) + draw.uniform(-JITTER, JITTER) for turn in (7 * k, 3 * k))
         ball = k % 3 == 2
         bodies.append(
-            RigidBody(
+            engine.RigidBody(
                 name=f"b{k}",
                 mass=1.0,
-                shape=Sphere(RADIUS) if ball else Box(EDGES),
+                shape=engine.Sphere(RADIUS) if ball else engine.Box(EDGES),
                 position=(x, y, 0.6 + APART * k),
                 angular_velocity=(0.0, 0.0, 0.0 if ball else SPIN),
                 material=material,
             )
         )
-    return Scene(bodies=tuple(bodies), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=tuple(bodies), gravity=(0.0, 0.0, -GRAVITY))
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,15 +79,19 @@ def bend(turned: np.ndarray, boxes: np.ndarray) -> np.ndarray:
     return most
 
 
-def read(simulate: Simulate, seed: int, restitution: float, friction: float, method: Method = PLAIN) -> Fall:
+def read(
+    simulate: case.Simulate, seed: int, restitution: float, friction: float, method: engine.Method = PLAIN
+) -> Fall:
     falling = scene(seed, restitution, friction)
     observe = {
-        "depth": Trace(quantity=Penetration()),
-        "spin": Trace(quantity=AngularVelocity()),
-        "energy": Trace(quantity=Energy()),
+        "depth": engine.Trace(quantity=engine.Penetration()),
+        "spin": engine.Trace(quantity=engine.AngularVelocity()),
+        "energy": engine.Trace(quantity=engine.Energy()),
     }
     result = simulate(falling, time_step=TIME_STEP, steps=STEPS, method=method, observe=observe)
-    boxes = np.array([isinstance(body, RigidBody) and isinstance(body.shape, Box) for body in falling.bodies])
+    boxes = np.array(
+        [isinstance(body, engine.RigidBody) and isinstance(body.shape, engine.Box) for body in falling.bodies]
+    )
     depth, energy = result["depth"].ravel(), result["energy"].ravel()
     bent = bend(TIME_STEP * np.linalg.norm(result["spin"], axis=2), boxes)
     return Fall(
@@ -120,7 +101,9 @@ def read(simulate: Simulate, seed: int, restitution: float, friction: float, met
     )
 
 
-def measure(simulate: Simulate, restitution: float, friction: float, method: Method) -> dict[str, float]:
+def measure(
+    simulate: case.Simulate, restitution: float, friction: float, method: engine.Method
+) -> dict[str, float]:
     falls = [read(simulate, seed, restitution, friction, method) for seed in PILES]
     return {
         "unexplained": max(float((fall.depth - fall.bent).max()) for fall in falls),
@@ -129,69 +112,69 @@ def measure(simulate: Simulate, restitution: float, friction: float, method: Met
     }
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Deepest overlap [m] at any sample of the pile with most bodies, frictional and without restitution."""
     result = simulate(
         scene(TALLEST, 0.0),
         time_step=time_step,
         duration=LADDER_DURATION,
         method=method,
-        observe={"depth": Maximum(quantity=Penetration())},
+        observe={"depth": engine.Maximum(quantity=engine.Penetration())},
     )
     return float(result["depth"].max())
 
 
-def column(places: tuple[tuple[float, float, float], ...], speed: float) -> Scene:
+def column(places: tuple[tuple[float, float, float], ...], speed: float) -> engine.Scene:
     """Boxes at rest but for `speed` [m/s] downwards, their centres at places [m] over the floor; plastic, frictional."""
-    material = Material(friction=FRICTIONS[0])
-    floor = RigidBody(
-        name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=material
+    material = engine.Material(friction=FRICTIONS[0])
+    floor = engine.RigidBody(
+        name="floor", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=material
     )
     boxes = (
-        RigidBody(
+        engine.RigidBody(
             name=f"b{k}",
             mass=1.0,
-            shape=Box(EDGES),
+            shape=engine.Box(EDGES),
             position=place,
             velocity=(0.0, 0.0, -speed),
             material=material,
         )
         for k, place in enumerate(places)
     )
-    return Scene(bodies=(floor, *boxes), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(floor, *boxes), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def stays_on(simulate: Simulate, aside: float) -> bool:
+def stays_on(simulate: case.Simulate, aside: float) -> bool:
     """Whether a box that falls onto another, so far aside [m], lies there: nothing has turned after half a second."""
     built = column(((0.0, 0.0, 0.5 * EDGES[2]), (aside, 0.0, 0.5 * EDGES[2] + APART)), 0.0)
-    observe = {"w": Final(quantity=AngularVelocity())}
+    observe = {"w": engine.Final(quantity=engine.AngularVelocity())}
     result = simulate(built, time_step=TIME_STEP, duration=0.5, observe=observe)
     return result.completed and float(np.abs(result["w"]).max()) < 1e-9
 
 
-def stays_apart(simulate: Simulate, speed: float) -> bool:
+def stays_apart(simulate: case.Simulate, speed: float) -> bool:
     """Whether three boxes thrown down one above the other [m/s] overlap no more than the gate allows, in ten steps."""
     built = column(tuple((0.0, 0.0, 0.6 + APART * k) for k in range(3)), speed)
-    observe = {"depth": Maximum(quantity=Penetration())}
+    observe = {"depth": engine.Maximum(quantity=engine.Penetration())}
     result = simulate(built, time_step=TIME_STEP, steps=10, observe=observe)
     return result.completed and float(result["depth"].max()) < 1e-7
 
 
-def farthest(simulate: Simulate) -> BreakPoint:
+def farthest(simulate: case.Simulate) -> case.BreakPoint:
     """How far aside [m] a box may fall onto another."""
     return break_point(functools.partial(stays_on, simulate), 0.1, 0.5, resolution=1e-3, walk=5)
 
 
-def fastest(simulate: Simulate) -> BreakPoint:
+def fastest(simulate: case.Simulate) -> case.BreakPoint:
     """The fastest fall [m/s] on which nothing overlaps."""
     return break_point(functools.partial(stays_apart, simulate), 1.0, FASTEST, walk=5)
 
 
-def _draw(simulate: Simulate) -> Drawing:
+def _draw(simulate: case.Simulate) -> case.Drawing:
     fall = read(simulate, PILES[-1], RESTITUTIONS[0], FRICTIONS[0])
     times = tuple(TIME_STEP * k for k in range(len(fall.depth)))
     curves = (("deepest overlap", fall.depth, "line"), ("what turning may add in a step", fall.bent, "limit"))
-    return Drawing(
+    return case.Drawing(
         curves=tuple(
             line(name, times, (1e3 * float(d) for d in depths), style) for name, depths, style in curves
         ),
@@ -201,7 +184,7 @@ def _draw(simulate: Simulate) -> Drawing:
 
 
 METRICS = (
-    Metric(
+    case.Metric(
         name="unexplained",
         description="deepest overlap on the way, beyond what the turns of two boxes may add in a step",
         unit="m",
@@ -212,7 +195,7 @@ METRICS = (
         reference=0.0,
         tolerance=1e-7,
     ),
-    Metric(
+    case.Metric(
         name="deepest",
         description="deepest overlap of any two bodies on the way",
         unit="m",
@@ -221,7 +204,7 @@ METRICS = (
         reference=0.0,
         relative_tolerance=0.1,
     ),
-    Metric(
+    case.Metric(
         name="energy_rise",
         description="largest rise of the total energy in a step, over the energy lost in all",
         unit="1",
@@ -233,7 +216,7 @@ METRICS = (
         tolerance=1e-9,
     ),
 )
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Falling pile",
     question="Do boxes and balls that fall on each other stay apart on the way down?",
     why="A pile at rest is easily right. While it falls, what is hit in one step is pushed into others in the same one, and an "
@@ -259,7 +242,7 @@ TEST = ScalarTest(
     conclusion="Green: nothing sinks into what it meets. Red: a pair was met too late, or not at all.",
     source="ours",
     measurements=tuple(
-        Measurement(
+        case.Measurement(
             configuration=configuration,
             time_step=TIME_STEP,
             parameters={"mu": friction, "e": restitution},
@@ -274,10 +257,10 @@ TEST = ScalarTest(
         for friction in FRICTIONS
         for restitution in RESTITUTIONS
     ),
-    example=lambda: Example(scene=scene(PILES[-1], RESTITUTIONS[0]), time_step=TIME_STEP, duration=2.0),
-    figures=(Figure(name="overlap", title="Deepest overlap of a falling pile", draw=_draw),),
+    example=lambda: case.Example(scene=scene(PILES[-1], RESTITUTIONS[0]), time_step=TIME_STEP, duration=2.0),
+    figures=(case.Figure(name="overlap", title="Deepest overlap of a falling pile", draw=_draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="overlap",
             description="deepest overlap of any two bodies in two seconds",
             unit="m",
@@ -289,7 +272,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="farthest-aside",
             title="How far aside a box may fall onto another",
             configuration="plain",
@@ -300,7 +283,7 @@ TEST = ScalarTest(
             expected_source="a plastic blow stops a box whose centre lies over the one below, whose edge is 0.3 m aside; to the "
             "resolution of the search",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="fastest",
             title="Fastest fall of three boxes that stay apart at h = 1/60 s",
             configuration="plain",

@@ -8,35 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import (
-    WORLD,
-    AngularVelocity,
-    Box,
-    Final,
-    Fluid,
-    MaximumAbsolute,
-    Method,
-    Orientation,
-    Position,
-    Prismatic,
-    RigidBody,
-    Scene,
-    Trace,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, cell, table
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityMap,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
@@ -61,18 +35,18 @@ STEPS = (1 / 60, 0.05, 0.1, 0.15, 0.2, 0.24, 0.26, 0.3)  # s
 STREAMS = (0.0, 1.0, 3.0, 10.0, 30.0, 60.0, 100.0, 200.0, 300.0)  # m/s
 
 
-def scene(ratio: float = RATIO, raised: float = 0.0, roll: float = 0.0) -> Scene:
+def scene(ratio: float = RATIO, raised: float = 0.0, roll: float = 0.0) -> engine.Scene:
     """A log along x at its draught, `raised` [m] above it or rolled by `roll` [rad] about its centre line."""
-    box = Box((LENGTH, SIDE, SIDE))
-    log = RigidBody(
+    box = engine.Box((LENGTH, SIDE, SIDE))
+    log = engine.RigidBody(
         name="log",
         mass=ratio * WATER * LENGTH * SIDE**2,
         shape=box,
         position=(0.0, 0.0, SIDE * (0.5 - ratio) + raised),
         orientation=(math.cos(0.5 * roll), math.sin(0.5 * roll), 0.0, 0.0),
     )
-    sea = Fluid(name="sea", density=WATER, level=0.0)
-    return Scene(bodies=(log,), forces=(sea,), gravity=(0.0, 0.0, -GRAVITY))
+    sea = engine.Fluid(name="sea", density=WATER, level=0.0)
+    return engine.Scene(bodies=(log,), forces=(sea,), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def heave_rate(ratio: float = RATIO) -> float:
@@ -90,9 +64,9 @@ def righting_arm(ratio: float, roll: float) -> float:
     return math.sin(roll) * (metacentric_height(ratio) + SIDE / (24.0 * ratio) * math.tan(roll) ** 2)
 
 
-def heave(simulate: Simulate) -> dict[str, float]:
+def heave(simulate: case.Simulate) -> dict[str, float]:
     """Bobbing and floating against the closed forms."""
-    observe = {"z": Trace(quantity=Position("log"))}
+    observe = {"z": engine.Trace(quantity=engine.Position("log"))}
     result = simulate(scene(raised=PUSHED), time_step=TIME_STEP, duration=DURATION, observe=observe)
     z = result["z"][:, 2] - SIDE * (0.5 - RATIO)
     # v₊ = v − h ω² z, z₊ = z + h v₊ from rest: z_n = z_0 cos((n + ½) θ)/cos(θ/2), sin(θ/2) = h ω/2.
@@ -113,16 +87,16 @@ def period(times: Any, z: Any) -> float:
     return float(falls[1] - falls[0]) / (len(at) - 1)
 
 
-def roll(simulate: Simulate) -> dict[str, float]:
+def roll(simulate: case.Simulate) -> dict[str, float]:
     """The righting moment in one step, and on which side of the metacentre the log stands."""
     worst = 0.0
     for ratio in (0.15, 0.5, 0.85):
         for degrees in ANGLES:
             angle = math.radians(degrees)
-            observe = {"w": Final(quantity=AngularVelocity("log"))}
+            observe = {"w": engine.Final(quantity=engine.AngularVelocity("log"))}
             result = simulate(scene(ratio, roll=angle), time_step=1e-4, steps=1, observe=observe)
             moved = scene(ratio, roll=angle).bodies[0]
-            assert isinstance(moved, RigidBody) and moved.inertia is not None
+            assert isinstance(moved, engine.RigidBody) and moved.inertia is not None
             arm = -float(result["w"][0]) / 1e-4 * moved.inertia[0] / (WATER * GRAVITY * volume(ratio, angle))
             worst = max(worst, abs(arm / lifted_arm(ratio, angle) - 1.0))
     return {"righting_error": worst, "wrong_sides": float(sum(_wrong(simulate, *case) for case in _CASES))}
@@ -143,18 +117,18 @@ def lifted_arm(ratio: float, roll: float) -> float:
     return righting_arm(own, roll)
 
 
-def _wrong(simulate: Simulate, ratio: float, stands: bool) -> bool:
+def _wrong(simulate: case.Simulate, ratio: float, stands: bool) -> bool:
     """Whether a log that is nudged falls where it should stand, or stands where it should fall, within 20 s."""
-    observe = {"q": Trace(quantity=Orientation("log"))}
+    observe = {"q": engine.Trace(quantity=engine.Orientation("log"))}
     result = simulate(scene(ratio, roll=NUDGE), time_step=TIME_STEP, duration=20.0, observe=observe)
     rolled = 2.0 * float(np.abs(result["q"][:, 1]).max())
     # Standing, the nudge stays as it is but for half a step of its rate; falling, it grows by e⁸ and more.
     return rolled > 1.1 * NUDGE if stands else rolled < 100.0 * NUDGE
 
 
-def bobs(simulate: Simulate, ratio: float, time_step: float) -> bool:
+def bobs(simulate: case.Simulate, ratio: float, time_step: float) -> bool:
     """Whether a log that is lifted a little never goes a hundred times as far."""
-    observe = {"z": MaximumAbsolute(quantity=Position("log"), from_start=True)}
+    observe = {"z": engine.MaximumAbsolute(quantity=engine.Position("log"), from_start=True)}
     result = simulate(scene(ratio, raised=LIFTED), time_step=time_step, steps=BOBS, observe=observe)
     return result.completed and float(result["z"][2]) < 100.0 * LIFTED
 
@@ -163,24 +137,26 @@ LONGEST = 2.0 / heave_rate()  # s: h ω = 2
 LIGHTEST = 0.25 * GRAVITY * TIME_STEP**2 / SIDE  # density ratio: the same at 1/60 s
 
 
-def longest(simulate: Simulate) -> BreakPoint:
+def longest(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step in which the log bobs."""
     return break_point(
         lambda time_step: bobs(simulate, RATIO, time_step), 0.4 * LONGEST, 2.0 * LONGEST, resolution=SEARCHED
     )
 
 
-def lightest(simulate: Simulate) -> BreakPoint:
+def lightest(simulate: case.Simulate) -> case.BreakPoint:
     """The lightest log that bobs at 1/60 s."""
     return break_point(
         lambda ratio: bobs(simulate, ratio, TIME_STEP), 6.0 * LIGHTEST, 0.2 * LIGHTEST, resolution=SEARCHED
     )
 
 
-def moored(stream: float) -> Scene:
+def moored(stream: float) -> engine.Scene:
     """The log lifted a little on a rail straight up, across a stream [m/s] with drag."""
-    rail = Prismatic(name="rail", between=(WORLD, "log"), axis=(0.0, 0.0, 1.0), compliance=0.0)
-    sea = Fluid(name="sea", density=WATER, level=0.0, velocity=(0.0, stream, 0.0), drag_coefficient=DRAG)
+    rail = engine.Prismatic(name="rail", between=(engine.WORLD, "log"), axis=(0.0, 0.0, 1.0), compliance=0.0)
+    sea = engine.Fluid(
+        name="sea", density=WATER, level=0.0, velocity=(0.0, stream, 0.0), drag_coefficient=DRAG
+    )
     return replace(scene(raised=LIFTED), constraints=(rail,), forces=(sea,))
 
 
@@ -192,15 +168,15 @@ def heave_growth(time_step: float, stream: float) -> float:
     return float(np.abs(np.linalg.eigvals(step)).max())
 
 
-def stream_map(simulate: Simulate) -> StabilityMap:
+def stream_map(simulate: case.Simulate) -> case.StabilityMap:
     """(time step, stream): what a run does, beside the eigenvalue of its step."""
 
     def kind(time_step: float, stream: float) -> str:
-        observe = {"z": Trace(quantity=Position("log"), from_start=True)}
+        observe = {"z": engine.Trace(quantity=engine.Position("log"), from_start=True)}
         result = simulate(moored(stream), time_step=time_step, steps=BOBS, observe=observe)
         return cell(result, result.partial["z"][:, 2] / LIFTED + 1.0, bound=100.0, rest=1e-3)
 
-    return StabilityMap(
+    return case.StabilityMap(
         x=STEPS,
         y=STREAMS,
         cells=table(STREAMS, STEPS, kind),
@@ -212,21 +188,21 @@ def stream_map(simulate: Simulate) -> StabilityMap:
     )
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest distance from z_0 cos ω t in 2 s [m]."""
-    observe = {"z": Trace(quantity=Position("log"))}
+    observe = {"z": engine.Trace(quantity=engine.Position("log"))}
     result = simulate(scene(raised=PUSHED), time_step=time_step, duration=2.0, method=method, observe=observe)
     z = result["z"][:, 2] - SIDE * (0.5 - RATIO)
     return float(np.abs(z - PUSHED * np.cos(heave_rate() * result.sample_times["z"])).max())
 
 
-def draw_heave(simulate: Simulate) -> Drawing:
+def draw_heave(simulate: case.Simulate) -> case.Drawing:
     """Height above the draught against time."""
-    observe = {"z": Trace(quantity=Position("log"))}
+    observe = {"z": engine.Trace(quantity=engine.Position("log"))}
     result = simulate(scene(raised=PUSHED), time_step=TIME_STEP, duration=4.0, observe=observe)
     time, z = result.sample_times["z"], result["z"][:, 2] - SIDE * (0.5 - RATIO)
     exact = PUSHED * np.cos(heave_rate() * time)
-    return Drawing(
+    return case.Drawing(
         curves=(line("simulation, h = 1/60 s", time, z), line("z₀ cos ω t", time, exact, "reference")),
         x_label="time [s]",
         y_label="height above the draught [m]",
@@ -234,16 +210,16 @@ def draw_heave(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_roll(simulate: Simulate) -> Drawing:
+def draw_roll(simulate: case.Simulate) -> case.Drawing:
     """How far a nudged log rolls against its density ratio."""
     ratios = [0.1, 0.15, 0.2, 0.2225, 0.3, 0.4, 0.5, 0.6, 0.7, 0.7775, 0.8, 0.85, 0.9]
     rolled = []
     for ratio in ratios:
-        observe = {"q": Trace(quantity=Orientation("log"), every=6)}
+        observe = {"q": engine.Trace(quantity=engine.Orientation("log"), every=6)}
         q = simulate(scene(ratio, roll=NUDGE), time_step=TIME_STEP, duration=20.0, observe=observe)["q"]
         rolled.append(math.degrees(2.0 * float(np.arcsin(np.minimum(1.0, np.abs(q[:, 1]).max())))))
     turned = sum(angle > 20.0 for angle in rolled)
-    return Drawing(
+    return case.Drawing(
         curves=(line("largest roll within 20 s", ratios, rolled),),
         x_label="density of the log over that of the water",
         y_label="largest roll [°]",
@@ -253,7 +229,7 @@ def draw_roll(simulate: Simulate) -> Drawing:
     )
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Floating box",
     question="Does a log float as deep, bob as fast and stand upright as hydrostatics says?",
     why="Boats, buoys and whatever falls into water are carried by the volume they displace; its size makes them "
@@ -280,11 +256,11 @@ TEST = ScalarTest(
     "or gravity and the fluid do not agree about which way is up.",
     source="ours; buoyancy is asked for in the thesis, section 5.4",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="period_error",
                     description="period of the heave over 2π √(s H/g), minus one",
                     unit="1",
@@ -295,7 +271,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     relative_tolerance=1e-6,
                 ),
-                Metric(
+                case.Metric(
                     name="heave_error",
                     description="largest distance from the discrete solution in 10 s",
                     unit="m",
@@ -305,7 +281,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-13,
                 ),
-                Metric(
+                case.Metric(
                     name="draught_error",
                     description="largest departure from the draught in 10 s at rest",
                     unit="m",
@@ -319,11 +295,11 @@ TEST = ScalarTest(
             measure=heave,
             note="heave and rest",
         ),
-        Measurement(
+        case.Measurement(
             configuration="roll",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="righting_error",
                     description="largest relative error of the righting arm at 2, 5 and 10°, three densities",
                     unit="1",
@@ -334,7 +310,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-11,
                 ),
-                Metric(
+                case.Metric(
                     name="wrong_sides",
                     description="densities at which a nudged log stands and should fall, or falls and should stand",
                     unit="1",
@@ -349,13 +325,13 @@ TEST = ScalarTest(
             note="one step rolled, and 20 s nudged",
         ),
     ),
-    example=lambda: Example(scene=scene(0.5, roll=0.02), time_step=TIME_STEP),
+    example=lambda: case.Example(scene=scene(0.5, roll=0.02), time_step=TIME_STEP),
     figures=(
-        Figure(name="heave", title="Heave", draw=draw_heave),
-        Figure(name="roll", title="Roll against density", draw=draw_roll),
+        case.Figure(name="heave", title="Heave", draw=draw_heave),
+        case.Figure(name="roll", title="Roll against density", draw=draw_roll),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest time step in which the log bobs",
             configuration="plain",
@@ -366,7 +342,7 @@ TEST = ScalarTest(
             expected_source="h ω = 2: at rest z_n turns into (2 n + 1) z₀ there, before it into no more than z₀/√(1 − (h ω/2)²); "
             "the search ends 0.2 % short of it at most",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="lightest",
             title="Lightest log, over the water, that bobs at 1/60 s",
             configuration="plain",
@@ -377,7 +353,7 @@ TEST = ScalarTest(
             expected=(LIGHTEST, (1.0 + 1.1 * SEARCHED) * LIGHTEST),
             expected_source="h ω = 2 of the heave, ω² = g/(s H): s = g h²/(4 H); the search ends 0.2 % short of it at most",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="stream",
             title="Heave of a log moored across a stream",
             configuration="plain",
@@ -387,7 +363,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="heave",
             description="largest distance from z₀ cos ω t in 2 s",
             unit="m",

@@ -7,38 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from spook_tracker.engine import (
-    WORLD,
-    AngularVelocity,
-    ConstraintForce,
-    Final,
-    Hinge,
-    JointCoordinate,
-    Load,
-    MaximumAbsolute,
-    Method,
-    Motor,
-    Prismatic,
-    Relation,
-    RigidBody,
-    Scene,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
 from spook_tracker.engine.joints import Constraint
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
@@ -58,35 +31,35 @@ PINION, RACK_MASS, PINION_INERTIA, PUSH = 0.1, 3.0, 0.05, 1e-4  # m, kg, kg m²,
 AXIS = (0.0, 0.0, 1.0)
 
 
-def planetary(torque: float = 0.0, back: float = 0.0, motor: Motor | None = None) -> Scene:
+def planetary(torque: float = 0.0, back: float = 0.0, motor: engine.Motor | None = None) -> engine.Scene:
     """A sun, a carrier and one planet inside a ring that belongs to the world. `torque` [N m] is on the sun, `back`
     on the carrier. What meshes is what turns relative to the carrier."""
     orbit = {"sun": 0.0, "carrier": 0.0, "planet": ORBIT}
     mass = {"sun": 1.0, "carrier": 1.0, "planet": PLANET_MASS}
     bodies = tuple(
-        RigidBody(
+        engine.RigidBody(
             name=name, mass=mass[name], inertia=(moment, moment, moment), position=(orbit[name], 0.0, 0.0)
         )
         for name, moment in INERTIA.items()
     )
     constraints: tuple[Constraint, ...] = (
-        Hinge(name="sun axle", between=(WORLD, "sun"), axis=AXIS, compliance=0.0, motor=motor),
-        Hinge(name="carrier axle", between=(WORLD, "carrier"), axis=AXIS, compliance=0.0),
-        Hinge(name="planet axle", between=("carrier", "planet"), axis=AXIS, compliance=0.0),
-        Relation(
+        engine.Hinge(name="sun axle", between=(engine.WORLD, "sun"), axis=AXIS, compliance=0.0, motor=motor),
+        engine.Hinge(name="carrier axle", between=(engine.WORLD, "carrier"), axis=AXIS, compliance=0.0),
+        engine.Hinge(name="planet axle", between=("carrier", "planet"), axis=AXIS, compliance=0.0),
+        engine.Relation(
             name="sun and planet",
             terms=(("sun axle", SUN), ("carrier axle", -SUN), ("planet axle", PLANET)),
             compliance=0.0,
         ),
-        Relation(
+        engine.Relation(
             name="planet and ring", terms=(("planet axle", PLANET), ("carrier axle", RING)), compliance=0.0
         ),
     )
     loads = (
-        Load(name="torque", body="sun", torque=(0.0, 0.0, torque)),
-        Load(name="back", body="carrier", torque=(0.0, 0.0, back)),
+        engine.Load(name="torque", body="sun", torque=(0.0, 0.0, torque)),
+        engine.Load(name="back", body="carrier", torque=(0.0, 0.0, back)),
     )
-    return Scene(bodies=bodies, constraints=constraints, forces=loads)
+    return engine.Scene(bodies=bodies, constraints=constraints, forces=loads)
 
 
 def reduced_inertia() -> float:
@@ -97,40 +70,43 @@ def reduced_inertia() -> float:
     )
 
 
-def rack() -> Scene:
+def rack() -> engine.Scene:
     """A rack on a slide, pushed with `PUSH`, that turns a pinion."""
     bodies = (
-        RigidBody(name="rack", mass=RACK_MASS, inertia=(1.0, 1.0, 1.0), position=(0.0, PINION, 0.0)),
-        RigidBody(name="pinion", mass=1.0, inertia=(PINION_INERTIA,) * 3, position=(0.0, 0.0, 0.0)),
+        engine.RigidBody(name="rack", mass=RACK_MASS, inertia=(1.0, 1.0, 1.0), position=(0.0, PINION, 0.0)),
+        engine.RigidBody(name="pinion", mass=1.0, inertia=(PINION_INERTIA,) * 3, position=(0.0, 0.0, 0.0)),
     )
     constraints = (
-        Prismatic(name="slide", between=(WORLD, "rack"), axis=(1.0, 0.0, 0.0), compliance=0.0),
-        Hinge(name="pinion axle", between=(WORLD, "pinion"), axis=AXIS, compliance=0.0),
-        Relation(name="mesh", terms=(("slide", 1.0), ("pinion axle", PINION)), compliance=0.0),
+        engine.Prismatic(name="slide", between=(engine.WORLD, "rack"), axis=(1.0, 0.0, 0.0), compliance=0.0),
+        engine.Hinge(name="pinion axle", between=(engine.WORLD, "pinion"), axis=AXIS, compliance=0.0),
+        engine.Relation(name="mesh", terms=(("slide", 1.0), ("pinion axle", PINION)), compliance=0.0),
     )
-    return Scene(
+    return engine.Scene(
         bodies=bodies,
         constraints=constraints,
-        forces=(Load(name="push", body="rack", force=(PUSH, 0.0, 0.0)),),
+        forces=(engine.Load(name="push", body="rack", force=(PUSH, 0.0, 0.0)),),
     )
 
 
-def turn(simulate: Simulate) -> dict[str, float]:
+def turn(simulate: case.Simulate) -> dict[str, float]:
     """The driven set after ten seconds, the set in balance, and the rack."""
     angles: dict[str, Observable] = {
-        name: Final(quantity=JointCoordinate(f"{name} axle")) for name in INERTIA
+        name: engine.Final(quantity=engine.JointCoordinate(f"{name} axle")) for name in INERTIA
     }
-    angles["w"] = Final(quantity=AngularVelocity("carrier"))
+    angles["w"] = engine.Final(quantity=engine.AngularVelocity("carrier"))
     driven = simulate(
-        planetary(motor=Motor(speed=SPEED)), time_step=TIME_STEP, duration=DURATION, observe=angles
+        planetary(motor=engine.Motor(speed=SPEED)), time_step=TIME_STEP, duration=DURATION, observe=angles
     )
     observe = {
-        "sun": Final(quantity=ConstraintForce("sun and planet")),
-        "ring": Final(quantity=ConstraintForce("planet and ring")),
-        "w": MaximumAbsolute(quantity=AngularVelocity("carrier")),
+        "sun": engine.Final(quantity=engine.ConstraintForce("sun and planet")),
+        "ring": engine.Final(quantity=engine.ConstraintForce("planet and ring")),
+        "w": engine.MaximumAbsolute(quantity=engine.AngularVelocity("carrier")),
     }
     held = simulate(planetary(TORQUE, -RATIO * TORQUE), time_step=TIME_STEP, steps=100, observe=observe)
-    v = {"v": Final(quantity=Velocity("rack")), "w": Final(quantity=AngularVelocity("pinion"))}
+    v = {
+        "v": engine.Final(quantity=engine.Velocity("rack")),
+        "w": engine.Final(quantity=engine.AngularVelocity("pinion")),
+    }
     pushed = simulate(rack(), time_step=TIME_STEP, duration=1.0, observe=v)
     a = PUSH / (RACK_MASS + PINION_INERTIA / PINION**2)
     return {
@@ -145,63 +121,69 @@ def turn(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def follows(simulate: Simulate, speed: float) -> bool:
+def follows(simulate: case.Simulate, speed: float) -> bool:
     """Whether the set turns with a sun of that speed for 100 steps, the carrier a fifth of its turns."""
-    observe = {name: Final(quantity=JointCoordinate(f"{name} axle")) for name in ("sun", "carrier")}
-    result = simulate(planetary(motor=Motor(speed=speed)), time_step=TIME_STEP, steps=100, observe=observe)
+    observe = {
+        name: engine.Final(quantity=engine.JointCoordinate(f"{name} axle")) for name in ("sun", "carrier")
+    }
+    result = simulate(
+        planetary(motor=engine.Motor(speed=speed)), time_step=TIME_STEP, steps=100, observe=observe
+    )
     return result.completed and abs(RATIO * float(result["carrier"]) / float(result["sun"]) - 1.0) < 0.1
 
 
-def fastest(simulate: Simulate) -> BreakPoint:
+def fastest(simulate: case.Simulate) -> case.BreakPoint:
     """The fastest sun that the set follows."""
     return break_point(
         functools.partial(follows, simulate), 0.3 / TIME_STEP, 30.0 / TIME_STEP, resolution=1e-3
     )
 
 
-def starts_right(simulate: Simulate, carrier: float) -> bool:
+def starts_right(simulate: case.Simulate, carrier: float) -> bool:
     """Whether a set with so heavy a carrier [kg m²] starts with the acceleration of its reduced inertia, to 1e-9."""
     built = planetary(TORQUE)
     bodies = tuple(
         replace(body, inertia=(carrier,) * 3)
-        if body.name == "carrier" and isinstance(body, RigidBody)
+        if body.name == "carrier" and isinstance(body, engine.RigidBody)
         else body
         for body in built.bodies
     )
-    observe = {"w": Final(quantity=AngularVelocity("carrier"))}
+    observe = {"w": engine.Final(quantity=engine.AngularVelocity("carrier"))}
     result = simulate(replace(built, bodies=bodies), time_step=TIME_STEP, steps=1, observe=observe)
     right = TIME_STEP * TORQUE * RATIO / (reduced_inertia() - INERTIA["carrier"] + carrier)
     return result.completed and abs(float(result["w"][2]) / right - 1.0) < 1e-9
 
 
-def heaviest_carrier(simulate: Simulate) -> BreakPoint:
+def heaviest_carrier(simulate: case.Simulate) -> case.BreakPoint:
     """The heaviest carrier [kg m²] with which the set starts as it should."""
     return break_point(functools.partial(starts_right, simulate), INERTIA["carrier"], HEAVIEST, walk=8)
 
 
-def start_up(simulate: Simulate) -> dict[str, float]:
+def start_up(simulate: case.Simulate) -> dict[str, float]:
     """Angular acceleration of the carrier from rest over T i/J, minus one, in the first step."""
-    observe = {"w": Final(quantity=AngularVelocity("carrier"))}
+    observe = {"w": engine.Final(quantity=engine.AngularVelocity("carrier"))}
     w = simulate(planetary(TORQUE), time_step=TIME_STEP, steps=1, observe=observe)["w"]
     return {"inertia_error": float(w[2]) / TIME_STEP * reduced_inertia() / (TORQUE * RATIO) - 1.0}
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Angle of the carrier after a second from rest, less ½ (T i/J) t² [rad]."""
-    observe = {"angle": Trace(quantity=JointCoordinate("carrier axle"))}
+    observe = {"angle": engine.Trace(quantity=engine.JointCoordinate("carrier axle"))}
     result = simulate(planetary(TORQUE), time_step=time_step, duration=1.0, method=method, observe=observe)
     return float(result["angle"][-1]) - 0.5 * TORQUE * RATIO / reduced_inertia()
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Angles of all three against time."""
-    observe = {name: Trace(quantity=JointCoordinate(f"{name} axle"), every=12) for name in INERTIA}
+    observe = {
+        name: engine.Trace(quantity=engine.JointCoordinate(f"{name} axle"), every=12) for name in INERTIA
+    }
     result = simulate(
-        planetary(motor=Motor(speed=SPEED)), time_step=TIME_STEP, duration=DURATION, observe=observe
+        planetary(motor=engine.Motor(speed=SPEED)), time_step=TIME_STEP, duration=DURATION, observe=observe
     )
     time = result.sample_times["sun"]
     off = float(np.abs(result["sun"] - RATIO * result["carrier"]).max())
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("sun", time, result["sun"]),
             line("carrier", time, result["carrier"]),
@@ -217,7 +199,7 @@ def draw(simulate: Simulate) -> Drawing:
 STATICS = "statics are exact in one step; rounding remains"
 EXACT = "a step turns each by h ω, and the rows ask the ratio of ω: rounding remains"
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Gears",
     question="Do gears keep their ratios, and does every casing feel the torque that they do not balance?",
     why="Gears, racks, screws, belts and differentials are one kind of row: a linear relation between coordinates. A "
@@ -241,7 +223,7 @@ TEST = ScalarTest(
     "that was not counted.",
     source="ours; R. Willis, Principles of Mechanism (1841)",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
@@ -292,7 +274,7 @@ TEST = ScalarTest(
             measure=turn,
             note="planetary set and rack",
         ),
-        Measurement(
+        case.Measurement(
             configuration="start",
             time_step=TIME_STEP,
             metrics=(
@@ -308,10 +290,12 @@ TEST = ScalarTest(
             note="one step from rest",
         ),
     ),
-    example=lambda: Example(scene=planetary(motor=Motor(speed=SPEED)), time_step=TIME_STEP, duration=6.0),
-    figures=(Figure(name="angles", title="Angles", draw=draw),),
+    example=lambda: case.Example(
+        scene=planetary(motor=engine.Motor(speed=SPEED)), time_step=TIME_STEP, duration=6.0
+    ),
+    figures=(case.Figure(name="angles", title="Angles", draw=draw),),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="fastest",
             title="Fastest sun that the set follows",
             configuration="plain",
@@ -322,7 +306,7 @@ TEST = ScalarTest(
             expected_source="wheels turn exactly; a planet's way is along its tangent, and its joint takes it back to the "
             "orbit up to h ω = 1 of the carrier",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="heaviest-carrier",
             title="Heaviest carrier with which the set starts as it should",
             configuration="plain",
@@ -335,7 +319,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="start",
             description="angle of the carrier after 1 s from rest against ½ (T i/J) t²",
             unit="rad",

@@ -6,31 +6,9 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import (
-    Box,
-    ContactForce,
-    Final,
-    KineticEnergy,
-    Material,
-    Method,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
@@ -48,26 +26,28 @@ STANDS, SLIDES = 0.999, 1.01  # of the slope at which it begins to slide
 WAYS = tuple(math.radians(15.0 * k + 5.0) for k in range(12))  # downhill, from x
 
 
-def scene(tangent: float = 0.0, way: float = WAY, throw: tuple[float, float] = (0.0, 0.0)) -> Scene:
+def scene(tangent: float = 0.0, way: float = WAY, throw: tuple[float, float] = (0.0, 0.0)) -> engine.Scene:
     """A box on a grained board tilted down along `way`; `throw` is its velocity along the grain and across it."""
     c, s = math.cos(GRAIN), math.sin(GRAIN)
-    board = RigidBody(
+    board = engine.RigidBody(
         name="board",
         motion="static",
-        shape=Plane(),
+        shape=engine.Plane(),
         position=(0.0, 0.0, 0.0),
-        material=Material(friction=ALONG**2, friction_across=ACROSS**2, friction_direction=(c, s, 0.0)),
+        material=engine.Material(
+            friction=ALONG**2, friction_across=ACROSS**2, friction_direction=(c, s, 0.0)
+        ),
     )
-    box = RigidBody(
+    box = engine.RigidBody(
         name="box",
         mass=MASS,
-        shape=Box(EDGE),
+        shape=engine.Box(EDGE),
         position=(0.0, 0.0, 0.5 * EDGE[2]),
         velocity=(c * throw[0] - s * throw[1], s * throw[0] + c * throw[1], 0.0),
-        material=Material(friction=1.0),
+        material=engine.Material(friction=1.0),
     )
     x, y, z = gravity(tangent, way)
-    return Scene(bodies=(board, box), gravity=(x, y, z))
+    return engine.Scene(bodies=(board, box), gravity=(x, y, z))
 
 
 def gravity(tangent: float, way: float) -> tuple[float, float, float]:
@@ -123,11 +103,11 @@ def stop() -> tuple[float, float]:
     return float(along @ time), float(across @ time)
 
 
-def down_the_slope(simulate: Simulate) -> dict[str, float]:
+def down_the_slope(simulate: case.Simulate) -> dict[str, float]:
     """One second from rest."""
     observe = {
-        "v": Trace(quantity=Velocity("box")),
-        "force": Final(quantity=ContactForce("box", "board")),
+        "v": engine.Trace(quantity=engine.Velocity("box")),
+        "force": engine.Final(quantity=engine.ContactForce("box", "board")),
     }
     result = simulate(scene(SLOPE), time_step=TIME_STEP, duration=1.0, observe=observe)
     found = np.array([grain_axes(x, y) for x, y, _ in result["v"]])
@@ -141,9 +121,12 @@ def down_the_slope(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def thrown(simulate: Simulate) -> dict[str, float]:
+def thrown(simulate: case.Simulate) -> dict[str, float]:
     """Thrown on the level until it rests."""
-    observe = {"v": Trace(quantity=Velocity("box")), "energy": Trace(quantity=KineticEnergy())}
+    observe = {
+        "v": engine.Trace(quantity=engine.Velocity("box")),
+        "energy": engine.Trace(quantity=engine.KineticEnergy()),
+    }
     result = simulate(scene(throw=THROW), time_step=TIME_STEP, duration=1.5, observe=observe)
     found = np.array([grain_axes(x, y) for x, y, _ in result["v"]])
     exact = [THROW]
@@ -155,11 +138,11 @@ def thrown(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def begins(simulate: Simulate) -> dict[str, float]:
+def begins(simulate: case.Simulate) -> dict[str, float]:
     """Half a second just below the slope at which it begins to slide, and just above, downhill all ways."""
     creep, late = 0.0, 0.0
     for way in WAYS:
-        observe = {"v": Final(quantity=Velocity("box"))}
+        observe = {"v": engine.Final(quantity=engine.Velocity("box"))}
         stands = scene(STANDS * least_slope(way), way)
         slides = scene(SLIDES * least_slope(way), way)
         v = simulate(stands, time_step=TIME_STEP, duration=0.5, observe=observe)["v"]
@@ -171,31 +154,31 @@ def begins(simulate: Simulate) -> dict[str, float]:
     return {"creep": creep, "slide_error": late}
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Distance of the place of rest from the closed form [m]."""
-    observe = {"x": Final(quantity=Position("box"))}
+    observe = {"x": engine.Final(quantity=engine.Position("box"))}
     result = simulate(scene(throw=THROW), time_step=time_step, duration=1.5, method=method, observe=observe)
     found = grain_axes(float(result["x"][0]), float(result["x"][1]))
     return math.dist(found, stop())
 
 
-def stands(simulate: Simulate, tangent: float) -> bool:
+def stands(simulate: case.Simulate, tangent: float) -> bool:
     """Whether the box is at rest after half a second."""
-    observe = {"v": Final(quantity=Velocity("box"))}
+    observe = {"v": engine.Final(quantity=engine.Velocity("box"))}
     result = simulate(scene(tangent), time_step=TIME_STEP, steps=30, observe=observe)
     return result.completed and float(np.abs(result["v"]).max()) < 1e-6
 
 
-def steepest(simulate: Simulate) -> BreakPoint:
+def steepest(simulate: case.Simulate) -> case.BreakPoint:
     """The steepest slope it stands on, from half the bound to twice it."""
     bound = least_slope(WAY)
     return break_point(lambda t: stands(simulate, t), 0.5 * bound, 2.0 * bound, resolution=1e-3)
 
 
-def slows(simulate: Simulate, times: float) -> bool:
+def slows(simulate: case.Simulate, times: float) -> bool:
     """Whether ten steps take of a throw so many times as fast what they must, to a millionth of that."""
     fast = (times * THROW[0], times * THROW[1])
-    observe = {"v": Final(quantity=Velocity("box"))}
+    observe = {"v": engine.Final(quantity=engine.Velocity("box"))}
     result = simulate(scene(throw=fast), time_step=TIME_STEP, steps=10, observe=observe)
     right = fast
     for _ in range(10):
@@ -204,16 +187,16 @@ def slows(simulate: Simulate, times: float) -> bool:
     return result.completed and math.dist(found, right) < 1e-6 * math.dist(fast, right)
 
 
-def draw_throw(simulate: Simulate) -> Drawing:
+def draw_throw(simulate: case.Simulate) -> case.Drawing:
     """The velocity across the grain against that along it, until the box rests."""
-    observe = {"v": Trace(quantity=Velocity("box"))}
+    observe = {"v": engine.Trace(quantity=engine.Velocity("box"))}
     result = simulate(scene(throw=THROW), time_step=TIME_STEP, duration=1.5, observe=observe)
     found = np.array([grain_axes(x, y) for x, y, _ in result["v"]])
     u = np.linspace(0.0, 1.0, 60)
     power = (ALONG / ACROSS) ** 2
     share = np.clip(found[:, 1] / THROW[1], 0.0, 1.0)
     off = float(np.abs(found[:, 0] - THROW[0] * share**power).max())
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("box", found[:, 0], found[:, 1], "points"),
             line("closed form", THROW[0] * u**power, THROW[1] * u, "reference"),
@@ -224,10 +207,10 @@ def draw_throw(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_drift(simulate: Simulate) -> Drawing:
+def draw_drift(simulate: case.Simulate) -> case.Drawing:
     """Which way the box slides from rest against where downhill is."""
     ways = [k * math.pi / 24 for k in range(1, 24)]
-    observe = {"v": Final(quantity=Velocity("box"))}
+    observe = {"v": engine.Final(quantity=engine.Velocity("box"))}
     found, exact = [], []
     for way in ways:
         v = simulate(scene(SLOPE, way + GRAIN), time_step=TIME_STEP, steps=10, observe=observe)["v"]
@@ -237,7 +220,7 @@ def draw_drift(simulate: Simulate) -> Drawing:
         exact.append(math.degrees(math.atan2(across, along)))
     degrees = [math.degrees(way) for way in ways]
     most = max(abs(f - d) for f, d in zip(found, degrees, strict=True))
-    return Drawing(
+    return case.Drawing(
         curves=(line("box", degrees, found, "points"), line("closed form", degrees, exact, "reference")),
         x_label="downhill, from the grain [°]",
         y_label="way it slides, from the grain [°]",
@@ -252,7 +235,7 @@ OPEN = (
 )
 THROWN = "as above, of up to 60 steps one after the other: what one leaves turns the next"
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Sliding on a grain",
     question="Does a box slide askew where friction differs with the direction, and where does it begin to slide?",
     why="Wood, boards with grooves, blades and tracks hold one way and let go the other. A law that takes each direction "
@@ -346,9 +329,9 @@ TEST = ScalarTest(
             "beginning",
         ),
     ),
-    example=lambda: Example(scene=scene(throw=THROW), time_step=TIME_STEP, duration=1.5),
+    example=lambda: case.Example(scene=scene(throw=THROW), time_step=TIME_STEP, duration=1.5),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="slope",
             title="Steepest slope the box stands on, 50° from the grain",
             configuration="plain",
@@ -372,11 +355,11 @@ TEST = ScalarTest(
         ),
     ),
     figures=(
-        Figure(name="throw", title="Speed across the grain against speed along it", draw=draw_throw),
-        Figure(name="drift", title="Way it slides against the way down", draw=draw_drift),
+        case.Figure(name="throw", title="Speed across the grain against speed along it", draw=draw_throw),
+        case.Figure(name="drift", title="Way it slides against the way down", draw=draw_drift),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="rest",
             description="place of rest of the thrown box, against two integrals",
             unit="m",

@@ -7,35 +7,9 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    WORLD,
-    Box,
-    Capsule,
-    Final,
-    Load,
-    Material,
-    Method,
-    Position,
-    Prismatic,
-    RigidBody,
-    Scene,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, sweep, told
@@ -54,14 +28,14 @@ ACCURACY = 1e-9  # of the friction solver, relative
 
 
 @functools.cache
-def scene(share: float) -> Scene:
+def scene(share: float) -> engine.Scene:
     """A capsule across two fingers on vertical faces; each presses with `share` of what is needed."""
-    rough = Material(friction=FRICTION)
+    rough = engine.Material(friction=FRICTION)
     bodies = [
-        RigidBody(
+        engine.RigidBody(
             name="capsule",
             mass=MASS,
-            shape=Capsule(RADIUS, LENGTH),
+            shape=engine.Capsule(RADIUS, LENGTH),
             position=(0, 0, 0),
             orientation=(1, 1, 0, 0),
             material=rough,
@@ -71,11 +45,17 @@ def scene(share: float) -> Scene:
     for name, side in (("left", -1.0), ("right", 1.0)):
         place = (side * (RADIUS + 0.01), 0.0, 0.0)
         bodies.append(
-            RigidBody(name=name, mass=FINGER, shape=Box((0.02, 0.2, 0.2)), position=place, material=rough)
+            engine.RigidBody(
+                name=name, mass=FINGER, shape=engine.Box((0.02, 0.2, 0.2)), position=place, material=rough
+            )
         )
-        joints.append(Prismatic(name=f"{name} guide", between=(WORLD, name), axis=(1, 0, 0), compliance=0.0))
-        loads.append(Load(name=f"{name} press", body=name, force=(-side * share * LEAST, 0, 0)))
-    return Scene(
+        joints.append(
+            engine.Prismatic(
+                name=f"{name} guide", between=(engine.WORLD, name), axis=(1, 0, 0), compliance=0.0
+            )
+        )
+        loads.append(engine.Load(name=f"{name} press", body=name, force=(-side * share * LEAST, 0, 0)))
+    return engine.Scene(
         bodies=tuple(bodies), constraints=tuple(joints), forces=tuple(loads), gravity=(0, 0, -GRAVITY)
     )
 
@@ -85,9 +65,9 @@ def acceleration(share: float) -> float:
     return max(0.0, GRAVITY * (1.0 - share))
 
 
-def held_time(simulate: Simulate, share: float, time_step: float) -> float:
+def held_time(simulate: case.Simulate, share: float, time_step: float) -> float:
     """How long the capsule is held [s], `HOLDING` at most."""
-    observe = {"x": Trace(quantity=Position("capsule"))}
+    observe = {"x": engine.Trace(quantity=engine.Position("capsule"))}
     result = simulate(scene(share), time_step=time_step, duration=HOLDING, observe=observe)
     gone = np.flatnonzero(np.abs(result["x"]).max(axis=1) > SLIPPED)
     return float(result.sample_times["x"][gone[0]]) if len(gone) else HOLDING
@@ -99,9 +79,9 @@ def slips_after(share: float) -> float:
     return min(HOLDING, math.sqrt(2.0 * SLIPPED / gain)) if gain > 0.0 else HOLDING
 
 
-def least(simulate: Simulate, method: Method, easy: float) -> BreakPoint:
+def least(simulate: case.Simulate, method: engine.Method, easy: float) -> case.BreakPoint:
     """The least share of the force with which it is held for a second, from `easy` downwards."""
-    observe = {"x": Final(quantity=Position("capsule"), from_start=True)}
+    observe = {"x": engine.Final(quantity=engine.Position("capsule"), from_start=True)}
 
     def holds(share: float) -> bool:
         result = simulate(
@@ -112,11 +92,11 @@ def least(simulate: Simulate, method: Method, easy: float) -> BreakPoint:
     return break_point(holds, easy, 0.5, resolution=5e-4)
 
 
-def measure(simulate: Simulate, time_step: float) -> dict[str, float]:
+def measure(simulate: case.Simulate, time_step: float) -> dict[str, float]:
     """Held, and let go, for a second."""
     observe = {
-        "x": Final(quantity=Position("capsule"), from_start=True),
-        "v": Final(quantity=Velocity("capsule")),
+        "x": engine.Final(quantity=engine.Position("capsule"), from_start=True),
+        "v": engine.Final(quantity=engine.Velocity("capsule")),
     }
     held = simulate(scene(HELD), time_step=time_step, duration=DURATION, observe=observe)
     loose = simulate(scene(SLIPPING), time_step=time_step, duration=0.2, observe=observe)
@@ -127,14 +107,14 @@ def measure(simulate: Simulate, time_step: float) -> dict[str, float]:
     }
 
 
-def sunk(simulate: Simulate, time_step: float, method: Method) -> float:
+def sunk(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """How far the held capsule has moved in a second [m]."""
-    observe = {"x": Final(quantity=Position("capsule"), from_start=True)}
+    observe = {"x": engine.Final(quantity=engine.Position("capsule"), from_start=True)}
     result = simulate(scene(GRIPPED), time_step=time_step, duration=DURATION, method=method, observe=observe)
     return float(result["x"][2])
 
 
-def draw_time(simulate: Simulate) -> Drawing:
+def draw_time(simulate: case.Simulate) -> case.Drawing:
     """How long it is held against the time step, at three forces."""
     steps = tuple(1.0 / n for n in (15, 30, 60, 120, 240))
     curves, ends = [], []
@@ -143,7 +123,7 @@ def draw_time(simulate: Simulate) -> Drawing:
         ends.append(found[2])
         curves.append(line(f"{share:g} of the least force", steps, found, "points"))
         curves.append(line(f"Coulomb, {share:g}", steps, (slips_after(share),) * len(steps), "reference"))
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="time step [s]",
         y_label="held for [s], ten at most",
@@ -154,15 +134,15 @@ def draw_time(simulate: Simulate) -> Drawing:
     )
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Acceleration against the force of the fingers."""
     shares = tuple(0.05 * k for k in range(10, 27))
 
     def found(share: float) -> float:
-        observe = {"v": Final(quantity=Velocity("capsule"))}
+        observe = {"v": engine.Final(quantity=engine.Velocity("capsule"))}
         return -float(simulate(scene(share), time_step=TIME_STEPS[0], steps=6, observe=observe)["v"][2]) / 0.1
 
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulation", shares, sweep(shares, found), "points"),
             line("g − 2 µ F/m", shares, map(acceleration, shares), "reference"),
@@ -172,7 +152,7 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
-def _asked(time_step: float) -> Measurement:
+def _asked(time_step: float) -> case.Measurement:
     slack = 10.0 * ACCURACY * SLIPPING / (1.0 - SLIPPING)
     return ask(
         functools.partial(measure, time_step=time_step),
@@ -184,7 +164,7 @@ def _asked(time_step: float) -> Measurement:
                 1e-9,
                 "statics: friction is below its bound, so that nothing slips at any time step",
             ),
-            Metric(
+            case.Metric(
                 name="held_time",
                 description="how long it is held, ten seconds at most, before it has slipped a millimetre",
                 unit="s",
@@ -209,7 +189,7 @@ def _asked(time_step: float) -> Measurement:
     )
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Grasp",
     question="Do two fingers hold a capsule by friction, and let it slip when they press too little?",
     why="Grasps slip slowly out of the fingers in engines whose friction creeps, the faster the longer the step (Erez, "
@@ -232,36 +212,36 @@ TEST = ScalarTest(
     conclusion="Green: what is held stays at any time step. Red: friction creeps, or its bound is wrong.",
     source="ours; after T. Erez, Y. Tassa and E. Todorov, Simulation tools for model-based robotics, 2015",
     measurements=tuple(_asked(h) for h in TIME_STEPS),
-    example=lambda: Example(scene=scene(SLIPPING), time_step=TIME_STEPS[0], duration=0.4),
+    example=lambda: case.Example(scene=scene(SLIPPING), time_step=TIME_STEPS[0], duration=0.4),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="least-force",
             title="Least force that holds, over that of statics",
             configuration="plain",
             definition="in a second it moves by less than a millimetre",
-            study=functools.partial(least, method=PLAIN, easy=2.0),
+            study=functools.partial(least, method=engine.PLAIN, easy=2.0),
             unit="1",
             better="smaller",
             expected=(0.9997, 1.0006),
             expected_source="statics: 1; a force 2e-4 too small slips a millimetre in a second, and the search ends within 5e-4",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="least-force-iterative",
             title="The same by sweeps",
             configuration="iterative",
             definition="in a second it moves by less than a millimetre, and every solve settles",
-            study=functools.partial(least, method=Method(solver="iterative"), easy=2.0),
+            study=functools.partial(least, method=engine.Method(solver="iterative"), easy=2.0),
             unit="1",
             better="smaller",
             expected_source="none: how near to its bound fifty sweeps settle has no closed form; above 1 by statics",
         ),
     ),
     figures=(
-        Figure(name="time", title="Time of holding against the time step", draw=draw_time),
-        Figure(name="force", title="Acceleration against the force of the fingers", draw=draw),
+        case.Figure(name="time", title="Time of holding against the time step", draw=draw_time),
+        case.Figure(name="force", title="Acceleration against the force of the fingers", draw=draw),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="held",
             description="how far the capsule sinks in a second, pressed with 1.1 of the least force: not at all is right",
             unit="m",

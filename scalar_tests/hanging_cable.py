@@ -5,30 +5,9 @@ from __future__ import annotations
 import functools
 import math
 
-from spook_tracker.engine import (
-    WORLD,
-    Ball,
-    Capsule,
-    ConstraintForce,
-    Final,
-    MaximumAbsolute,
-    Method,
-    Position,
-    RigidBody,
-    Scene,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_count, unbroken
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.heavier import heavier
@@ -79,7 +58,7 @@ def nodes(count: int) -> list[tuple[float, float]]:
 
 
 @functools.cache
-def scene(count: int) -> Scene:
+def scene(count: int) -> engine.Scene:
     """Thin rods on ball joints, at rest where statics puts them."""
     length, places = LENGTH / count, nodes(count)
     rods, joints = [], []
@@ -87,20 +66,22 @@ def scene(count: int) -> Scene:
         (x, z), (u, w) = places[k], places[k + 1]
         turn = 0.5 * (0.5 * math.pi - angle)  # the rod lies along its z axis
         rods.append(
-            RigidBody(
+            engine.RigidBody(
                 name=f"link {k}",
                 mass=MASS / count,
-                shape=Capsule(0.02, length - 0.04),
+                shape=engine.Capsule(0.02, length - 0.04),
                 inertia=(MASS / count * length**2 / 12.0, MASS / count * length**2 / 12.0, 1e-5),
                 position=(0.5 * (x + u), 0.0, 0.5 * (z + w)),
                 orientation=(math.cos(turn), 0.0, math.sin(turn), 0.0),
             )
         )
-    names = [WORLD, *(rod.name for rod in rods), WORLD]
+    names = [engine.WORLD, *(rod.name for rod in rods), engine.WORLD]
     for k, (x, z) in enumerate(places):
-        between = (names[k], names[k + 1]) if k < count else (WORLD, names[k])
-        joints.append(Ball(name=f"joint {k}", between=between, at=(x, 0.0, z), compliance=0.0))
-    return Scene(bodies=tuple(rods), constraints=tuple(joints), gravity=(0.0, 0.0, -GRAVITY), contacts=False)
+        between = (names[k], names[k + 1]) if k < count else (engine.WORLD, names[k])
+        joints.append(engine.Ball(name=f"joint {k}", between=between, at=(x, 0.0, z), compliance=0.0))
+    return engine.Scene(
+        bodies=tuple(rods), constraints=tuple(joints), gravity=(0.0, 0.0, -GRAVITY), contacts=False
+    )
 
 
 def smoothing(count: int) -> float:
@@ -113,9 +94,9 @@ def smoothing(count: int) -> float:
     return float(further / (2.0 * a * (math.asinh(half / a) - half / a / math.sqrt(bent))))
 
 
-def finest(simulate: Simulate) -> BreakPoint:
+def finest(simulate: case.Simulate) -> case.BreakPoint:
     """The largest number of links whose cable hangs still at 1/60 s."""
-    observe = {"x": MaximumAbsolute(quantity=Position(), from_start=True)}
+    observe = {"x": engine.MaximumAbsolute(quantity=engine.Position(), from_start=True)}
 
     def still(count: int) -> bool:
         result = simulate(scene(count), time_step=TIME_STEP, steps=300, observe=observe)
@@ -124,11 +105,11 @@ def finest(simulate: Simulate) -> BreakPoint:
     return break_count(still, (10, 20, 40, 80))
 
 
-def hangs(simulate: Simulate, whole: float) -> bool:
+def hangs(simulate: case.Simulate, whole: float) -> bool:
     """Whether ten links of that mass [kg] hang still for a second and pull in proportion to it."""
     observe = {
-        "x": MaximumAbsolute(quantity=Position(), from_start=True),
-        "force": Final(quantity=ConstraintForce("joint 0")),
+        "x": engine.MaximumAbsolute(quantity=engine.Position(), from_start=True),
+        "force": engine.Final(quantity=engine.ConstraintForce("joint 0")),
     }
     result = simulate(
         heavier(scene(10), whole / MASS), time_step=TIME_STEP, duration=DURATION, observe=observe
@@ -137,12 +118,12 @@ def hangs(simulate: Simulate, whole: float) -> bool:
     return result.completed and float(result["x"].max()) < 1e-9 and abs(pull / horizontal(10) - 1.0) < 1e-9
 
 
-def measure(simulate: Simulate, count: int, time_step: float) -> dict[str, float]:
+def measure(simulate: case.Simulate, count: int, time_step: float) -> dict[str, float]:
     """A second at rest."""
     middle = f"link {count // 2}"
     observe = {
-        "x": MaximumAbsolute(quantity=Position(middle), from_start=True),
-        "force": Final(quantity=ConstraintForce("joint 0")),
+        "x": engine.MaximumAbsolute(quantity=engine.Position(middle), from_start=True),
+        "force": engine.Final(quantity=engine.ConstraintForce("joint 0")),
     }
     result = simulate(scene(count), time_step=time_step, duration=DURATION, observe=observe)
     pull, weight = horizontal(count), MASS * GRAVITY
@@ -155,24 +136,24 @@ def measure(simulate: Simulate, count: int, time_step: float) -> dict[str, float
     }
 
 
-def pull_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def pull_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Relative error of the horizontal force of the cable of ten links after a second."""
-    observe = {"force": Final(quantity=ConstraintForce("joint 0"))}
+    observe = {"force": engine.Final(quantity=engine.ConstraintForce("joint 0"))}
     result = simulate(scene(10), time_step=time_step, duration=DURATION, method=method, observe=observe)
     return -float(result["force"][0]) / horizontal(10) - 1.0
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Where the links lie after a second, and the catenary."""
     count = 10
-    observe = {str(k): Final(quantity=Position(f"link {k}")) for k in range(count)}
+    observe = {str(k): engine.Final(quantity=engine.Position(f"link {k}")) for k in range(count)}
     result = simulate(scene(count), time_step=TIME_STEP, duration=DURATION, observe=observe)
     places = [result[str(k)] for k in range(count)]
     a = catenary() * LENGTH / (MASS * GRAVITY)
     x = [SPAN * (k / 60.0 - 0.5) for k in range(61)]
     top = math.cosh(0.5 * SPAN / a)
     off = max(abs(float(p[2]) - a * (math.cosh(float(p[0]) / a) - top)) for p in places)
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("middles of the links", (p[0] for p in places), (p[2] for p in places), "points"),
             line("catenary", x, (a * (math.cosh(u / a) - top) for u in x), "reference"),
@@ -183,7 +164,7 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
-def _asked(count: int, time_step: float) -> Measurement:
+def _asked(count: int, time_step: float) -> case.Measurement:
     asked = ask(
         functools.partial(measure, count=count, time_step=time_step),
         (
@@ -204,7 +185,7 @@ def _asked(count: int, time_step: float) -> Measurement:
         f"{count} links",
         time_step,
     )
-    return Measurement(
+    return case.Measurement(
         configuration=asked.configuration,
         time_step=time_step,
         parameters={"N": float(count)},
@@ -214,7 +195,7 @@ def _asked(count: int, time_step: float) -> Measurement:
     )
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Hanging cable",
     question="Does a cable of rigid links hang in its catenary, and pull at its ends as statics says?",
     why="A cable's pull comes from its shape alone: joints that give way, or forces that leak along the chain, change it.",
@@ -238,10 +219,10 @@ TEST = ScalarTest(
     conclusion="Green: joints carry the cable's weight and pull. Red: they give way or forces are wrong.",
     source="ours; the catenary is J. Bernoulli's problem of 1690",
     measurements=(*(_asked(*asked) for asked in ASKED),),
-    example=lambda: Example(scene=scene(10), time_step=TIME_STEP, duration=2.0),
-    figures=(Figure(name="shape", title="A hanging cable", draw=draw),),
+    example=lambda: case.Example(scene=scene(10), time_step=TIME_STEP, duration=2.0),
+    figures=(case.Figure(name="shape", title="A hanging cable", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="pull",
             description="relative error of the horizontal force at an end after a second, ten links",
             unit="1",
@@ -253,7 +234,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="finest",
             title="Most links whose cable hangs still at 1/60 s",
             configuration="plain",

@@ -13,39 +13,14 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import eigh
 
-from spook_tracker.engine import (
-    PLAIN,
-    WORLD,
-    Ball,
-    MaximumAbsolute,
-    Method,
-    Position,
-    Result,
-    RigidBody,
-    Scene,
-    Trace,
-    Violation,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, cell, is_stable, table
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityMap,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.sweep import line
 
-STIFF = Method(string_stiffness=True)
-STIFF_HALF = Method(string_stiffness=True, half_step_velocities=True)
+STIFF = engine.Method(string_stiffness=True)
+STIFF_HALF = engine.Method(string_stiffness=True, half_step_velocities=True)
 RODS = 10
 LENGTH, MASS = 1.0, 1.0  # m, kg
 ACROSS = MASS * LENGTH**2 / 12.0  # kg m², of a thin rod about its centre
@@ -62,8 +37,8 @@ MAP_LOADS = tuple(float(m) for m in np.geomspace(30.0, 3e8, 8))  # kg
 MAP_STEPS = tuple(float(h) for h in np.geomspace(1.0 / 480.0, 0.1, 8))  # s
 
 OBSERVE: dict[str, Observable] = {
-    "load": Trace(quantity=Position("load")),
-    "joint": MaximumAbsolute(quantity=Violation("joint 10")),
+    "load": engine.Trace(quantity=engine.Position("load")),
+    "joint": engine.MaximumAbsolute(quantity=engine.Violation("joint 10")),
 }
 
 
@@ -72,14 +47,14 @@ def _vector(values: npt.NDArray[np.float64]) -> tuple[float, float, float]:
     return (x, y, z)
 
 
-def scene(load: float = HEAVY, compliance: float = 0.0) -> Scene:
+def scene(load: float = HEAVY, compliance: float = 0.0) -> engine.Scene:
     """The rods in a row, TILT off the vertical, on ball joints; the load at the end, free to turn."""
     angles = [TILT + ZIGZAG * (-1) ** k for k in range(RODS)]
     ends = [np.zeros(3)]
     for angle in angles:
         ends.append(ends[-1] + LENGTH * np.array([math.sin(angle), 0.0, -math.cos(angle)]))
     bodies = [
-        RigidBody(
+        engine.RigidBody(
             name=f"rod {k}",
             mass=MASS,
             inertia=(ACROSS, ACROSS, 1e-3),
@@ -88,13 +63,19 @@ def scene(load: float = HEAVY, compliance: float = 0.0) -> Scene:
         )
         for k, angle in enumerate(angles)
     ]
-    bodies.append(RigidBody(name="load", mass=load, inertia=(0.01 * load,) * 3, position=_vector(ends[-1])))
-    names = [WORLD, *(body.name for body in bodies)]
+    bodies.append(
+        engine.RigidBody(name="load", mass=load, inertia=(0.01 * load,) * 3, position=_vector(ends[-1]))
+    )
+    names = [engine.WORLD, *(body.name for body in bodies)]
     joints = tuple(
-        Ball(name=f"joint {k}", between=(names[k], names[k + 1]), at=_vector(ends[k]), compliance=compliance)
+        engine.Ball(
+            name=f"joint {k}", between=(names[k], names[k + 1]), at=_vector(ends[k]), compliance=compliance
+        )
         for k in range(RODS + 1)
     )
-    return Scene(bodies=tuple(bodies), constraints=joints, gravity=(0.0, 0.0, -GRAVITY), contacts=False)
+    return engine.Scene(
+        bodies=tuple(bodies), constraints=joints, gravity=(0.0, 0.0, -GRAVITY), contacts=False
+    )
 
 
 def rates(load: float) -> npt.NDArray[np.float64]:
@@ -113,7 +94,7 @@ def period(load: float, time_step: float) -> float:
     return math.pi * time_step / math.atan(0.5 * time_step * rates(load)[0]) * (1.0 + TILT**2 / 16.0)
 
 
-def measured_period(result: Result) -> float:
+def measured_period(result: engine.Result) -> float:
     """Mean period [s] from the load's zero crossings; NaN with fewer than three."""
     time, place = result.sample_times["load"], result["load"][:, 0]
     crossing = np.nonzero((place[:-1] > 0.0) != (place[1:] > 0.0))[0]
@@ -123,7 +104,7 @@ def measured_period(result: Result) -> float:
     return float(2.0 * (zero[-1] - zero[0]) / (len(zero) - 1))
 
 
-def swing(simulate: Simulate) -> dict[str, float]:
+def swing(simulate: case.Simulate) -> dict[str, float]:
     """Period, width and joints under the heavy load."""
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, method=STIFF, observe=OBSERVE)
     width = np.abs(result["load"][:, 0])
@@ -135,9 +116,9 @@ def swing(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """How far the load is from its swing at most [m], of 0.1 m."""
-    observe = {"load": Trace(quantity=Position("load"))}
+    observe = {"load": engine.Trace(quantity=engine.Position("load"))}
     result = simulate(scene(), time_step=time_step, duration=LADDER_DURATION, method=method, observe=observe)
     rate = rates(HEAVY)[0] / (1.0 + TILT**2 / 16.0)
     exact = RODS * LENGTH * math.sin(TILT) * np.cos(rate * result.sample_times["load"])
@@ -145,25 +126,25 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
 
 
 def _kind(
-    simulate: Simulate,
+    simulate: case.Simulate,
     load: float,
     time_step: float,
-    method: Method,
+    method: engine.Method,
     seconds: float,
     compliance: float = 0.0,
 ) -> str:
     """Stable while the load swings no wider than it started, beyond what a step's start offset adds."""
-    observe = {"load": Trace(quantity=Position("load"))}
+    observe = {"load": engine.Trace(quantity=engine.Position("load"))}
     built, steps = scene(load, compliance), round(seconds / time_step)
     result = simulate(built, time_step=time_step, steps=steps, method=method, observe=observe)
     start = RODS * LENGTH * TILT
     return cell(result, result.partial["load"][:, 0] / start, bound=1.1 + time_step * float(rates(load)[0]))
 
 
-def heaviest(simulate: Simulate) -> BreakPoint:
+def heaviest(simulate: case.Simulate) -> case.BreakPoint:
     """Largest load [kg] of plain SPOOK at 1/60 s."""
     return break_point(
-        lambda load: is_stable(_kind(simulate, load, TIME_STEP, PLAIN, 20.0)),
+        lambda load: is_stable(_kind(simulate, load, TIME_STEP, engine.PLAIN, 20.0)),
         30.0,
         3e4,
         resolution=0.005,
@@ -180,11 +161,11 @@ def predicted_break(time_step: float = TIME_STEP) -> float:
     return low
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """Longest time step [s] of plain SPOOK under SOME kilograms."""
     guess = 2.0 / float(rates(SOME)[-1])
     return break_point(
-        lambda h: is_stable(_kind(simulate, SOME, h, PLAIN, 20.0)),
+        lambda h: is_stable(_kind(simulate, SOME, h, engine.PLAIN, 20.0)),
         0.2 * guess,
         3.0 * guess,
         resolution=0.005,
@@ -192,7 +173,7 @@ def longest_step(simulate: Simulate) -> BreakPoint:
     )
 
 
-def stiffest(simulate: Simulate) -> BreakPoint:
+def stiffest(simulate: case.Simulate) -> case.BreakPoint:
     """Smallest compliance [m/N] of the joints under the heavy load, its tension taken implicitly."""
     return break_point(
         lambda compliance: is_stable(_kind(simulate, HEAVY, TIME_STEP, STIFF, 20.0, compliance)),
@@ -208,9 +189,9 @@ def _explicit_growth(load: float, time_step: float) -> float:
     return 1.0 if half <= 1.0 else half + math.sqrt(half * half - 1.0)
 
 
-def _map(method: Method) -> Any:
-    def study(simulate: Simulate) -> StabilityMap:
-        return StabilityMap(
+def _map(method: engine.Method) -> Any:
+    def study(simulate: case.Simulate) -> case.StabilityMap:
+        return case.StabilityMap(
             x=MAP_LOADS,
             y=MAP_STEPS,
             cells=table(MAP_STEPS, MAP_LOADS, lambda m, h: _kind(simulate, m, h, method, MAP_SECONDS)),
@@ -223,11 +204,11 @@ def _map(method: Method) -> Any:
     return study
 
 
-def _draw(simulate: Simulate) -> Drawing:
+def _draw(simulate: case.Simulate) -> case.Drawing:
     result = simulate(scene(), time_step=TIME_STEP, duration=20.0, method=STIFF, observe=OBSERVE)
     times = result.sample_times["load"]
     exact = RODS * LENGTH * TILT * np.cos(2.0 * math.pi * times / period(HEAVY, TIME_STEP))
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulation", times[::6], result["load"][::6, 0]),
             line("exact", times[::6], exact[::6], "reference"),
@@ -241,7 +222,7 @@ HOLDS = (
     "20 s (13 s in maps) without the load swinging wider than at the start, beyond 10 % and the step's start offset, "
     "or doubling in the last third; rods start 1e-9 rad left and right in turn"
 )
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Loaded rods",
     question="How heavy a load do ten light rods carry, and does it swing with its period?",
     why="Cranes, bridges and legs are light parts under heavy loads; there rigid-body engines tremble, or blow up.",
@@ -261,12 +242,12 @@ TEST = ScalarTest(
     conclusion="Green: tension is carried however large. Red: the load changes its period, or the rods tremble.",
     source="ours; the rigid counterpart of the hanging chain",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="string",
             time_step=TIME_STEP,
             parameters={"N": RODS},
             metrics=(
-                Metric(
+                case.Metric(
                     name="period_error",
                     description="relative error of the mean period over 40 s",
                     unit="1",
@@ -277,7 +258,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-9,
                 ),
-                Metric(
+                case.Metric(
                     name="width_change",
                     description="|largest swing of the last 7 s over that of the first, less one|",
                     unit="1",
@@ -287,7 +268,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-9,
                 ),
-                Metric(
+                case.Metric(
                     name="joint_violation",
                     description="largest violation of the joint at the load",
                     unit="m",
@@ -302,17 +283,19 @@ TEST = ScalarTest(
             note="Geometric stiffness treated implicitly.",
         ),
     ),
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP, method=STIFF),
-    figures=(Figure(name="swing", title="The load sideways", draw=_draw),),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP, method=STIFF),
+    figures=(case.Figure(name="swing", title="The load sideways", draw=_draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="place",
             description="load from its swing at most, in 20 s: the slowest mode, with its width in the period",
             unit="m",
             time_steps=tuple(1.0 / n for n in (15, 30, 60, 120, 240, 480)),
             configurations=(
-                Configuration(name="string", method=STIFF, expected_order=1.0, order_range=(1 / 480, 1 / 30)),
-                Configuration(
+                case.Configuration(
+                    name="string", method=STIFF, expected_order=1.0, order_range=(1 / 480, 1 / 30)
+                ),
+                case.Configuration(
                     name="string, half-step",
                     method=STIFF_HALF,
                     expected_order=2.0,
@@ -325,7 +308,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="heaviest-load-plain",
             title="Heaviest load of ten rods, plain SPOOK",
             configuration="plain",
@@ -335,7 +318,7 @@ TEST = ScalarTest(
             expected=(0.99 * predicted_break(), 1.01 * predicted_break()),
             expected_source="h ω = 2 for the fastest mode of ten rods",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step-plain",
             title="Longest time step of ten rods under 1000 kg, plain SPOOK",
             configuration="plain",
@@ -345,7 +328,7 @@ TEST = ScalarTest(
             expected=(0.99 * 2.0 / float(rates(SOME)[-1]), 1.005 * 2.0 / float(rates(SOME)[-1])),
             expected_source="h ω = 2 for the fastest mode of ten rods, to the resolution of the search",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="smallest-compliance-string",
             title="Smallest compliance of the joints under 1e6 kg, string stiffness",
             configuration="string",
@@ -357,14 +340,14 @@ TEST = ScalarTest(
             expected_source="rows of an open chain do not repeat each other: the system is regular at 0 as well, and a "
             "row's own map is stable for every compliance while τ > 0; the search ends at 1e-18",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="map-plain",
             title="Load and time step, plain SPOOK",
             configuration="plain",
             definition=HOLDS,
-            study=_map(PLAIN),
+            study=_map(engine.PLAIN),
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="map-string",
             title="Load and time step, string stiffness",
             configuration="string",

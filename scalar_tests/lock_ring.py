@@ -11,32 +11,9 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import (
-    WORLD,
-    Box,
-    ConstraintForce,
-    Final,
-    Lock,
-    MaximumAbsolute,
-    Method,
-    Position,
-    RigidBody,
-    Scene,
-    Trace,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_count, break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
@@ -56,15 +33,15 @@ def radius(count: int) -> float:
     return 0.5 * PIECE / math.tan(math.pi / count)
 
 
-def scene(count: int = COUNT, compliance: float = 0.0) -> Scene:
+def scene(count: int = COUNT, compliance: float = 0.0) -> engine.Scene:
     """A vertical ring of locked boxes; box 1, at the top, is locked to the world."""
     size = radius(count)
     angles = [2.0 * math.pi * i / count for i in range(count)]
     boxes = tuple(
-        RigidBody(
+        engine.RigidBody(
             name=f"box {i + 1}",
             mass=MASS,
-            shape=Box((PIECE, 0.1, 0.1)),
+            shape=engine.Box((PIECE, 0.1, 0.1)),
             position=(size * math.sin(angle), 0.0, size * math.cos(angle)),
             orientation=(math.cos(0.5 * angle), 0.0, math.sin(0.5 * angle), 0.0),
         )
@@ -72,17 +49,17 @@ def scene(count: int = COUNT, compliance: float = 0.0) -> Scene:
     )
     corner = math.hypot(size, 0.5 * PIECE)
 
-    def lock(i: int) -> Lock:
+    def lock(i: int) -> engine.Lock:
         angle = 2.0 * math.pi * (i + 0.5) / count
-        return Lock(
+        return engine.Lock(
             name=f"lock {i + 1}",
             between=(f"box {i + 1}", f"box {(i + 1) % count + 1}"),
             at=(corner * math.sin(angle), 0.0, corner * math.cos(angle)),
             compliance=compliance,
         )
 
-    hanger = Lock(name="hanger", between=(WORLD, "box 1"), compliance=0.0)
-    return Scene(
+    hanger = engine.Lock(name="hanger", between=(engine.WORLD, "box 1"), compliance=0.0)
+    return engine.Scene(
         bodies=boxes,
         constraints=(hanger, *(lock(i) for i in range(count))),
         gravity=(0.0, 0.0, -GRAVITY),
@@ -90,18 +67,18 @@ def scene(count: int = COUNT, compliance: float = 0.0) -> Scene:
     )
 
 
-def displacements(simulate: Simulate, count: int) -> tuple[np.ndarray, float]:
+def displacements(simulate: case.Simulate, count: int) -> tuple[np.ndarray, float]:
     """(count, 3) largest displacement [m] over the second half of the run, and the hanger's last force [N]."""
     observe = {
-        "place": Trace(quantity=Position(), first=STEPS // 2, every=10, from_start=True),
-        "hanger": Trace(quantity=ConstraintForce("hanger"), first=STEPS),
+        "place": engine.Trace(quantity=engine.Position(), first=STEPS // 2, every=10, from_start=True),
+        "hanger": engine.Trace(quantity=engine.ConstraintForce("hanger"), first=STEPS),
     }
     result = simulate(scene(count), time_step=TIME_STEP, steps=STEPS, observe=observe)
     return np.abs(result["place"]).max(axis=0), float(result["hanger"][-1, 2])
 
 
 def _measure(count: int) -> object:
-    def measure(simulate: Simulate) -> dict[str, float]:
+    def measure(simulate: case.Simulate) -> dict[str, float]:
         moved, held = displacements(simulate, count)
         return {
             "shape_error": 100.0 * float(moved.max()) / (2.0 * radius(count)),
@@ -111,10 +88,10 @@ def _measure(count: int) -> object:
     return measure
 
 
-def _draw(simulate: Simulate) -> Drawing:
+def _draw(simulate: case.Simulate) -> case.Drawing:
     moved, _ = displacements(simulate, COUNT)
     boxes = tuple(float(i + 1) for i in range(COUNT))
-    return Drawing(
+    return case.Drawing(
         curves=tuple(
             line(f"along {axis}", boxes, 1e12 * moved[:, i], "both") for i, axis in enumerate("xyz")
         ),
@@ -124,9 +101,9 @@ def _draw(simulate: Simulate) -> Drawing:
     )
 
 
-def _metrics(role: str) -> tuple[Metric, ...]:
+def _metrics(role: str) -> tuple[case.Metric, ...]:
     return (
-        Metric(
+        case.Metric(
             name="shape_error",
             description="largest displacement of a box over the ring's diameter, second half of the run",
             unit="%",
@@ -136,7 +113,7 @@ def _metrics(role: str) -> tuple[Metric, ...]:
             reference=0.0,
             tolerance=1e-12,
         ),
-        Metric(
+        case.Metric(
             name="weight_error",
             description="force of the hanger over the ring's weight, minus one",
             unit="1",
@@ -171,40 +148,40 @@ def sinks(count: int) -> float:
     return -float(moved[3 * (count // 2) - 2])
 
 
-def keeps_round(simulate: Simulate, compliance: float) -> bool:
+def keeps_round(simulate: case.Simulate, compliance: float) -> bool:
     """Whether the lowest box of a ring of soft locks has sunk by less than SAGGED when it rests."""
     lowest = f"box {LADDER_COUNT // 2 + 1}"
-    observe = {"moved": Final(quantity=Position(lowest), from_start=True)}
+    observe = {"moved": engine.Final(quantity=engine.Position(lowest), from_start=True)}
     result = simulate(scene(LADDER_COUNT, compliance), time_step=TIME_STEP, duration=2.0, observe=observe)
     return result.completed and -float(result["moved"][2]) < SAGGED * 2.0 * radius(LADDER_COUNT)
 
 
-def closes(simulate: Simulate, count: int) -> bool:
+def closes(simulate: case.Simulate, count: int) -> bool:
     """Whether a ring of so many rigid locks keeps its shape to 1e-6 % of its diameter, over a second."""
-    observe = {"place": MaximumAbsolute(quantity=Position(), from_start=True)}
+    observe = {"place": engine.MaximumAbsolute(quantity=engine.Position(), from_start=True)}
     result = simulate(scene(count), time_step=TIME_STEP, duration=1.0, observe=observe)
     return result.completed and float(result["place"].max()) < 1e-8 * 2.0 * radius(count)
 
 
-def softest(simulate: Simulate) -> BreakPoint:
+def softest(simulate: case.Simulate) -> case.BreakPoint:
     """The largest compliance [m/N, rad/(N m)] of locks with which the ring keeps its shape."""
     return break_point(functools.partial(keeps_round, simulate), 1e-8, 1e-3, resolution=1e-3, walk=6)
 
 
-def most_boxes(simulate: Simulate) -> BreakPoint:
+def most_boxes(simulate: case.Simulate) -> case.BreakPoint:
     """The most boxes of a rigid ring that keeps its shape."""
     return break_count(functools.partial(closes, simulate), RINGS)
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest displacement of any box over 1 s, of the ring's diameter [%]."""
-    observe = {"place": MaximumAbsolute(quantity=Position(), from_start=True)}
+    observe = {"place": engine.MaximumAbsolute(quantity=engine.Position(), from_start=True)}
     result = simulate(scene(LADDER_COUNT), time_step=time_step, duration=1.0, method=method, observe=observe)
     return 100.0 * float(result["place"].max()) / (2.0 * radius(LADDER_COUNT))
 
 
 SOFTEST = SAGGED * 2.0 * radius(LADDER_COUNT) / sinks(LADDER_COUNT)  # m/N, rad/(N m)
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Closed ring of locks",
     question="Does a closed ring of locks keep its shape in every direction?",
     why="A loop has one joint too many: solvers made for trees cut it open, and singular ones let it creep.",
@@ -220,7 +197,7 @@ TEST = ScalarTest(
     conclusion="Green: loops are solved like trees. Red: the loop opens, or redundancy is regularised away.",
     source="thesis, section 3.2.1 (asked for)",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             parameters={"N": COUNT},
@@ -228,7 +205,7 @@ TEST = ScalarTest(
             measure=_measure(COUNT),  # type: ignore[arg-type]
             note="Direct solver.",
         ),
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             parameters={"N": 200},
@@ -237,10 +214,10 @@ TEST = ScalarTest(
             note="A ring of 200 boxes, 100 m around.",
         ),
     ),
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP),
-    figures=(Figure(name="displacements", title="Displacement of every box", draw=_draw),),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP),
+    figures=(case.Figure(name="displacements", title="Displacement of every box", draw=_draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="shape",
             description="largest displacement of a ring of 12 over 1 s, of its diameter",
             unit="%",
@@ -254,7 +231,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="softest",
             title="Softest locks with which a ring of 12 keeps its shape",
             configuration="plain",
@@ -265,7 +242,7 @@ TEST = ScalarTest(
             expected_source="at rest g = −ε F: statics of rigid boxes on springs, small displacements; a thousandth for what "
             "bends with them, another for the search, one to spare",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="most-boxes",
             title="Most boxes of a rigid ring that keeps its shape",
             configuration="plain",

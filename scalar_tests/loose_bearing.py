@@ -9,39 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    WORLD,
-    Box,
-    Compound,
-    ContactForce,
-    Hinge,
-    Load,
-    Material,
-    Method,
-    Motor,
-    Part,
-    PointOnLine,
-    Position,
-    Prismatic,
-    RigidBody,
-    Scene,
-    Sphere,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.heavier import heavier
@@ -73,24 +44,24 @@ DURATION = 2.25  # s: four flights
 
 
 @functools.cache
-def scene(time_step: float, preload: float | None = None) -> Scene:
+def scene(time_step: float, preload: float | None = None) -> engine.Scene:
     """A crank that a motor turns, a rod whose far end is a pin guided along x, and round it the slider's slot. The pin
     touches the slot's left wall: it brakes the slider. Or the right one, which a preload [N] on the slider shuts."""
     x, lean, _ = (float(value) for value in pin(START))
     rates = [SPEED * float(slope(lambda t, i=i: pin(t)[i], START)) for i in (0, 1)]
     c, s = CRANK * math.cos(START), CRANK * math.sin(START)
     joint: dict[str, Any] = {"compliance": 0.0, "damping": RELAXATION * time_step}
-    plastic = Material()
+    plastic = engine.Material()
     half = 0.5 * ROD
     aside = PIN + PLAY + 0.5 * WALL[0]
     bodies = (
-        RigidBody(
+        engine.RigidBody(
             name="crank", mass=1.0, inertia=(TURNING,) * 3, position=(0, 0, 0), angular_velocity=(0, 0, SPEED)
         ),
-        RigidBody(
+        engine.RigidBody(
             name="rod",
             mass=ROD_MASS,
-            shape=Compound((Part(shape=Sphere(PIN), position=(half, 0.0, 0.0)),)),
+            shape=engine.Compound((engine.Part(shape=engine.Sphere(PIN), position=(half, 0.0, 0.0)),)),
             inertia=(1e-4, ROD_MASS * ROD**2 / 12.0, ROD_MASS * ROD**2 / 12.0),
             position=(0.5 * (c + x), 0.5 * s, 0.0),
             orientation=(math.cos(0.5 * lean), 0.0, 0.0, -math.sin(0.5 * lean)),
@@ -98,10 +69,12 @@ def scene(time_step: float, preload: float | None = None) -> Scene:
             angular_velocity=(0.0, 0.0, -rates[1]),
             material=plastic,
         ),
-        RigidBody(
+        engine.RigidBody(
             name="slider",
             mass=SLIDER,
-            shape=Compound(tuple(Part(shape=Box(WALL), position=(d, 0.0, 0.0)) for d in (-aside, aside))),
+            shape=engine.Compound(
+                tuple(engine.Part(shape=engine.Box(WALL), position=(d, 0.0, 0.0)) for d in (-aside, aside))
+            ),
             inertia=(0.01,) * 3,
             position=(x + (PLAY if preload is None else -PLAY), 0, 0),
             velocity=(rates[0], 0, 0),
@@ -109,20 +82,24 @@ def scene(time_step: float, preload: float | None = None) -> Scene:
         ),
     )
     joints = (
-        Hinge(
+        engine.Hinge(
             name="drive",
-            between=(WORLD, "crank"),
+            between=(engine.WORLD, "crank"),
             at=(0, 0, 0),
             axis=(0, 0, 1),
-            motor=Motor(speed=SPEED),
+            motor=engine.Motor(speed=SPEED),
             **joint,
         ),
-        Hinge(name="pin", between=("crank", "rod"), at=(c, s, 0.0), axis=(0, 0, 1), **joint),
-        PointOnLine(name="wrist", between=(WORLD, "rod"), at=(x, 0.0, 0.0), axis=(1, 0, 0), **joint),
-        Prismatic(name="guide", between=(WORLD, "slider"), axis=(1, 0, 0), **joint),
+        engine.Hinge(name="pin", between=("crank", "rod"), at=(c, s, 0.0), axis=(0, 0, 1), **joint),
+        engine.PointOnLine(
+            name="wrist", between=(engine.WORLD, "rod"), at=(x, 0.0, 0.0), axis=(1, 0, 0), **joint
+        ),
+        engine.Prismatic(name="guide", between=(engine.WORLD, "slider"), axis=(1, 0, 0), **joint),
     )
-    loads = () if preload is None else (Load(name="preload", body="slider", force=(-preload, 0.0, 0.0)),)
-    return Scene(bodies=bodies, constraints=joints, forces=loads)
+    loads = (
+        () if preload is None else (engine.Load(name="preload", body="slider", force=(-preload, 0.0, 0.0)),)
+    )
+    return engine.Scene(bodies=bodies, constraints=joints, forces=loads)
 
 
 def place(time: Any) -> Any:
@@ -188,11 +165,13 @@ def path(times: Any) -> Any:
     return found
 
 
-def runs(simulate: Simulate, time_step: float, method: Method = PLAIN) -> tuple[Any, Any, Any]:
+def runs(
+    simulate: case.Simulate, time_step: float, method: engine.Method = engine.PLAIN
+) -> tuple[Any, Any, Any]:
     """Times, and the slider's place and speed along its guide."""
     observe: dict[str, Observable] = {
-        "x": Trace(quantity=Position("slider")),
-        "v": Trace(quantity=Velocity("slider")),
+        "x": engine.Trace(quantity=engine.Position("slider")),
+        "v": engine.Trace(quantity=engine.Velocity("slider")),
     }
     result = simulate(
         scene(time_step), time_step=time_step, duration=DURATION, method=method, observe=observe
@@ -200,7 +179,7 @@ def runs(simulate: Simulate, time_step: float, method: Method = PLAIN) -> tuple[
     return result.sample_times["x"], result["x"][:, 0], result["v"][:, 0]
 
 
-def measure(simulate: Simulate) -> dict[str, float]:
+def measure(simulate: case.Simulate) -> dict[str, float]:
     """Two turns and a quarter."""
     times, x, v = runs(simulate, TIME_STEP)
     flying = [v[round(0.5 * (left + struck) / TIME_STEP)] / flies - 1.0 for left, struck, flies in flights()]
@@ -235,9 +214,9 @@ def place_limit(time_step: float) -> float:
     return pin_error(time_step) + longest * flight_error(time_step)
 
 
-def shut(simulate: Simulate, preload: float) -> bool:
+def shut(simulate: case.Simulate, preload: float) -> bool:
     """Whether pin and wall press each other in every step of a turn."""
-    observe = {"f": Trace(quantity=ContactForce("slider", "rod"))}
+    observe = {"f": engine.Trace(quantity=engine.ContactForce("slider", "rod"))}
     asked = scene(TIME_STEP, preload)
     result = simulate(asked, time_step=TIME_STEP, duration=TURN, observe=observe)
     return result.completed and float(np.abs(result["f"][1:, 0]).min()) > 0.0
@@ -248,33 +227,33 @@ def preload_error() -> float:
     return SLIDER * (2.0 * SPEED) ** 2 * lag(TIME_STEP)
 
 
-def least(simulate: Simulate) -> BreakPoint:
+def least(simulate: case.Simulate) -> case.BreakPoint:
     """The least preload that keeps the bearing from rattling."""
     return break_point(
         functools.partial(shut, simulate), 4.0 * PRELOAD, 0.25 * PRELOAD, resolution=1e-3, walk=4
     )
 
 
-def flies(simulate: Simulate, slider: float) -> bool:
+def flies(simulate: case.Simulate, slider: float) -> bool:
     """Whether a slider of that mass [kg] is where it should be in two turns and a quarter."""
     asked = heavier(scene(TIME_STEP), slider / SLIDER, "slider")
-    observe = {"x": Trace(quantity=Position("slider"))}
+    observe = {"x": engine.Trace(quantity=engine.Position("slider"))}
     result = simulate(asked, time_step=TIME_STEP, duration=DURATION, observe=observe)
     off = np.abs(result["x"][:, 0] - path(result.sample_times["x"]))
     return result.completed and float(off.max()) < place_limit(TIME_STEP)
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest error of the slider's place [m]."""
     times, x, _ = runs(simulate, time_step, method)
     return float(np.abs(x - path(times)).max())
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """How far the slider is ahead of the pin."""
     times, x, _ = runs(simulate, TIME_STEP)
     apart = float(np.abs(x - path(times)).max())
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulation", times, 1e3 * (x - place(times)), "points"),
             line("flights and blows", times, 1e3 * (path(times) - place(times)), "reference"),
@@ -287,7 +266,7 @@ def draw(simulate: Simulate) -> Drawing:
 
 LAG = "rods and cranks lag by (1 + 2 τ/h)/4 h² of the acceleration across a joint"
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Slider-crank with clearance",
     question="Does a slider with play in its bearing fly, strike and stick when and where mechanics says?",
     why="Worn bearings rattle. Twice a turn the pin leaves one side of its hole and strikes the other: a contact within a "
@@ -349,10 +328,10 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=scene(TIME_STEP), time_step=TIME_STEP, duration=4.0),
-    figures=(Figure(name="play", title="The slider's play", draw=draw),),
+    example=lambda: case.Example(scene=scene(TIME_STEP), time_step=TIME_STEP, duration=4.0),
+    figures=(case.Figure(name="play", title="The slider's play", draw=draw),),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="preload",
             title="Least preload of the slider that keeps its bearing from rattling",
             configuration="plain",
@@ -377,7 +356,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="place",
             description="largest error of the slider's place",
             unit="m",

@@ -5,32 +5,9 @@ from __future__ import annotations
 import functools
 import math
 
-from spook_tracker.engine import (
-    PLAIN,
-    ContactForce,
-    ConvexHull,
-    Final,
-    Material,
-    Method,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.sweep import line, sweep, told
 
 GRAVITY = 9.81  # m/s²
@@ -66,16 +43,18 @@ def voussoirs(count: int, thickness: float) -> list[list[tuple[float, float, flo
 
 
 @functools.cache
-def scene(count: int, thickness: float, friction: float = FRICTION) -> Scene:
+def scene(count: int, thickness: float, friction: float = FRICTION) -> engine.Scene:
     """The arch on rough ground, its stones touching and at rest."""
-    stone = Material(friction=friction, compliance=COMPLIANCE, slip_compliance=CREEP)
+    stone = engine.Material(friction=friction, compliance=COMPLIANCE, slip_compliance=CREEP)
     bodies = [
-        RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=stone)
+        engine.RigidBody(
+            name="ground", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=stone
+        )
     ]
     for k, corners in enumerate(voussoirs(count, thickness)):
-        shape, position, orientation = ConvexHull.placed(corners)
+        shape, position, orientation = engine.ConvexHull.placed(corners)
         bodies.append(
-            RigidBody(
+            engine.RigidBody(
                 name=f"stone {k}",
                 mass=DENSITY * shape.volume,
                 shape=shape,
@@ -84,13 +63,15 @@ def scene(count: int, thickness: float, friction: float = FRICTION) -> Scene:
                 material=stone,
             )
         )
-    return Scene(bodies=tuple(bodies), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=tuple(bodies), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def weight(count: int, thickness: float) -> float:
     """Of the whole arch [N]."""
     return GRAVITY * sum(
-        body.mass for body in scene(count, thickness).bodies if isinstance(body, RigidBody) and body.mass
+        body.mass
+        for body in scene(count, thickness).bodies
+        if isinstance(body, engine.RigidBody) and body.mass
     )
 
 
@@ -101,23 +82,27 @@ def most_sinking(count: int, thickness: float) -> float:
 
 
 def sinking(
-    simulate: Simulate, count: int, thickness: float, time_step: float = TIME_STEP, method: Method = PLAIN
+    simulate: case.Simulate,
+    count: int,
+    thickness: float,
+    time_step: float = TIME_STEP,
+    method: engine.Method = engine.PLAIN,
 ) -> float:
     """How far the crown sinks in half a second [m]."""
     crown = f"stone {count // 2}"
-    observe = {"x": Final(quantity=Position(crown))}
+    observe = {"x": engine.Final(quantity=engine.Position(crown))}
     asked = scene(count, thickness)
     result = simulate(asked, time_step=time_step, duration=DURATION, method=method, observe=observe)
     return float(asked.body(crown).position[2]) - float(result["x"][2])
 
 
-def measure(simulate: Simulate, count: int) -> dict[str, float]:
+def measure(simulate: case.Simulate, count: int) -> dict[str, float]:
     """An arch 2 % thicker than it must be, and one 2 % thinner."""
     thick, thin = 1.02 * LEAST[count], 0.98 * LEAST[count]
     observe = {
-        "x": Final(quantity=Position(f"stone {count // 2}")),
-        "foot": Final(quantity=ContactForce("stone 0", "ground")),
-        "ground": Final(quantity=ContactForce("ground")),
+        "x": engine.Final(quantity=engine.Position(f"stone {count // 2}")),
+        "foot": engine.Final(quantity=engine.ContactForce("stone 0", "ground")),
+        "ground": engine.Final(quantity=engine.ContactForce("ground")),
     }
     asked = scene(count, thick)
     result = simulate(asked, time_step=TIME_STEP, duration=DURATION, observe=observe)
@@ -131,12 +116,12 @@ def measure(simulate: Simulate, count: int) -> dict[str, float]:
     }
 
 
-def stands(simulate: Simulate, count: int, thickness: float) -> bool:
+def stands(simulate: case.Simulate, count: int, thickness: float) -> bool:
     """Whether it sinks by no more than it can while it stands."""
     return sinking(simulate, count, thickness) < most_sinking(count, thickness)
 
 
-def thinnest(simulate: Simulate) -> BreakPoint:
+def thinnest(simulate: case.Simulate) -> case.BreakPoint:
     """The thinnest arch of nine stones that stands."""
     least = LEAST[9]
     return break_point(
@@ -144,15 +129,15 @@ def thinnest(simulate: Simulate) -> BreakPoint:
     )
 
 
-def slides(simulate: Simulate, friction: float) -> float:
+def slides(simulate: case.Simulate, friction: float) -> float:
     """How far a foot of five stones slides outwards in SOON [m]."""
     asked = scene(5, 1.02 * LEAST[5], friction)
-    observe = {"x": Final(quantity=Position("stone 0"), from_start=True)}
+    observe = {"x": engine.Final(quantity=engine.Position("stone 0"), from_start=True)}
     result = simulate(asked, time_step=TIME_STEP, duration=SOON, observe=observe)
     return float(result["x"][0])
 
 
-def smoothest(simulate: Simulate) -> BreakPoint:
+def smoothest(simulate: case.Simulate) -> case.BreakPoint:
     """The least friction with which an arch of five stones stands."""
     low, high = SMOOTHEST
     return break_point(
@@ -160,7 +145,7 @@ def smoothest(simulate: Simulate) -> BreakPoint:
     )
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """The crown's sinking against the thickness, over the least one."""
     ratios = (0.96, 0.98, 0.99, 1.01, 1.02, 1.04)
     curves = [
@@ -173,7 +158,7 @@ def draw(simulate: Simulate) -> Drawing:
         for count in (5, 9)
     ]
     standing, falling = curves[1].y[3], curves[1].y[2]
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="thickness over the least one",
         y_label="sinking of the crown in 0.5 s [m]",
@@ -183,14 +168,14 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
-def _asked(count: int) -> Measurement:
+def _asked(count: int) -> case.Measurement:
     low, high = THRUST[count]
-    return Measurement(
+    return case.Measurement(
         configuration="plain",
         time_step=TIME_STEP,
         parameters={"N": float(count)},
         metrics=(
-            Metric(
+            case.Metric(
                 name="stands",
                 description="sinking of the crown of the thicker arch, over the most that a standing one can",
                 unit="1",
@@ -200,7 +185,7 @@ def _asked(count: int) -> Measurement:
                 reference=0.0,
                 relative_tolerance=1e-3,
             ),
-            Metric(
+            case.Metric(
                 name="falls",
                 description="sinking of the crown of the thinner arch, over the most that a standing one can",
                 unit="1",
@@ -211,7 +196,7 @@ def _asked(count: int) -> Measurement:
                 limit_kind="physical",
                 relative_tolerance=1e-3,
             ),
-            Metric(
+            case.Metric(
                 name="weight_error",
                 description="force on the ground over the weight, minus one",
                 unit="1",
@@ -221,7 +206,7 @@ def _asked(count: int) -> Measurement:
                 reference=0.0,
                 tolerance=1e-4,
             ),
-            Metric(
+            case.Metric(
                 name="thrust",
                 description="horizontal force at a foot over the weight, of the thicker arch",
                 unit="1",
@@ -238,7 +223,7 @@ def _asked(count: int) -> Measurement:
     )
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Masonry arch",
     question="How thin may a masonry arch be, and does it fall when it is thinner?",
     why="Nothing but contact and friction holds an arch, and whether it stands is decided by geometry alone: every "
@@ -264,9 +249,9 @@ TEST = ScalarTest(
     "(it falls too early) or the stones stick (it stands too long).",
     source="ours; J. Heyman, The stone skeleton, 1966",
     measurements=(_asked(5), _asked(9), _asked(21)),
-    example=lambda: Example(scene=scene(9, 0.95 * LEAST[9]), time_step=TIME_STEP, duration=1.5),
+    example=lambda: case.Example(scene=scene(9, 0.95 * LEAST[9]), time_step=TIME_STEP, duration=1.5),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="thickness",
             title="Thinnest arch of nine stones that stands",
             configuration="plain",
@@ -278,7 +263,7 @@ TEST = ScalarTest(
             expected_source="limit analysis: 0.1015; the resolution of the search, and what half a second of a fall that "
             "has hardly begun hides",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="smoothest",
             title="Least friction with which an arch of five stones stands",
             configuration="plain",
@@ -291,17 +276,19 @@ TEST = ScalarTest(
             "and as much lacking that slides by half of that in a tenth of a second",
         ),
     ),
-    figures=(Figure(name="thickness", title="Sinking of the crown against thickness", draw=draw),),
+    figures=(case.Figure(name="thickness", title="Sinking of the crown against thickness", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="sinking",
             description="sinking of the crown of nine stones, 2 % thicker than they must be: none is right",
             unit="m",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
             configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=None),
-                Configuration(
-                    name="iterative", method=Method(solver="iterative", iterations=2000), expected_order=None
+                case.Configuration(name="direct", method=engine.PLAIN, expected_order=None),
+                case.Configuration(
+                    name="iterative",
+                    method=engine.Method(solver="iterative", iterations=2000),
+                    expected_order=None,
                 ),
             ),
             error=lambda simulate, time_step, method: sinking(

@@ -8,33 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import (
-    WORLD,
-    AngularVelocity,
-    Final,
-    Hinge,
-    JointCoordinate,
-    Load,
-    Method,
-    Motor,
-    RigidBody,
-    Scene,
-    Trace,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import apart, line
 
@@ -47,21 +24,21 @@ RISE = SPEED * INERTIA / TORQUE  # s, 5
 LEAD = 0.5 * TIME_STEP * SPEED  # rad
 HEAVIEST = 1e12  # kg m², where the search for the largest wheel ends
 OBSERVE: dict[str, Observable] = {
-    "spin": Trace(quantity=AngularVelocity("wheel")),
-    "turned": Trace(quantity=JointCoordinate("axle")),
+    "spin": engine.Trace(quantity=engine.AngularVelocity("wheel")),
+    "turned": engine.Trace(quantity=engine.JointCoordinate("axle")),
 }
 
 
-def scene(torque: float | None = TORQUE) -> Scene:
+def scene(torque: float | None = TORQUE) -> engine.Scene:
     """A wheel at rest on an axle that a motor drives with at most `torque` [N m]; None is unbounded."""
-    wheel = RigidBody(name="wheel", mass=5.0, inertia=(1.5, 1.5, INERTIA), position=(0.0, 0.0, 0.0))
-    axle = Hinge(
+    wheel = engine.RigidBody(name="wheel", mass=5.0, inertia=(1.5, 1.5, INERTIA), position=(0.0, 0.0, 0.0))
+    axle = engine.Hinge(
         name="axle",
-        between=(WORLD, "wheel"),
+        between=(engine.WORLD, "wheel"),
         axis=(0.0, 0.0, 1.0),
-        motor=Motor(speed=SPEED, max_force=torque),
+        motor=engine.Motor(speed=SPEED, max_force=torque),
     )
-    return Scene(bodies=(wheel,), constraints=(axle,))
+    return engine.Scene(bodies=(wheel,), constraints=(axle,))
 
 
 def exact_speed(time: Any) -> Any:
@@ -76,7 +53,7 @@ def exact_angle(time: Any) -> Any:
     return 0.5 * TORQUE / INERTIA * rising**2 + SPEED * np.maximum(time - RISE, 0.0)
 
 
-def bounded(simulate: Simulate) -> dict[str, float]:
+def bounded(simulate: case.Simulate) -> dict[str, float]:
     """Speed against the closed form at every step."""
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=OBSERVE)
     time, spin = result.sample_times["spin"], result["spin"]
@@ -87,16 +64,16 @@ def bounded(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def unbounded(simulate: Simulate) -> dict[str, float]:
+def unbounded(simulate: case.Simulate) -> dict[str, float]:
     """The speed after one step."""
-    observe = {"spin": Final(quantity=AngularVelocity("wheel"))}
+    observe = {"spin": engine.Final(quantity=engine.AngularVelocity("wheel"))}
     result = simulate(scene(None), time_step=TIME_STEP, steps=1, observe=observe)
     return {"speed_error": float(result["spin"][2]) - SPEED}
 
 
-def wheel(inertia: float, spin: float) -> RigidBody:
+def wheel(inertia: float, spin: float) -> engine.RigidBody:
     """A wheel of that moment [kg m²] about its axle, spinning [rad/s]."""
-    return RigidBody(
+    return engine.RigidBody(
         name="wheel",
         mass=5.0,
         inertia=(inertia,) * 3,
@@ -105,46 +82,46 @@ def wheel(inertia: float, spin: float) -> RigidBody:
     )
 
 
-def bears(simulate: Simulate, torque: float) -> bool:
+def bears(simulate: case.Simulate, torque: float) -> bool:
     """Whether the motor keeps its set speed for a second against a load of `torque` [N m]."""
     turning = wheel(INERTIA, SPEED)
-    load = Load(name="load", body="wheel", torque=(0.0, 0.0, -torque))
-    observe = {"spin": Final(quantity=AngularVelocity("wheel"))}
+    load = engine.Load(name="load", body="wheel", torque=(0.0, 0.0, -torque))
+    observe = {"spin": engine.Final(quantity=engine.AngularVelocity("wheel"))}
     built = replace(scene(), bodies=(turning,), forces=(load,))
     spin = simulate(built, time_step=TIME_STEP, duration=1.0, observe=observe)["spin"]
     return abs(float(spin[2]) - SPEED) < 1e-9
 
 
-def starts(simulate: Simulate, inertia: float) -> bool:
+def starts(simulate: case.Simulate, inertia: float) -> bool:
     """Whether an unbounded motor has a wheel of `inertia` [kg m²] at its speed after one step."""
     built = replace(scene(None), bodies=(wheel(inertia, 0.0),))
-    observe = {"spin": Final(quantity=AngularVelocity("wheel"))}
+    observe = {"spin": engine.Final(quantity=engine.AngularVelocity("wheel"))}
     spin = simulate(built, time_step=TIME_STEP, steps=1, observe=observe)["spin"]
     return abs(float(spin[2]) - SPEED) < 1e-9
 
 
-def heaviest_load(simulate: Simulate) -> BreakPoint:
+def heaviest_load(simulate: case.Simulate) -> case.BreakPoint:
     """The largest load [N m] against which the motor keeps its speed."""
     return break_point(functools.partial(bears, simulate), 1.0, 9.0, resolution=1e-3, walk=5)
 
 
-def largest_wheel(simulate: Simulate) -> BreakPoint:
+def largest_wheel(simulate: case.Simulate) -> case.BreakPoint:
     """The largest wheel [kg m²] that an unbounded motor starts in one step."""
     return break_point(functools.partial(starts, simulate), INERTIA, HEAVIEST, walk=5)
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Angle after 10 s minus the closed form [rad]."""
-    observe = {"turned": Trace(quantity=JointCoordinate("axle"))}
+    observe = {"turned": engine.Trace(quantity=engine.JointCoordinate("axle"))}
     result = simulate(scene(), time_step=time_step, duration=DURATION, method=method, observe=observe)
     return float(result["turned"][-1] - exact_angle(DURATION))
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Speed against time."""
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=OBSERVE)
     time = result.sample_times["spin"][::6]
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulation", time, result["spin"][::6, 2]),
             line("min(T t/J, set speed)", time, exact_speed(time), "reference"),
@@ -155,7 +132,7 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
-SPEED_ERROR = Metric(
+SPEED_ERROR = case.Metric(
     name="speed_error",
     description="largest difference to min(T t/J, set speed) in 10 s",
     unit="rad/s",
@@ -166,7 +143,7 @@ SPEED_ERROR = Metric(
     tolerance=1e-12,
 )
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Motor",
     question="Does a motor reach its set speed, with the torque it is allowed and no more?",
     why="Winches, wheels and robots are motors with a bound. One that is too strong, or that takes its bound for an "
@@ -191,12 +168,12 @@ TEST = ScalarTest(
     "row is damped.",
     source="ours; torques are asked for in the thesis, section 5.4",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="bounded",
             time_step=TIME_STEP,
             metrics=(
                 SPEED_ERROR,
-                Metric(
+                case.Metric(
                     name="angle_lead",
                     description="angle beyond the closed form after 10 s over ½ h ω, minus one",
                     unit="1",
@@ -206,7 +183,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-12,
                 ),
-                Metric(
+                case.Metric(
                     name="wobble",
                     description="largest spin across the axle",
                     unit="rad/s",
@@ -220,7 +197,7 @@ TEST = ScalarTest(
             measure=bounded,
             note="at most 4 N m",
         ),
-        Measurement(
+        case.Measurement(
             configuration="unbounded",
             time_step=TIME_STEP,
             metrics=(SPEED_ERROR,),
@@ -228,10 +205,10 @@ TEST = ScalarTest(
             note="no bound: the set speed after one step",
         ),
     ),
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP, observe=OBSERVE),
-    figures=(Figure(name="speed", title="Speed of the wheel", draw=draw),),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP, observe=OBSERVE),
+    figures=(case.Figure(name="speed", title="Speed of the wheel", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="angle",
             description="angle after 10 s against the closed form",
             unit="rad",
@@ -243,7 +220,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="heaviest-load",
             title="Largest load against which the motor keeps its speed",
             configuration="bounded",
@@ -253,7 +230,7 @@ TEST = ScalarTest(
             expected=(0.999 * TORQUE, TORQUE),
             expected_source="the torque it is allowed, 4 N m; to the resolution of the search",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="largest-wheel",
             title="Largest wheel that an unbounded motor starts in one step",
             configuration="unbounded",

@@ -6,35 +6,10 @@ import functools
 
 import numpy as np
 
-from spook_tracker.engine import (
-    AngularVelocity,
-    Box,
-    Energy,
-    Final,
-    Maximum,
-    Method,
-    Penetration,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-    Trace,
-)
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_count, break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Curve,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line
@@ -54,24 +29,26 @@ STILL = 1e-9  # m
 TALL = (2, 5, 10, 20, 40)  # plates that are tried
 
 
-def scene(count: int, share: float) -> Scene:
+def scene(count: int, share: float) -> engine.Scene:
     """`count` plates, the k-th from above reaching `share` L/(2 k) beyond the next, on a floor."""
     rough = Material(friction=FRICTION)
-    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
+    floor = engine.RigidBody(
+        name="floor", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=rough
+    )
     plates, x = [], 0.0
     for level in range(count):
         if level:
             x += share * LENGTH / (2.0 * (count - level))
         plates.append(
-            RigidBody(
+            engine.RigidBody(
                 name=f"plate {level + 1}",
                 mass=MASS,
-                shape=Box((LENGTH, LENGTH, THICKNESS)),
+                shape=engine.Box((LENGTH, LENGTH, THICKNESS)),
                 position=(x, 0.0, THICKNESS * (level + 0.5)),
                 material=rough,
             )
         )
-    return Scene(bodies=(floor, *plates), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(floor, *plates), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def tipping_rate(share: float = OUTSIDE) -> float:
@@ -81,20 +58,23 @@ def tipping_rate(share: float = OUTSIDE) -> float:
     return GRAVITY * beyond / inertia
 
 
-def _measure_standing(simulate: Simulate) -> dict[str, float]:
-    observe = {"moved": Final(quantity=Position(), from_start=True)}
+def _measure_standing(simulate: case.Simulate) -> dict[str, float]:
+    observe = {"moved": engine.Final(quantity=engine.Position(), from_start=True)}
     result = simulate(scene(COUNT, INSIDE), time_step=TIME_STEP, duration=STANDING, observe=observe)
     return {"standing_moved": float(np.abs(result["moved"]).max())}
 
 
-def _measure_tipping(simulate: Simulate) -> dict[str, float]:
-    observe = {"w": Final(quantity=AngularVelocity("plate 2"))}
+def _measure_tipping(simulate: case.Simulate) -> dict[str, float]:
+    observe = {"w": engine.Final(quantity=engine.AngularVelocity("plate 2"))}
     result = simulate(scene(2, OUTSIDE), time_step=TIME_STEP, steps=1, observe=observe)
     return {"tipping_error": float(result["w"][1]) / (TIME_STEP * tipping_rate()) - 1.0}
 
 
-def _measure_heap(simulate: Simulate) -> dict[str, float]:
-    observe = {"depth": Maximum(quantity=Penetration()), "energy": Trace(quantity=Energy())}
+def _measure_heap(simulate: case.Simulate) -> dict[str, float]:
+    observe = {
+        "depth": engine.Maximum(quantity=engine.Penetration()),
+        "energy": engine.Trace(quantity=engine.Energy()),
+    }
     result = simulate(scene(FALLEN, OUTSIDE), time_step=TIME_STEP, duration=FALLING, observe=observe)
     energy = result["energy"]
     return {
@@ -103,33 +83,33 @@ def _measure_heap(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def stands(simulate: Simulate, count: int, share: float) -> bool:
+def stands(simulate: case.Simulate, count: int, share: float) -> bool:
     """Whether no plate of a stack has moved by STILL in a quarter of a second."""
-    observe = {"moved": Final(quantity=Position(), from_start=True)}
+    observe = {"moved": engine.Final(quantity=engine.Position(), from_start=True)}
     result = simulate(scene(count, share), time_step=TIME_STEP, duration=0.25, observe=observe)
     return result.completed and float(np.abs(result["moved"]).max()) < STILL
 
 
-def farthest(simulate: Simulate) -> BreakPoint:
+def farthest(simulate: case.Simulate) -> case.BreakPoint:
     """The largest overhang, over its limit, at which five plates stand."""
     return break_point(functools.partial(stands, simulate, 5), 0.6, 2.0, resolution=5e-4, walk=5)
 
 
-def tallest(simulate: Simulate) -> BreakPoint:
+def tallest(simulate: case.Simulate) -> case.BreakPoint:
     """The most plates that stand inside the limit."""
     return break_count(lambda count: stands(simulate, count, INSIDE), TALL)
 
 
-def _draw(simulate: Simulate) -> Drawing:
+def _draw(simulate: case.Simulate) -> case.Drawing:
     shares = tuple(0.97 + 0.005 * k for k in range(13))
     rates = []
     for share in shares:
-        observe = {"w": Final(quantity=AngularVelocity("plate 2"))}
+        observe = {"w": engine.Final(quantity=engine.AngularVelocity("plate 2"))}
         result = simulate(scene(2, share), time_step=TIME_STEP, steps=1, observe=observe)
         rates.append(float(result["w"][1]) / TIME_STEP)
-    return Drawing(
+    return case.Drawing(
         curves=(
-            Curve(name="simulation", x=shares, y=tuple(rates), style="points"),
+            case.Curve(name="simulation", x=shares, y=tuple(rates), style="points"),
             line("g d/i²", shares, (max(0.0, tipping_rate(s)) for s in shares), "reference"),
         ),
         x_label="overhang over its limit",
@@ -137,17 +117,17 @@ def _draw(simulate: Simulate) -> Drawing:
     )
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Deepest overlap [m] while three plates fall and lie."""
-    observe = {"depth": Maximum(quantity=Penetration())}
+    observe = {"depth": engine.Maximum(quantity=engine.Penetration())}
     result = simulate(
         scene(FALLEN, OUTSIDE), time_step=time_step, duration=LADDER_DURATION, method=method, observe=observe
     )
     return float(result["depth"])
 
 
-def _at_most(name: str, description: str, unit: str, limit: float, source: str) -> Metric:
-    return Metric(
+def _at_most(name: str, description: str, unit: str, limit: float, source: str) -> case.Metric:
+    return case.Metric(
         name=name,
         description=description,
         unit=unit,
@@ -160,7 +140,7 @@ def _at_most(name: str, description: str, unit: str, limit: float, source: str) 
     )
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Leaning plates",
     question="Does a stack of plates hang over by half the harmonic series, and fall beyond?",
     why="At its limit every interface is about to open: a solver that leaves a part of the load out, or softens it, "
@@ -211,7 +191,7 @@ TEST = ScalarTest(
             "One plate outside the limit.",
             TIME_STEP,
         ),
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             parameters={"N": FALLEN},
@@ -235,10 +215,10 @@ TEST = ScalarTest(
             note="Three plates fall and lie. What a step of it costs is followed as its work, and as the run time of the ladder.",
         ),
     ),
-    example=lambda: Example(scene=scene(FALLEN, OUTSIDE), time_step=TIME_STEP, duration=LADDER_DURATION),
-    figures=(Figure(name="tipping", title="Where the upper plate begins to tip", draw=_draw),),
+    example=lambda: case.Example(scene=scene(FALLEN, OUTSIDE), time_step=TIME_STEP, duration=LADDER_DURATION),
+    figures=(case.Figure(name="tipping", title="Where the upper plate begins to tip", draw=_draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="heap",
             description="deepest overlap while three plates fall and lie",
             unit="m",
@@ -248,7 +228,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="farthest",
             title="Largest overhang of five plates, over its limit",
             configuration="plain",
@@ -259,7 +239,7 @@ TEST = ScalarTest(
             expected_source="the plates above an edge have their centre on it at L/(2 k), and fall beyond; to the resolution of "
             "the search",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="tallest",
             title="Most plates that stand at 0.99 of the limit",
             configuration="plain",

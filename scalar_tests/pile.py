@@ -9,38 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    ContactForce,
-    Energy,
-    Final,
-    Method,
-    Momentum,
-    Penetration,
-    Plane,
-    Result,
-    RigidBody,
-    Scene,
-    Sphere,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-    Unobserved,
-)
 from spook_tracker.scalar_tests.sweep import line
 
 COUNT = 1000
@@ -54,7 +26,7 @@ GRAVITY = 9.81  # m/s²
 TIME_STEP = 1.0 / 60.0  # s
 STEPS = 240  # 4 s
 LAST = 60  # steps of the last second
-SWEEPS = Method(solver="iterative", iterations=50)
+SWEEPS = engine.Method(solver="iterative", iterations=50)
 MISSING_LOAD = -0.006  # 1, of the last second: the pile still sinks, and is slowed down
 SPREAD = 0.0012  # 1, of it from start to start
 STARTS = 4.0  # spreads that a start may be off
@@ -66,12 +38,14 @@ LEAST_FRICTION = math.tan(0.5 * LEAN)  # .358, of a pile of four
 LADDER_MISSING_LOAD, LADDER_SPREAD = -0.0025, 0.0012  # 1, of so many
 
 
-def scene(count: int = COUNT) -> Scene:
+def scene(count: int = COUNT) -> engine.Scene:
     """`count` spheres above a plane in ten layers of a square grid, each moved a little to the side."""
     rng = np.random.default_rng(1)
     rough = Material(friction=FRICTION)
     side = math.ceil(math.sqrt(count / 10))
-    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
+    floor = engine.RigidBody(
+        name="floor", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=rough
+    )
     spheres = []
     for k in range(count):
         dx, dy = rng.uniform(-JITTER, JITTER, 2)
@@ -81,9 +55,11 @@ def scene(count: int = COUNT) -> Scene:
             2 * RADIUS + SPACING * (k // side**2),
         )
         spheres.append(
-            RigidBody(name=f"s{k}", mass=MASS, shape=Sphere(RADIUS), position=place, material=rough)
+            engine.RigidBody(
+                name=f"s{k}", mass=MASS, shape=engine.Sphere(RADIUS), position=place, material=rough
+            )
         )
-    return Scene(bodies=(floor, *spheres), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(floor, *spheres), gravity=(0.0, 0.0, -GRAVITY))
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,9 +82,9 @@ def energy_rise(energy: np.ndarray) -> float:
 
 
 def read(
-    simulate: Simulate,
+    simulate: case.Simulate,
     count: int,
-    method: Method,
+    method: engine.Method,
     steps: int = STEPS,
     last: int = LAST,
     time_step: float = TIME_STEP,
@@ -116,12 +92,12 @@ def read(
 ) -> Pile:
     """Runs the pile; the floor's impulse is compared with the weight and the change of momentum, by Newton's law."""
     observe = {
-        "load": Trace(quantity=ContactForce("floor")),
-        "momentum": Trace(quantity=Momentum()),
-        "energy": Trace(quantity=Energy()),
-        "depth": Trace(quantity=Penetration()),
+        "load": engine.Trace(quantity=engine.ContactForce("floor")),
+        "momentum": engine.Trace(quantity=engine.Momentum()),
+        "energy": engine.Trace(quantity=engine.Energy()),
+        "depth": engine.Trace(quantity=engine.Penetration()),
     }
-    result: Result = simulate(
+    result: engine.Result = simulate(
         scene(count),
         time_step=time_step,
         duration=steps * time_step,
@@ -146,7 +122,7 @@ def read(
     )
 
 
-def measure(simulate: Simulate, count: int = COUNT, method: Method = SWEEPS) -> dict[str, float]:
+def measure(simulate: case.Simulate, count: int = COUNT, method: engine.Method = SWEEPS) -> dict[str, float]:
     pile = read(simulate, count, method)
     return {
         "overlap": pile.overlap,
@@ -156,29 +132,29 @@ def measure(simulate: Simulate, count: int = COUNT, method: Method = SWEEPS) -> 
     }
 
 
-def _draw(simulate: Simulate) -> Drawing:
+def _draw(simulate: case.Simulate) -> case.Drawing:
     pile = read(simulate, COUNT, SWEEPS)
     times = tuple(TIME_STEP * k for k in range(len(pile.depth)))
-    return Drawing(
+    return case.Drawing(
         curves=(line("deepest overlap", times, (1e3 * float(d) for d in pile.depth)),),
         x_label="time [s]",
         y_label="overlap [mm]",
     )
 
 
-def ladder_read(simulate: Simulate, time_step: float, method: Method) -> Pile:
+def ladder_read(simulate: case.Simulate, time_step: float, method: engine.Method) -> Pile:
     """Four seconds of a smaller pile, so that a night can bear it."""
     second = round(1.0 / time_step)
     steps = round(STEPS * TIME_STEP / time_step)
     return read(simulate, LADDER_COUNT, method, steps, second, time_step, time_limit=None)
 
 
-def ladder_overlap(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_overlap(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Deepest overlap [m], in the mean over all steps: the deepest of all is one blow's luck."""
     return float(ladder_read(simulate, time_step, method).depth.mean())
 
 
-def ladder_load(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_load(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """How far the missing load of the last second is from that on springs, over the weight.
 
     No less than what starts differ by: nearer is luck.
@@ -187,45 +163,47 @@ def ladder_load(simulate: Simulate, time_step: float, method: Method) -> float:
     return max(STARTS * LADDER_SPREAD, abs(found.slowed - LADDER_MISSING_LOAD))
 
 
-def pyramid(friction: float) -> Scene:
+def pyramid(friction: float) -> engine.Scene:
     """The least pile: three spheres on the floor, SPACING apart, and one on all of them."""
     rough = Material(friction=friction)
-    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
+    floor = engine.RigidBody(
+        name="floor", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=rough
+    )
     aside = SPACING / math.sqrt(3.0)  # of the lower centres from the middle
     turns = [2.0 * math.pi * k / 3.0 for k in range(3)]
     places = [(aside * math.cos(turn), aside * math.sin(turn), RADIUS) for turn in turns]
     places.append((0.0, 0.0, RADIUS + math.sqrt(4.0 * RADIUS**2 - aside**2)))
     spheres = (
-        RigidBody(name=f"s{k}", mass=MASS, shape=Sphere(RADIUS), position=place, material=rough)
+        engine.RigidBody(name=f"s{k}", mass=MASS, shape=engine.Sphere(RADIUS), position=place, material=rough)
         for k, place in enumerate(places)
     )
-    return Scene(bodies=(floor, *spheres), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(floor, *spheres), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def holds_together(simulate: Simulate, method: Method, friction: float) -> bool:
+def holds_together(simulate: case.Simulate, method: engine.Method, friction: float) -> bool:
     """Whether four spheres stand on each other: slower than 1e-6 m/s after half a second."""
-    observe = {"v": Final(quantity=Velocity())}
+    observe = {"v": engine.Final(quantity=engine.Velocity())}
     result = simulate(pyramid(friction), time_step=TIME_STEP, steps=30, method=method, observe=observe)
     return result.completed and float(np.abs(result["v"]).max()) < 1e-6
 
 
-def smoothest(simulate: Simulate, method: Method) -> BreakPoint:
+def smoothest(simulate: case.Simulate, method: engine.Method) -> case.BreakPoint:
     """The least friction with which four spheres stand."""
     holds = functools.partial(holds_together, simulate, method)
     return break_point(holds, 1.0, 0.1, resolution=1e-3, walk=5)
 
 
-def _by_sweeps(sweeps: int, substeps: int = 1) -> Configuration:
+def _by_sweeps(sweeps: int, substeps: int = 1) -> case.Configuration:
     name = f"{sweeps} sweeps" + (f", {substeps} substeps" if substeps > 1 else "")
-    method = Method(solver="iterative", iterations=sweeps, substeps=substeps)
-    return Configuration(name=name, method=method, expected_order=None)
+    method = engine.Method(solver="iterative", iterations=sweeps, substeps=substeps)
+    return case.Configuration(name=name, method=method, expected_order=None)
 
 
 def _ladder(
-    name: str, description: str, unit: str, error: Callable[[Simulate, float, Method], float]
-) -> Ladder:
+    name: str, description: str, unit: str, error: Callable[[case.Simulate, float, engine.Method], float]
+) -> case.Ladder:
     """Solvers, sweeps and substeps against each other."""
-    return Ladder(
+    return case.Ladder(
         name=name,
         description=description,
         unit=unit,
@@ -235,18 +213,18 @@ def _ladder(
             _by_sweeps(20),
             _by_sweeps(100),
             _by_sweeps(5, substeps=4),
-            Configuration(name="direct", method=PLAIN, expected_order=None),
+            case.Configuration(name="direct", method=engine.PLAIN, expected_order=None),
         ),
         error=error,
-        run=Unobserved(ladder_overlap),
+        run=case.Unobserved(ladder_overlap),
     )
 
 
-def metrics(missing_load: float = MISSING_LOAD, spread: float = SPREAD) -> tuple[Metric, ...]:
+def metrics(missing_load: float = MISSING_LOAD, spread: float = SPREAD) -> tuple[case.Metric, ...]:
     """What is asked of a pile of any size; the load that is missing, and its spread from start to start, go with it."""
     off = STARTS * spread
     return (
-        Metric(
+        case.Metric(
             name="overlap",
             description="deepest overlap of any two bodies in the last second",
             unit="m",
@@ -257,7 +235,7 @@ def metrics(missing_load: float = MISSING_LOAD, spread: float = SPREAD) -> tuple
             reference=0.0,
             tolerance=2e-3,
         ),
-        Metric(
+        case.Metric(
             name="balance_error",
             description="impulse of the floor over the last second against weight and change of momentum",
             unit="1",
@@ -267,7 +245,7 @@ def metrics(missing_load: float = MISSING_LOAD, spread: float = SPREAD) -> tuple
             reference=0.0,
             tolerance=1e-9,
         ),
-        Metric(
+        case.Metric(
             name="missing_load",
             description="part of the weight that the floor does not carry, mean over the last second; less than none: what "
             "still falls is slowed down",
@@ -279,7 +257,7 @@ def metrics(missing_load: float = MISSING_LOAD, spread: float = SPREAD) -> tuple
             reference=missing_load,
             tolerance=spread,
         ),
-        Metric(
+        case.Metric(
             name="energy_rise",
             description="largest rise of the total energy in a step, over the energy lost in all",
             unit="1",
@@ -293,7 +271,7 @@ def metrics(missing_load: float = MISSING_LOAD, spread: float = SPREAD) -> tuple
     )
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Pile of spheres",
     question="Does a pile of 1000 dropped spheres carry its weight without sinking into itself?",
     why="Thousands of contacts are out of reach of a direct solve; a few sweeps must come near enough.",
@@ -313,7 +291,7 @@ TEST = ScalarTest(
     conclusion="Green: sweeps carry a pile. Red: pairs that are pushed together are found too late, or sweeps stall.",
     source="ours; the thesis asks for larger contact scenes in section 5.4",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="iterative",
             time_step=TIME_STEP,
             parameters={"N": COUNT},
@@ -322,8 +300,8 @@ TEST = ScalarTest(
             note="Fifty sweeps, more where the rows are still far off.",
         ),
     ),
-    example=lambda: Example(scene=scene(EXAMPLE), time_step=TIME_STEP, method=SWEEPS, duration=4.0),
-    figures=(Figure(name="overlap", title="Deepest overlap on the way", draw=_draw),),
+    example=lambda: case.Example(scene=scene(EXAMPLE), time_step=TIME_STEP, method=SWEEPS, duration=4.0),
+    figures=(case.Figure(name="overlap", title="Deepest overlap on the way", draw=_draw),),
     ladders=(
         _ladder(
             "overlap",
@@ -339,7 +317,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=tuple(
-        StabilityStudy(
+        case.StabilityStudy(
             name=f"smoothest-{name}",
             title="Least friction with which a pile of four spheres stands",
             configuration=name,
@@ -351,6 +329,6 @@ TEST = ScalarTest(
             expected_source="moments about a lower centre make friction above and below alike, and level forces balance with "
             "T (1 + cos φ) = N sin φ: µ = tan(φ/2), φ from the vertical to the upper centre; to the resolution of the search",
         )
-        for name, method in (("direct", PLAIN), ("iterative", SWEEPS))
+        for name, method in (("direct", engine.PLAIN), ("iterative", SWEEPS))
     ),
 )

@@ -5,28 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from spook_tracker.engine import (
-    PLAIN,
-    ContactForce,
-    Final,
-    Method,
-    Plane,
-    RigidBody,
-    Scene,
-    Sphere,
-)
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Example,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.configurations import configured
 
 RADIUS = 0.5  # m
@@ -38,54 +20,58 @@ WEIGHT = MASS * GRAVITY  # N
 LONGEST = 1e4  # s, where the search for the longest step ends
 
 
-def scene() -> Scene:
+def scene() -> engine.Scene:
     """The ball on a smooth plane, touching from the start."""
     smooth = Material(friction=0.0)
-    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=smooth)
-    ball = RigidBody(
-        name="ball", mass=MASS, shape=Sphere(RADIUS), position=(0.0, 0.0, RADIUS), material=smooth
+    floor = engine.RigidBody(
+        name="floor", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=smooth
     )
-    return Scene(bodies=(floor, ball), gravity=(0.0, 0.0, -GRAVITY))
+    ball = engine.RigidBody(
+        name="ball", mass=MASS, shape=engine.Sphere(RADIUS), position=(0.0, 0.0, RADIUS), material=smooth
+    )
+    return engine.Scene(bodies=(floor, ball), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def force(simulate: Simulate, time_step: float = TIME_STEP, method: Method = PLAIN) -> dict[str, float]:
+def force(
+    simulate: case.Simulate, time_step: float = TIME_STEP, method: engine.Method = engine.PLAIN
+) -> dict[str, float]:
     """What the plane does to the ball, over its weight: upwards, less one, and sideways."""
-    observe = {"force": Final(quantity=ContactForce("ball", "floor"))}
+    observe = {"force": engine.Final(quantity=engine.ContactForce("ball", "floor"))}
     result = simulate(scene(), time_step=time_step, duration=DURATION, method=method, observe=observe)
     x, y, z = (float(part) / WEIGHT for part in result["force"])
     return {"weight_error": z - 1.0, "sideways": math.hypot(x, y)}
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """How far the force is from the weight, over the weight."""
     return abs(force(simulate, time_step, method)["weight_error"])
 
 
-def heaviest(simulate: Simulate) -> BreakPoint:
+def heaviest(simulate: case.Simulate) -> case.BreakPoint:
     """Largest mass [kg] whose weight the plane is told to carry."""
 
     def carries(mass: float) -> bool:
         floor, ball = scene().bodies
         built = replace(scene(), bodies=(floor, replace(ball, mass=mass)))
-        observe = {"force": Final(quantity=ContactForce("ball", "floor"))}
+        observe = {"force": engine.Final(quantity=engine.ContactForce("ball", "floor"))}
         result = simulate(built, time_step=TIME_STEP, duration=DURATION, observe=observe)
         return abs(float(result["force"][2]) / (mass * GRAVITY) - 1.0) < 1e-9
 
     return break_point(carries, MASS, 1e12, walk=13)
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step [s] after ten of which the plane is told to carry the weight."""
 
     def carries(time_step: float) -> bool:
-        observe = {"force": Final(quantity=ContactForce("ball", "floor"))}
+        observe = {"force": engine.Final(quantity=engine.ContactForce("ball", "floor"))}
         result = simulate(scene(), time_step=time_step, steps=10, observe=observe)
         return result.completed and abs(float(result["force"][2]) / WEIGHT - 1.0) < 1e-9
 
     return break_point(carries, TIME_STEP, LONGEST, walk=8)
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Resting ball",
     question="Is the force under one ball at rest its weight?",
     why="What an engine says of contact forces is read by games, robots and scales; one ball at rest shows whether it is so.",
@@ -101,11 +87,11 @@ TEST = ScalarTest(
     conclusion="Green: the force that is told is the one that acts. Red: it is another one, or the ball is not at rest.",
     source="ours; users of Rapier 0.12 found a quarter of the weight (dimforge/rapier.js#261)",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="direct",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="weight_error",
                     description="upward force of the plane on the ball over its weight, less one, after 2 s",
                     unit="1",
@@ -115,7 +101,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-12,
                 ),
-                Metric(
+                case.Metric(
                     name="sideways",
                     description="sideways force of the plane on the ball over its weight, after 2 s",
                     unit="1",
@@ -130,9 +116,9 @@ TEST = ScalarTest(
             note="Direct solver.",
         ),
     ),
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="force",
             description="how far the force under the ball is from its weight, over its weight, after 2 s",
             unit="1",
@@ -144,7 +130,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="heaviest",
             title="Heaviest ball whose weight is told",
             configuration="plain",
@@ -154,7 +140,7 @@ TEST = ScalarTest(
             expected=(1e12, 1e12),
             expected_source="one contact, one row: mass scales out of it; the search ends at 1e12 kg",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest step after which the weight is told",
             configuration="direct",

@@ -6,20 +6,11 @@ import functools
 import math
 from dataclasses import replace
 
-from spook_tracker.engine import PLAIN, Box, Final, Method, Plane, Position, RigidBody, Scene
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Material
 from spook_tracker.engine.shapes import Shape
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Example,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.configurations import configured
 
 EDGE = 0.5  # m
@@ -31,71 +22,73 @@ STEPS, LONGEST = 10, 1e4  # steps of the search for the longest, and where it en
 # The speed that a step leaves is a few roundings of g h, and a few of h times it are what the box sinks
 ROUNDED = math.sqrt(DEEP / (4.0 * STEPS * 2.0**-53 * GRAVITY))  # s, 151: no shorter step sinks it by DEEP
 DURATION = 2.0  # s, long after whatever gives has come to rest
-FLOORS: dict[str, Shape] = {"plane": Plane(), "box": Box((EDGE, EDGE, EDGE))}
+FLOORS: dict[str, Shape] = {"plane": engine.Plane(), "box": engine.Box((EDGE, EDGE, EDGE))}
 
 
-def scene(floor: str) -> Scene:
+def scene(floor: str) -> engine.Scene:
     """The box, touching from the start, on a fixed `floor`: a plane or an equal box."""
     rough = Material(friction=0.5)
     top = 0.5 * EDGE if floor == "box" else 0.0
-    under = RigidBody(
+    under = engine.RigidBody(
         name="floor", motion="static", shape=FLOORS[floor], position=(0.0, 0.0, 0.0), material=rough
     )
-    box = RigidBody(
+    box = engine.RigidBody(
         name="box",
         mass=MASS,
-        shape=Box((EDGE, EDGE, EDGE)),
+        shape=engine.Box((EDGE, EDGE, EDGE)),
         position=(0.0, 0.0, top + 0.5 * EDGE),
         material=rough,
     )
-    return Scene(bodies=(under, box), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(under, box), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def depth(simulate: Simulate, floor: str, time_step: float = TIME_STEP, method: Method = PLAIN) -> float:
+def depth(
+    simulate: case.Simulate, floor: str, time_step: float = TIME_STEP, method: engine.Method = engine.PLAIN
+) -> float:
     """How far the box lies below where it was put [m], once it rests."""
-    observe = {"moved": Final(quantity=Position("box"), from_start=True)}
+    observe = {"moved": engine.Final(quantity=engine.Position("box"), from_start=True)}
     result = simulate(scene(floor), time_step=time_step, duration=DURATION, method=method, observe=observe)
     return -float(result["moved"][2])
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """The depth on a box [m]."""
     return abs(depth(simulate, "box", time_step, method))
 
 
-def stays(simulate: Simulate, aside: float) -> bool:
+def stays(simulate: case.Simulate, aside: float) -> bool:
     """Whether the box, set down so far aside [m] of the one below, has not moved after a quarter of a second."""
     built = scene("box")
     under, box = built.bodies
     moved = replace(built, bodies=(under, replace(box, position=(aside, 0.0, EDGE))))
-    observe = {"moved": Final(quantity=Position("box"), from_start=True)}
+    observe = {"moved": engine.Final(quantity=engine.Position("box"), from_start=True)}
     result = simulate(moved, time_step=TIME_STEP, duration=0.25, observe=observe)
     return result.completed and max(map(abs, map(float, result["moved"]))) < DEEP
 
 
-def lies(simulate: Simulate, time_step: float) -> bool:
+def lies(simulate: case.Simulate, time_step: float) -> bool:
     """Whether the box lies no deeper than DEEP after ten steps so long [s]."""
-    observe = {"moved": Final(quantity=Position("box"), from_start=True)}
+    observe = {"moved": engine.Final(quantity=engine.Position("box"), from_start=True)}
     result = simulate(scene("box"), time_step=time_step, steps=STEPS, observe=observe)
     return result.completed and abs(float(result["moved"][2])) < DEEP
 
 
-def farthest(simulate: Simulate) -> BreakPoint:
+def farthest(simulate: case.Simulate) -> case.BreakPoint:
     """How far aside [m] a box may be set down."""
     return break_point(functools.partial(stays, simulate), 0.1, 0.4, resolution=5e-4, walk=5)
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step [s] in which the box does not sink."""
     return break_point(functools.partial(lies, simulate), TIME_STEP, LONGEST, resolution=0.05, walk=7)
 
 
-def _on(floor: str) -> Measurement:
-    return Measurement(
+def _on(floor: str) -> case.Measurement:
+    return case.Measurement(
         configuration="direct",
         time_step=TIME_STEP,
         metrics=(
-            Metric(
+            case.Metric(
                 name=f"depth_on_{floor}",
                 description=f"how deep the box lies in the {floor} it stands on, after 2 s",
                 unit="m",
@@ -111,7 +104,7 @@ def _on(floor: str) -> Measurement:
     )
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Resting box",
     question="How deep does one box sink into the plane or the box it stands on?",
     why="The most direct question about contact: one body, one depth. What changes here changes in every heap.",
@@ -127,9 +120,9 @@ TEST = ScalarTest(
     conclusion="Green: contact holds bodies where they are. Red: it lets them sink.",
     source="ours; the depth of a box on a box halved from MuJoCo 3.3.7 to 3.4.0",
     measurements=(_on("plane"), _on("box")),
-    example=lambda: Example(scene=scene("box"), time_step=TIME_STEP),
+    example=lambda: case.Example(scene=scene("box"), time_step=TIME_STEP),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="depth",
             description="how deep the box lies in the box it stands on after 2 s",
             unit="m",
@@ -141,7 +134,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="farthest-aside",
             title="How far aside a box may be set down on an equal one",
             configuration="direct",
@@ -152,7 +145,7 @@ TEST = ScalarTest(
             expected_source="its centre over the edge of the box below, half an edge aside, and it falls; to the resolution of "
             "the search",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest step in which a box does not sink into another",
             configuration="direct",

@@ -7,35 +7,12 @@ from itertools import pairwise
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    Box,
-    Capsule,
-    ContactForce,
-    Cylinder,
-    Final,
-    Method,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-    Sphere,
-)
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Material
 from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.shapes import Shape
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Example,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-    Unobserved,
-)
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.heavier import heavier
 
@@ -46,10 +23,10 @@ TIME_STEP = 1.0 / 60.0  # s
 DURATION = 2.0  # s
 LYING = (0.5**0.5, 0.5**0.5, 0.0, 0.0)  # turned about x, so that an axis along z lies level
 SHAPES: Mapping[str, tuple[Shape, tuple[float, float, float, float]]] = {
-    "box": (Box((EDGE, EDGE, EDGE)), (1.0, 0.0, 0.0, 0.0)),
-    "ball": (Sphere(RADIUS), (1.0, 0.0, 0.0, 0.0)),
-    "cylinder": (Cylinder(RADIUS, EDGE), (1.0, 0.0, 0.0, 0.0)),
-    "capsule": (Capsule(RADIUS, EDGE), LYING),
+    "box": (engine.Box((EDGE, EDGE, EDGE)), (1.0, 0.0, 0.0, 0.0)),
+    "ball": (engine.Sphere(RADIUS), (1.0, 0.0, 0.0, 0.0)),
+    "cylinder": (engine.Cylinder(RADIUS, EDGE), (1.0, 0.0, 0.0, 0.0)),
+    "capsule": (engine.Capsule(RADIUS, EDGE), LYING),
 }
 STACKS = (2, 5, 10, 20)  # boxes
 RATIOS = (1.0, 1e2, 1e4)  # of the upper box's mass
@@ -59,50 +36,58 @@ LONGEST, HEAVIEST = 1e4, 1e12  # s, kg, where the searches end
 ROUGH = Material(friction=0.5)
 
 
-def on_plane(shape: str) -> Scene:
+def on_plane(shape: str) -> engine.Scene:
     """A body of that shape on a plane, touching from the start: half a metre up its centre, all of them."""
     form, turn = SHAPES[shape]
-    body = RigidBody(
+    body = engine.RigidBody(
         name="body 1", mass=MASS, shape=form, position=(0.0, 0.0, RADIUS), orientation=turn, material=ROUGH
     )
-    return Scene(bodies=(_floor(), body), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(_floor(), body), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def stack(*masses: float) -> Scene:
+def stack(*masses: float) -> engine.Scene:
     """Boxes of those masses [kg] on each other, from below."""
     boxes = (
-        RigidBody(
+        engine.RigidBody(
             name=f"body {k + 1}",
             mass=mass,
-            shape=Box((EDGE, EDGE, EDGE)),
+            shape=engine.Box((EDGE, EDGE, EDGE)),
             position=(0.0, 0.0, (k + 0.5) * EDGE),
             material=ROUGH,
         )
         for k, mass in enumerate(masses)
     )
-    return Scene(bodies=(_floor(), *boxes), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(_floor(), *boxes), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def _floor() -> RigidBody:
-    return RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=ROUGH)
+def _floor() -> engine.RigidBody:
+    return engine.RigidBody(
+        name="floor", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=ROUGH
+    )
 
 
 def moved(
-    simulate: Simulate, built: Scene, time_step: float = TIME_STEP, method: Method = PLAIN
+    simulate: case.Simulate,
+    built: engine.Scene,
+    time_step: float = TIME_STEP,
+    method: engine.Method = engine.PLAIN,
 ) -> tuple[float, float]:
     """How far any body is after two seconds up or down, and aside, from where it was put [m]."""
-    observe = {"way": Final(quantity=Position(), from_start=True)}
+    observe = {"way": engine.Final(quantity=engine.Position(), from_start=True)}
     way = simulate(built, time_step=time_step, duration=DURATION, method=method, observe=observe)["way"]
     return float(np.abs(way[:, 2]).max()), float(np.abs(way[:, :2]).max())
 
 
 def load_error(
-    simulate: Simulate, built: Scene, time_step: float = TIME_STEP, method: Method = PLAIN
+    simulate: case.Simulate,
+    built: engine.Scene,
+    time_step: float = TIME_STEP,
+    method: engine.Method = engine.PLAIN,
 ) -> float:
     """How far the force under any body is from the weight of it and all above after two seconds, over that."""
     names = [body.name for body in built.bodies]
     observe: dict[str, Observable] = {
-        above: Final(quantity=ContactForce(above, below)) for below, above in pairwise(names)
+        above: engine.Final(quantity=engine.ContactForce(above, below)) for below, above in pairwise(names)
     }
     found = simulate(built, time_step=time_step, duration=DURATION, method=method, observe=observe)
     held = np.array([found[name] for name in names[1:]])
@@ -112,30 +97,30 @@ def load_error(
     return float((np.linalg.norm(held - right, axis=1) / right[:, 2]).max())
 
 
-def heavy_on_light() -> Scene:
+def heavy_on_light() -> engine.Scene:
     return stack(MASS, RATIO * MASS)
 
 
-def ladder_load(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_load(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     return load_error(simulate, heavy_on_light(), time_step, method)
 
 
-def ladder_depth(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_depth(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     return moved(simulate, heavy_on_light(), time_step, method)[0]
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step [s] after ten of which a capsule that lies is told to press with its weight."""
 
     def presses(time_step: float) -> bool:
-        observe = {"force": Final(quantity=ContactForce("body 1", "floor"))}
+        observe = {"force": engine.Final(quantity=engine.ContactForce("body 1", "floor"))}
         result = simulate(on_plane("capsule"), time_step=time_step, steps=10, observe=observe)
         return result.completed and abs(float(result["force"][2]) / (MASS * GRAVITY) - 1.0) < 1e-9
 
     return break_point(presses, TIME_STEP, LONGEST, walk=8)
 
 
-def heaviest(simulate: Simulate) -> BreakPoint:
+def heaviest(simulate: case.Simulate) -> case.BreakPoint:
     """The heaviest standing cylinder [kg] that is told to press with its weight."""
 
     def presses(mass: float) -> bool:
@@ -145,8 +130,8 @@ def heaviest(simulate: Simulate) -> BreakPoint:
     return break_point(presses, MASS, HEAVIEST, walk=5)
 
 
-def _lies(what: str, built: Scene, parameters: Mapping[str, float]) -> Measurement:
-    def measure(simulate: Simulate) -> dict[str, float]:
+def _lies(what: str, built: engine.Scene, parameters: Mapping[str, float]) -> case.Measurement:
+    def measure(simulate: case.Simulate) -> dict[str, float]:
         deep, aside = moved(simulate, built)
         return {f"{what}_depth": deep, f"{what}_creep": aside}
 
@@ -154,12 +139,12 @@ def _lies(what: str, built: Scene, parameters: Mapping[str, float]) -> Measureme
         ("depth", "up or down", DEEP, "a millimetre in a metre"),
         ("creep", "aside", ASIDE, "a tenth of one"),
     )
-    return Measurement(
+    return case.Measurement(
         configuration="direct",
         time_step=TIME_STEP,
         parameters=parameters,
         metrics=tuple(
-            Metric(
+            case.Metric(
                 name=f"{what}_{name}",
                 description=f"how far a resting {what} is {way} from where it was put, after 2 s",
                 unit="m",
@@ -177,13 +162,13 @@ def _lies(what: str, built: Scene, parameters: Mapping[str, float]) -> Measureme
     )
 
 
-def _presses(what: str, built: Scene, parameters: Mapping[str, float]) -> Measurement:
-    return Measurement(
+def _presses(what: str, built: engine.Scene, parameters: Mapping[str, float]) -> case.Measurement:
+    return case.Measurement(
         configuration="direct",
         time_step=TIME_STEP,
         parameters=parameters,
         metrics=(
-            Metric(
+            case.Metric(
                 name=f"{what}_load_error",
                 description=f"how far the force under a resting {what} is from the weight it carries, over that, after 2 s",
                 unit="1",
@@ -200,13 +185,13 @@ def _presses(what: str, built: Scene, parameters: Mapping[str, float]) -> Measur
     )
 
 
-SCENES: tuple[tuple[str, Scene, Mapping[str, float]], ...] = (
+SCENES: tuple[tuple[str, engine.Scene, Mapping[str, float]], ...] = (
     *((shape, on_plane(shape), {}) for shape in SHAPES),
     *(("stack", stack(*(MASS,) * count), {"N": float(count)}) for count in STACKS),
     *(("pair", stack(MASS, ratio * MASS), {"mass ratio": ratio}) for ratio in RATIOS),
 )
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Grid of what rests",
     question="Does whatever lies on something lie still, and press on it with its weight?",
     why="A box, a ball, a cylinder, a capsule, boxes on boxes, a heavy one on a light one: the first scenes that are tried, "
@@ -224,17 +209,17 @@ TEST = ScalarTest(
     reference="Statics (closed form).",
     conclusion="Green: what rests is at rest and weighs what it weighs. Red: it sinks, creeps, or its load is another.",
     source="ours; asked for by users of several engines (newton-physics/newton#2549, leggedrobotics/SimBenchmark#11)",
-    measurements=tuple(make(*case) for case in SCENES for make in (_lies, _presses)),
-    example=lambda: Example(scene=stack(MASS, RATIO * MASS), time_step=TIME_STEP),
+    measurements=tuple(make(*one) for one in SCENES for make in (_lies, _presses)),
+    example=lambda: case.Example(scene=stack(MASS, RATIO * MASS), time_step=TIME_STEP),
     ladders=tuple(
-        Ladder(
+        case.Ladder(
             name=name,
             description=description,
             unit=unit,
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
             configurations=configured({"direct": None, "iterative, 50 sweeps": None}),
             error=error,
-            run=Unobserved(ladder_load),
+            run=case.Unobserved(ladder_load),
             target_error=target,
             target_seconds=0.1,
         )
@@ -256,7 +241,7 @@ TEST = ScalarTest(
         )
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest step after which a lying capsule presses with its weight",
             configuration="direct",
@@ -266,7 +251,7 @@ TEST = ScalarTest(
             expected=(LONGEST, LONGEST),
             expected_source="an impulse of h m g over h, shared by two contacts alike: the step scales out of it; the search ends at 10 000 s",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="heaviest",
             title="Heaviest standing cylinder that presses with its weight",
             configuration="direct",

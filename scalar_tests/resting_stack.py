@@ -8,36 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import (
-    Box,
-    ContactForce,
-    Energy,
-    Final,
-    Maximum,
-    MaximumAbsolute,
-    Method,
-    Plane,
-    Position,
-    Result,
-    RigidBody,
-    Scene,
-    Trace,
-)
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Material
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_count, break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line
 
@@ -48,34 +23,36 @@ GRAVITY = 9.81  # m/s²
 TIME_STEP = 1.0 / 60.0  # s
 STEPS = 600  # 10 s
 HEIGHTS, TALLEST = (2, 5, 10, 20, 40, 80, 160, 320), 1280  # boxes
-SWEPT = Method(solver="iterative", iterations=50)
+SWEPT = engine.Method(solver="iterative", iterations=50)
 NEARLY = 0.01  # relative, of loads by sweeps, which are never right to 1e-6
 LADDER_COUNT = 8
 LADDER_DURATION = 2.0  # s
 
 
-def scene(count: int = COUNT, masses: tuple[float, ...] = ()) -> Scene:
+def scene(count: int = COUNT, masses: tuple[float, ...] = ()) -> engine.Scene:
     """`count` boxes on top of each other, at rest, on a plane; of 1 kg, or of `masses` [kg] from below."""
     smooth = Material(friction=0.5)
-    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=smooth)
+    floor = engine.RigidBody(
+        name="floor", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=smooth
+    )
     boxes = (
-        RigidBody(
+        engine.RigidBody(
             name=f"box {i + 1}",
             mass=masses[i] if masses else MASS,
-            shape=Box((EDGE, EDGE, EDGE)),
+            shape=engine.Box((EDGE, EDGE, EDGE)),
             position=(0.0, 0.0, (i + 0.5) * EDGE),
             material=smooth,
         )
         for i in range(count)
     )
-    return Scene(bodies=(floor, *boxes), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(floor, *boxes), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def loads(simulate: Simulate, count: int = COUNT) -> np.ndarray:
+def loads(simulate: case.Simulate, count: int = COUNT) -> np.ndarray:
     """(count,) upward force [N] on each box from what lies under it, after STEPS steps."""
     below = ["floor", *(f"box {i}" for i in range(1, count))]
     observe = {
-        f"box {i + 1}": Trace(quantity=ContactForce(f"box {i + 1}", below[i]), first=STEPS)
+        f"box {i + 1}": engine.Trace(quantity=engine.ContactForce(f"box {i + 1}", below[i]), first=STEPS)
         for i in range(count)
     }
     result = simulate(scene(count), time_step=TIME_STEP, steps=STEPS, observe=observe)
@@ -87,14 +64,14 @@ def expected(count: int = COUNT) -> np.ndarray:
     return MASS * GRAVITY * np.arange(count, 0, -1.0)
 
 
-def _measure_loads(simulate: Simulate) -> dict[str, float]:
+def _measure_loads(simulate: case.Simulate) -> dict[str, float]:
     return {"load_error": float(np.abs(loads(simulate) / expected() - 1.0).max())}
 
 
-def _measure_energy(simulate: Simulate) -> dict[str, float]:
+def _measure_energy(simulate: case.Simulate) -> dict[str, float]:
     observe = {
-        "energy": Maximum(quantity=Energy(), from_start=True),
-        "drift": Trace(quantity=Position(), first=STEPS, from_start=True),
+        "energy": engine.Maximum(quantity=engine.Energy(), from_start=True),
+        "drift": engine.Trace(quantity=engine.Position(), first=STEPS, from_start=True),
     }
     result = simulate(scene(), time_step=TIME_STEP, steps=STEPS, observe=observe)
     scale = MASS * GRAVITY * EDGE
@@ -117,9 +94,9 @@ def deepest(moved: np.ndarray) -> float:
     return float(-np.diff(moved[1:, 2]).min())
 
 
-def _draw_loads(simulate: Simulate) -> Drawing:
+def _draw_loads(simulate: case.Simulate) -> case.Drawing:
     contacts = tuple(float(i + 1) for i in range(COUNT))
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulation", contacts, loads(simulate), "points"),
             line("(N − i + 1) m g", contacts, expected(), "reference"),
@@ -129,11 +106,12 @@ def _draw_loads(simulate: Simulate) -> Drawing:
     )
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest relative error of the force under each of eight boxes after 2 s."""
     below = ["floor", *(f"box {i}" for i in range(1, LADDER_COUNT))]
     observe = {
-        f"box {i + 1}": Final(quantity=ContactForce(f"box {i + 1}", below[i])) for i in range(LADDER_COUNT)
+        f"box {i + 1}": engine.Final(quantity=engine.ContactForce(f"box {i + 1}", below[i]))
+        for i in range(LADDER_COUNT)
     }
     result = simulate(
         scene(LADDER_COUNT), time_step=time_step, duration=LADDER_DURATION, method=method, observe=observe
@@ -142,14 +120,14 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(np.abs(held / expected(LADDER_COUNT) - 1.0).max())
 
 
-def _stands(simulate: Simulate, masses: tuple[float, ...], tolerance: float = 1e-6) -> bool:
+def _stands(simulate: case.Simulate, masses: tuple[float, ...], tolerance: float = 1e-6) -> bool:
     """Whether boxes of these masses [kg], bottom first, stand still for two seconds with the right loads."""
     built = scene(len(masses), masses)
     names = [box.name for box in built.bodies]
     observe: dict[str, Observable] = {
-        name: Final(quantity=ContactForce(name, below)) for below, name in pairwise(names)
+        name: engine.Final(quantity=engine.ContactForce(name, below)) for below, name in pairwise(names)
     }
-    observe["sink"] = MaximumAbsolute(quantity=Position(), from_start=True)
+    observe["sink"] = engine.MaximumAbsolute(quantity=engine.Position(), from_start=True)
     result = simulate(built, time_step=TIME_STEP, steps=120, observe=observe)
     if not result.completed:
         return False
@@ -158,35 +136,35 @@ def _stands(simulate: Simulate, masses: tuple[float, ...], tolerance: float = 1e
     return bool(np.abs(held / right - 1.0).max() <= tolerance and result["sink"].max() <= tolerance * EDGE)
 
 
-def heaviest_on_light(simulate: Simulate) -> BreakPoint:
+def heaviest_on_light(simulate: case.Simulate) -> case.BreakPoint:
     """Largest mass ratio of a box standing on a box of 1 kg."""
     return break_point(
         lambda ratio: _stands(simulate, (MASS, ratio * MASS)), 1.0, 1e12, resolution=0.1, walk=13
     )
 
 
-def heaviest_neighbour(simulate: Simulate) -> BreakPoint:
+def heaviest_neighbour(simulate: case.Simulate) -> case.BreakPoint:
     """Largest mass ratio of neighbours in a stack of six, light and heavy in turn."""
     return break_point(
         lambda ratio: _stands(simulate, (MASS, ratio * MASS) * 3), 1.0, 1e12, resolution=0.1, walk=13
     )
 
 
-def tallest_stack(simulate: Simulate) -> BreakPoint:
+def tallest_stack(simulate: case.Simulate) -> case.BreakPoint:
     """Most equal boxes that stand on each other."""
     return break_count(lambda count: _stands(simulate, (MASS,) * count), (*HEIGHTS, TALLEST))
 
 
-def tallest_swept(simulate: Simulate) -> BreakPoint:
+def tallest_swept(simulate: case.Simulate) -> case.BreakPoint:
     """Most equal boxes that stand on each other by fifty sweeps."""
 
-    def swept(scene: Scene, **options: Any) -> Result:
+    def swept(scene: engine.Scene, **options: Any) -> engine.Result:
         return simulate(scene, **(options | {"method": SWEPT}))
 
     return break_count(lambda count: _stands(swept, (MASS,) * count, NEARLY), HEIGHTS)
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Resting stack",
     question="Does every contact of a stack of 20 boxes carry exactly what lies above it?",
     why="Iterative solvers pass the weight down one contact per sweep; a tall stack shows what is still missing.",
@@ -202,12 +180,12 @@ TEST = ScalarTest(
     conclusion="Green: contacts are solved, not approached. Red: the solver stops early or lets the stack breathe.",
     source="ours; the thesis asks for larger contact scenes in section 5.4",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="direct",
             time_step=TIME_STEP,
             parameters={"N": COUNT},
             metrics=(
-                Metric(
+                case.Metric(
                     name="load_error",
                     description="largest relative error of a contact's force after 10 s",
                     unit="1",
@@ -221,12 +199,12 @@ TEST = ScalarTest(
             measure=_measure_loads,
             note="Direct solver.",
         ),
-        Measurement(
+        case.Measurement(
             configuration="direct",
             time_step=TIME_STEP,
             parameters={"N": COUNT},
             metrics=(
-                Metric(
+                case.Metric(
                     name="energy_gain",
                     description="largest energy above the start in 10 s, over m g times one edge",
                     unit="1",
@@ -237,7 +215,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-12,
                 ),
-                Metric(
+                case.Metric(
                     name="drift",
                     description="largest displacement of any box in 10 s",
                     unit="m",
@@ -247,7 +225,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-12,
                 ),
-                Metric(
+                case.Metric(
                     name="overlap",
                     description="how far a box is sunk into the box under it at most, after 10 s",
                     unit="m",
@@ -263,10 +241,10 @@ TEST = ScalarTest(
             note="Direct solver.",
         ),
     ),
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP),
-    figures=(Figure(name="loads", title="Force of every contact", draw=_draw_loads),),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP),
+    figures=(case.Figure(name="loads", title="Force of every contact", draw=_draw_loads),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="loads",
             description="largest relative error of a contact's load in a stack of eight after 2 s",
             unit="1",
@@ -280,7 +258,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="heavy-on-light",
             title="Largest mass ratio of a box on a lighter box",
             configuration="plain",
@@ -290,7 +268,7 @@ TEST = ScalarTest(
             expected=(1e9, 1e12),
             expected_source="the contact solve is refined against the true equations; the search ends at 1e12",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="heavy-neighbours",
             title="Largest mass ratio of neighbours in a stack of six",
             configuration="plain",
@@ -300,7 +278,7 @@ TEST = ScalarTest(
             expected=(1e9, 1e12),
             expected_source="the contact solve is refined against the true equations; the search ends at 1e12",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="tallest-stack",
             title="Tallest stack of equal boxes",
             configuration="plain",
@@ -310,7 +288,7 @@ TEST = ScalarTest(
             expected=(float(TALLEST), float(TALLEST)),
             expected_source="statics: a direct solve carries any number; the search ends at 1280",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="tallest-stack-swept",
             title="Tallest stack of equal boxes by fifty sweeps",
             configuration="iterative",

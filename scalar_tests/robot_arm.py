@@ -9,35 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    WORLD,
-    AngularVelocity,
-    ConstraintForce,
-    Final,
-    Hinge,
-    MaximumAbsolute,
-    Method,
-    Motor,
-    Result,
-    RigidBody,
-    Scene,
-)
+from spook_tracker import engine
 from spook_tracker.engine.joints import Constraint
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
 
@@ -145,19 +121,19 @@ def quaternion(rotation: Any) -> tuple[float, float, float, float]:
 
 def scene(
     pose: Vector, speeds: Vector = (0.0,) * 6, torque: float | Sequence[float | None] | None = None
-) -> Scene:
+) -> engine.Scene:
     """The arm in a pose, its links moving with the joints' speeds, each joint driven at its speed with at most `torque`
     [N m], of all or one by one."""
     bounds = torque if isinstance(torque, Sequence) else (torque,) * len(LINKS)
     arm = kinematics(pose)
     _, velocities, spins = inverse_dynamics(pose, speeds, np.zeros(6))
-    bodies: list[RigidBody] = []
+    bodies: list[engine.RigidBody] = []
     joints: list[Constraint] = []
     for k, ((place, axis, centre, rotation), (_, _, _, mass, inertia)) in enumerate(
         zip(arm, LINKS, strict=True)
     ):
         bodies.append(
-            RigidBody(
+            engine.RigidBody(
                 name=f"link {k + 1}",
                 mass=mass,
                 inertia=inertia,
@@ -168,24 +144,29 @@ def scene(
             )
         )
         joints.append(
-            Hinge(
+            engine.Hinge(
                 name=f"joint {k + 1}",
-                between=(WORLD if k == 0 else f"link {k}", f"link {k + 1}"),
+                between=(engine.WORLD if k == 0 else f"link {k}", f"link {k + 1}"),
                 at=tuple(place),
                 axis=tuple(axis),
                 compliance=0.0,
-                motor=Motor(speed=float(speeds[k]), max_force=bounds[k]),
+                motor=engine.Motor(speed=float(speeds[k]), max_force=bounds[k]),
             )
         )
-    return Scene(bodies=tuple(bodies), constraints=tuple(joints), gravity=GRAVITY)
+    return engine.Scene(bodies=tuple(bodies), constraints=tuple(joints), gravity=GRAVITY)
 
 
 def torques(
-    simulate: Simulate, pose: Vector, speeds: Vector, time_step: float, method: Method = PLAIN, steps: int = 1
+    simulate: case.Simulate,
+    pose: Vector,
+    speeds: Vector,
+    time_step: float,
+    method: engine.Method = engine.PLAIN,
+    steps: int = 1,
 ) -> Any:
     """What the drives carry about their axes in the last of so many steps [N m]."""
     observe: dict[str, Observable] = {
-        f"{k}": Final(quantity=ConstraintForce(f"joint {k + 1}")) for k in range(len(LINKS))
+        f"{k}": engine.Final(quantity=engine.ConstraintForce(f"joint {k + 1}")) for k in range(len(LINKS))
     }
     result = simulate(
         scene(pose, speeds), time_step=time_step, duration=steps * time_step, method=method, observe=observe
@@ -195,40 +176,40 @@ def torques(
     return np.array([axis @ result[f"{k}"][3:] for k, axis in enumerate(axes)])
 
 
-def hold(simulate: Simulate) -> dict[str, float]:
+def hold(simulate: case.Simulate) -> dict[str, float]:
     """Three poses held against gravity; and with drives of a tenth of what that takes."""
     worst, moved, bound = 0.0, 0.0, 0.0
     for pose in POSES:
         right, _, _ = inverse_dynamics(pose, np.zeros(6), np.zeros(6))
         found = torques(simulate, pose, (0.0,) * 6, TIME_STEP)
         worst = max(worst, float(np.abs(found - right).max() / np.abs(right).max()))
-        still: dict[str, Observable] = {"w": MaximumAbsolute(quantity=AngularVelocity())}
+        still: dict[str, Observable] = {"w": engine.MaximumAbsolute(quantity=engine.AngularVelocity())}
         result = simulate(scene(pose), time_step=TIME_STEP, duration=2.0, observe=still)
         moved = max(moved, float(result["w"].max()))
     weak = 0.1 * float(np.abs(inverse_dynamics(POSES[1], np.zeros(6), np.zeros(6))[0]).max())
-    observe: dict[str, Observable] = {"f": Final(quantity=ConstraintForce("joint 2"))}
+    observe: dict[str, Observable] = {"f": engine.Final(quantity=engine.ConstraintForce("joint 2"))}
     result = simulate(scene(POSES[1], torque=weak), time_step=1e-6, steps=1, observe=observe)
     axis = kinematics(POSES[1])[1][1]
     bound = abs(float(axis @ result["f"][3:])) / weak - 1.0
     return {"holding_error": worst, "creep": moved, "bound_error": bound}
 
 
-def stays(simulate: Simulate, share: float) -> bool:
+def stays(simulate: case.Simulate, share: float) -> bool:
     """Whether the second pose is still held after half a second by drives that may carry so much of what that takes; the
     upright axis needs none and is held."""
     needed = np.abs(inverse_dynamics(POSES[1], np.zeros(6), np.zeros(6))[0])
     asked = scene(POSES[1], torque=[None, *(float(share * one) for one in needed[1:])])
-    observe = {"w": Final(quantity=AngularVelocity())}
+    observe = {"w": engine.Final(quantity=engine.AngularVelocity())}
     result = simulate(asked, time_step=TIME_STEP, steps=30, observe=observe)
     return result.completed and float(np.abs(result["w"]).max()) < SLOWEST
 
 
-def weakest(simulate: Simulate) -> BreakPoint:
+def weakest(simulate: case.Simulate) -> case.BreakPoint:
     """The weakest drives that hold the arm."""
     return break_point(functools.partial(stays, simulate), 3.0, 0.3, resolution=1e-4, walk=5)
 
 
-def held_for(simulate: Simulate, time_step: float) -> bool:
+def held_for(simulate: case.Simulate, time_step: float) -> bool:
     """Whether the drives carry what statics asks in three poses, to 1e-9, after three steps so long [s]."""
     worst = 0.0
     for pose in POSES:
@@ -239,7 +220,7 @@ def held_for(simulate: Simulate, time_step: float) -> bool:
 
 
 def driven_error(
-    simulate: Simulate, pose: Vector, time_step: float, method: Method = PLAIN
+    simulate: case.Simulate, pose: Vector, time_step: float, method: engine.Method = engine.PLAIN
 ) -> tuple[float, float]:
     """Largest error of a torque after `SETTLED` steps at steady speeds, and the largest torque there [N m]."""
     there = np.asarray(pose) + SETTLED * time_step * np.asarray(SPEEDS)
@@ -264,23 +245,23 @@ def lag_bound(time_step: float = FINE) -> float:
     return worst
 
 
-def drive(simulate: Simulate) -> dict[str, float]:
+def drive(simulate: case.Simulate) -> dict[str, float]:
     """Torques of the arm driven at steady joint speeds."""
     errors = [driven_error(simulate, pose, FINE) for pose in POSES]
     return {"driving_error": max(error / largest for error, largest in errors)}
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest error of a driving torque from the second pose on [N m]."""
     return driven_error(simulate, POSES[1], time_step, method)[0]
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+def ladder_run(simulate: case.Simulate, time_step: float, method: engine.Method) -> engine.Result:
     """The same steps with nothing observed."""
     return simulate(scene(POSES[1], SPEEDS), time_step=time_step, duration=SETTLED * time_step, method=method)
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Torques in the second pose, held and driven."""
     joints = list(range(1, len(LINKS) + 1))
     curves = []
@@ -291,10 +272,10 @@ def draw(simulate: Simulate) -> Drawing:
     ):
         there = np.asarray(POSES[1]) + steps * time_step * np.asarray(speeds)
         right, _, _ = inverse_dynamics(there, speeds, np.zeros(6))
-        found = torques(simulate, POSES[1], speeds, time_step, PLAIN, steps)
+        found = torques(simulate, POSES[1], speeds, time_step, engine.PLAIN, steps)
         worst = max(worst, float(np.abs(found - right).max()))
         curves += [line(f"{name}, Newton–Euler", joints, right, "reference"), line(name, joints, found)]
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="joint, from the base",
         y_label="torque [N m]",
@@ -302,7 +283,7 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Robot arm",
     question="Do the drives of a six-joint arm carry what inverse dynamics says?",
     why="A controller computes torques from a model of the arm. If the simulated arm needs other torques, the controller is "
@@ -331,11 +312,11 @@ TEST = ScalarTest(
     "is wrong, or a bound is no bound.",
     source="ours; robots are asked for in the thesis, section 5.4",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="holding_error",
                     description="largest error of a holding torque over the largest torque, three poses",
                     unit="1",
@@ -345,7 +326,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-12,
                 ),
-                Metric(
+                case.Metric(
                     name="creep",
                     description="fastest turn of a link that is held for 2 s",
                     unit="rad/s",
@@ -355,7 +336,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-12,
                 ),
-                Metric(
+                case.Metric(
                     name="bound_error",
                     description="torque of a drive at its bound over the bound, minus one",
                     unit="1",
@@ -369,11 +350,11 @@ TEST = ScalarTest(
             measure=hold,
             note="held in three poses",
         ),
-        Measurement(
+        case.Measurement(
             configuration="driven",
             time_step=FINE,
             metrics=(
-                Metric(
+                case.Metric(
                     name="driving_error",
                     description="largest error of a driving torque over the largest torque, three poses",
                     unit="1",
@@ -388,10 +369,10 @@ TEST = ScalarTest(
             note="steady joint speeds",
         ),
     ),
-    example=lambda: Example(scene=scene(POSES[1], SPEEDS), time_step=TIME_STEP, duration=4.0),
-    figures=(Figure(name="torques", title="Torques of the joints", draw=draw),),
+    example=lambda: case.Example(scene=scene(POSES[1], SPEEDS), time_step=TIME_STEP, duration=4.0),
+    figures=(case.Figure(name="torques", title="Torques of the joints", draw=draw),),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="weakest",
             title="Weakest drives that hold the arm, over what inverse dynamics asks of each",
             configuration="plain",
@@ -415,7 +396,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="torque",
             description="largest error of a driving torque",
             unit="N m",

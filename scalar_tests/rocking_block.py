@@ -9,30 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    Box,
-    ContactForce,
-    Final,
-    Material,
-    Method,
-    Orientation,
-    Plane,
-    RigidBody,
-    Scene,
-    Trace,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
@@ -55,26 +34,28 @@ GRIP = 0.75 * math.sin(SLENDER) * math.cos(SLENDER) / (1.0 - 0.75 * math.sin(SLE
 @functools.cache
 def scene(
     lean: float = START, half_width: float = HALF_WIDTH, spin: float = 0.0, friction: float = 2.0
-) -> Scene:
+) -> engine.Scene:
     """The block leaning on its right lower edge, at rest or turning about it [rad/s]."""
-    rough = Material(friction=friction)
-    ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0, 0, 0), material=rough)
+    rough = engine.Material(friction=friction)
+    ground = engine.RigidBody(
+        name="ground", motion="static", shape=engine.Plane(), position=(0, 0, 0), material=rough
+    )
     c, s = math.cos(lean), math.sin(lean)
     out, up = (
         HALF_HEIGHT * s - half_width * c,
         half_width * s + HALF_HEIGHT * c,
     )  # of the centre, from the edge
-    block = RigidBody(
+    block = engine.RigidBody(
         name="block",
         mass=MASS,
-        shape=Box((2 * half_width, DEPTH, 2 * HALF_HEIGHT)),
+        shape=engine.Box((2 * half_width, DEPTH, 2 * HALF_HEIGHT)),
         position=(half_width + out, 0.0, up),
         orientation=(math.cos(0.5 * lean), 0.0, math.sin(0.5 * lean), 0.0),
         velocity=(spin * up, 0.0, -spin * out),
         angular_velocity=(0.0, spin, 0.0),
         material=rough,
     )
-    return Scene(bodies=(ground, block), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(ground, block), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def energy(lean: float) -> float:
@@ -114,29 +95,29 @@ def whole(time_step: float) -> float:
     return round(DURATION / time_step) * time_step
 
 
-def returns(simulate: Simulate, lean: float) -> bool:
+def returns(simulate: case.Simulate, lean: float) -> bool:
     """Whether a block let go at that lean has come back by some of it after a second."""
-    observe = {"q": Final(quantity=Orientation("block"))}
+    observe = {"q": engine.Final(quantity=engine.Orientation("block"))}
     result = simulate(scene(lean), time_step=COARSE, duration=1.0, observe=observe)
     return result.completed and 2.0 * math.atan2(result["q"][2], result["q"][0]) < lean
 
 
-def farthest(simulate: Simulate) -> BreakPoint:
+def farthest(simulate: case.Simulate) -> case.BreakPoint:
     """The largest lean from which it comes back."""
     return break_point(
         functools.partial(returns, simulate), 0.25 * SLENDER, 2.0 * SLENDER, resolution=1e-4, walk=5
     )
 
 
-def rocks(simulate: Simulate, half_width: float) -> bool:
+def rocks(simulate: case.Simulate, half_width: float) -> bool:
     """Whether a block that a slow turn sets down on its other edge leans over that one then."""
-    observe = {"q": Trace(quantity=Orientation("block"))}
+    observe = {"q": engine.Trace(quantity=engine.Orientation("block"))}
     asked = scene(LAID, half_width, -ARRIVING)
     result = simulate(asked, time_step=SHORT, steps=100, observe=observe)
     return result.completed and float(result["q"][:, 2].min()) < -ROCKED
 
 
-def broadest(simulate: Simulate) -> BreakPoint:
+def broadest(simulate: case.Simulate) -> case.BreakPoint:
     """The largest width over its height at which it rocks on."""
     found = break_point(
         functools.partial(rocks, simulate),
@@ -148,9 +129,9 @@ def broadest(simulate: Simulate) -> BreakPoint:
     return replace(found, value=found.value / HALF_HEIGHT)
 
 
-def grips(simulate: Simulate, friction: float) -> bool:
+def grips(simulate: case.Simulate, friction: float) -> bool:
     """Whether the step of the same blow does not use friction up."""
-    observe = {"f": Trace(quantity=ContactForce("block", "ground"))}
+    observe = {"f": engine.Trace(quantity=engine.ContactForce("block", "ground"))}
     asked = scene(LAID, spin=-ARRIVING, friction=friction)
     result = simulate(asked, time_step=SHORT, steps=50, observe=observe)
     if not result.completed:
@@ -159,7 +140,7 @@ def grips(simulate: Simulate, friction: float) -> bool:
     return abs(float(across)) < (1.0 - 1e-6) * friction * float(up)
 
 
-def smoothest(simulate: Simulate) -> BreakPoint:
+def smoothest(simulate: case.Simulate) -> case.BreakPoint:
     """The least friction with which the edge that comes down does not slip."""
     return break_point(functools.partial(grips, simulate), 4.0 * GRIP, 0.3 * GRIP, resolution=1e-4, walk=5)
 
@@ -179,9 +160,9 @@ def unseen() -> float:
     return lost / ARRIVING / (math.sqrt(2.0) / 3.0)
 
 
-def leans(simulate: Simulate, time_step: float, method: Method = PLAIN) -> Any:
+def leans(simulate: case.Simulate, time_step: float, method: engine.Method = engine.PLAIN) -> Any:
     """The lean at every step [rad]."""
-    observe = {"q": Trace(quantity=Orientation("block"))}
+    observe = {"q": engine.Trace(quantity=engine.Orientation("block"))}
     q = simulate(scene(), time_step=time_step, duration=whole(time_step), method=method, observe=observe)["q"]
     return 2.0 * np.arctan2(q[:, 2], q[:, 0])
 
@@ -201,7 +182,7 @@ def kept(lean: Any, time_step: float) -> float:
     return energy(float(-lean.min())) / energy(START)
 
 
-def measure(simulate: Simulate) -> dict[str, float]:
+def measure(simulate: case.Simulate) -> dict[str, float]:
     """The first blow and the swing after it."""
     lean = leans(simulate, TIME_STEP)
     times = [*blows(lean, TIME_STEP), math.nan, math.nan]  # an engine may lose a blow
@@ -226,12 +207,12 @@ def kept_limit(time_step: float) -> float:
     return time_step * blow_costs(RATE**2 * math.sin(SLENDER) / w, w)
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Relative error of the energy kept at the first blow."""
     return kept(leans(simulate, time_step, method), time_step) / KEPT**2 - 1.0
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """The lean over time at three steps."""
     curves = []
     for steps in (250, 1000, 4000):
@@ -249,10 +230,10 @@ def draw(simulate: Simulate) -> Drawing:
             "points",
         )
     )
-    return Drawing(curves=tuple(curves), x_label="time [s]", y_label="lean [°]")
+    return case.Drawing(curves=tuple(curves), x_label="time [s]", y_label="lean [°]")
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Rocking block",
     question="Does a rocking block lose at each blow what Housner's rule says, and take its time?",
     why="Columns and statues in earthquakes rock from corner to corner. The blow must act at the new corner alone: an "
@@ -312,10 +293,10 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=scene(), time_step=1.0 / 240.0, duration=4.0),
-    figures=(Figure(name="lean", title="A block that rocks", draw=draw),),
+    example=lambda: case.Example(scene=scene(), time_step=1.0 / 240.0, duration=4.0),
+    figures=(case.Figure(name="lean", title="A block that rocks", draw=draw),),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="farthest",
             title="Largest lean from which the block comes back",
             configuration="plain",
@@ -325,7 +306,7 @@ TEST = ScalarTest(
             expected=(0.9998 * SLENDER, 1.0001 * SLENDER),
             expected_source="at tan α = b/h its centre is above the edge; the search ends within 1e-4",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="broadest",
             title="Largest width over height of a block that rocks on after its blow",
             configuration="plain",
@@ -336,7 +317,7 @@ TEST = ScalarTest(
             expected_source="Housner's rule turns no block on whose (3/2) sin²α is 1, b/h = √2; what of a lean is too small to be "
             "seen, and the search, which ends within 1e-4",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="smoothest",
             title="Least friction with which the edge that comes down does not slip",
             configuration="plain",
@@ -350,7 +331,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="kept",
             description="relative error of the energy kept at the first blow, which falls on the middle of a step",
             unit="1",

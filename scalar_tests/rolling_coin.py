@@ -9,32 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import (
-    Cylinder,
-    Energy,
-    Final,
-    Material,
-    Method,
-    Orientation,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-    Trace,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
@@ -64,7 +41,7 @@ class Steady:
     @property
     def rate(self) -> float:
         """Ω [rad/s], from the moments about the centre; see the page."""
-        across, along = Cylinder(RADIUS, THICKNESS).inertia(1.0)[1:]
+        across, along = engine.Cylinder(RADIUS, THICKNESS).inertia(1.0)[1:]
         c, s = math.cos(self.lean), math.sin(self.lean)
         contact = self.circle + self.reach
         turning = s * ((across - along) * c + along * contact / RADIUS)
@@ -81,22 +58,24 @@ STEPS_A_TURN = 600
 
 
 @functools.cache
-def scene(motion: Steady, friction: float = FRICTION) -> Scene:
+def scene(motion: Steady, friction: float = FRICTION) -> engine.Scene:
     """The coin in steady motion about the z axis."""
-    rough = Material(friction=friction)
-    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
+    rough = engine.Material(friction=friction)
+    floor = engine.RigidBody(
+        name="floor", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=rough
+    )
     c, s = math.cos(motion.lean), math.sin(motion.lean)
-    coin = RigidBody(
+    coin = engine.RigidBody(
         name="coin",
         mass=MASS,
-        shape=Cylinder(RADIUS, THICKNESS),
+        shape=engine.Cylinder(RADIUS, THICKNESS),
         position=(motion.circle, 0.0, motion.height),
         orientation=(math.cos(0.5 * motion.lean), 0.0, math.sin(0.5 * motion.lean), 0.0),
         velocity=(0.0, motion.rate * motion.circle, 0.0),
         angular_velocity=(motion.spin * s, 0.0, motion.rate + motion.spin * c),
         material=rough,
     )
-    return Scene(bodies=(floor, coin), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(floor, coin), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def step(motion: Steady) -> float:
@@ -110,13 +89,13 @@ def axis(orientation: Any) -> Any:
     return np.stack((2.0 * (x * z + w * y), 2.0 * (y * z - w * x), 1.0 - 2.0 * (x * x + y * y)), axis=-1)
 
 
-def turn(simulate: Simulate, motion: Steady, steps: int, part: int = 1) -> Any:
+def turn(simulate: case.Simulate, motion: Steady, steps: int, part: int = 1) -> Any:
     """Errors after one turn about the vertical of so many steps, or that part of it: lean [rad], phase [of it], centre [m] and
     energy [of m g height]."""
     observe = {
-        "x": Final(quantity=Position("coin")),
-        "q": Trace(quantity=Orientation("coin")),
-        "energy": Trace(quantity=Energy()),
+        "x": engine.Final(quantity=engine.Position("coin")),
+        "q": engine.Trace(quantity=engine.Orientation("coin")),
+        "energy": engine.Trace(quantity=engine.Energy()),
     }
     h = 2.0 * math.pi / motion.rate / steps
     result = simulate(scene(motion), time_step=h, steps=steps // part, observe=observe)
@@ -135,10 +114,10 @@ def turn(simulate: Simulate, motion: Steady, steps: int, part: int = 1) -> Any:
 LEAST = COIN.rate**2 * COIN.circle / GRAVITY  # µ that keeps the coin's centre on its circle
 
 
-def grips(simulate: Simulate, friction: float) -> bool:
+def grips(simulate: case.Simulate, friction: float) -> bool:
     """Whether the coin goes for a quarter of a turn as it does on a floor as rough as any. A first step, which does not know
     yet how the contact wanders, asks for a seventh more friction, and may slip by a millimetre."""
-    observe = {"x": Final(quantity=Position("coin"))}
+    observe = {"x": engine.Final(quantity=engine.Position("coin"))}
     found = [
         simulate(scene(COIN, one), time_step=step(COIN), steps=STEPS_A_TURN // 4, observe=observe)
         for one in (friction, FRICTION)
@@ -148,17 +127,17 @@ def grips(simulate: Simulate, friction: float) -> bool:
     return float(np.abs(found[0]["x"] - found[1]["x"]).max()) < 3e-3
 
 
-def slippery(simulate: Simulate) -> BreakPoint:
+def slippery(simulate: case.Simulate) -> case.BreakPoint:
     """The least friction on which the coin rolls."""
     return break_point(functools.partial(grips, simulate), 2.0 * LEAST, 0.3 * LEAST, resolution=1e-3)
 
 
-def extrapolated(simulate: Simulate, motion: Steady, steps: int, part: int = 1) -> Any:
+def extrapolated(simulate: case.Simulate, motion: Steady, steps: int, part: int = 1) -> Any:
     """The errors of two time steps, extrapolated: what is of first order in the step drops out."""
     return 2.0 * turn(simulate, motion, 2 * steps, part) - turn(simulate, motion, steps, part)
 
 
-def turns_flat(simulate: Simulate, degrees: float) -> bool:
+def turns_flat(simulate: case.Simulate, degrees: float) -> bool:
     """Whether Euler's disk leaning by so little keeps lean, rate and energy for a quarter of a turn of 300 steps."""
     disk = Steady(math.radians(degrees), 0.0)
     lean, rate, centre, energy = extrapolated(simulate, disk, STEPS_A_TURN // 2, 4)
@@ -166,7 +145,7 @@ def turns_flat(simulate: Simulate, degrees: float) -> bool:
     return bool(max(abs(lean) / disk.lean, abs(rate), abs(centre) / RADIUS, abs(energy)) < left)
 
 
-def measure(simulate: Simulate, motion: Steady) -> dict[str, float]:
+def measure(simulate: case.Simulate, motion: Steady) -> dict[str, float]:
     """Those of one turn."""
     errors = extrapolated(simulate, motion, STEPS_A_TURN)
     names = ("lean_error", "rate_error", "centre_error", "energy_error")
@@ -183,9 +162,9 @@ def half_turn(time_step: float) -> float:
     return round(math.pi / COIN.rate / time_step) * time_step
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Distance of the coin's centre from its place on the circle after half a turn [m]."""
-    observe = {"x": Final(quantity=Position("coin"))}
+    observe = {"x": engine.Final(quantity=engine.Position("coin"))}
     duration = half_turn(time_step)
     result = simulate(scene(COIN), time_step=time_step, duration=duration, method=method, observe=observe)
     angle = COIN.rate * duration
@@ -193,12 +172,12 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return abs(complex(result["x"][0], result["x"][1]) - place)
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """How far the coin leans over one turn, at three time steps."""
     curves, ends = [], []
     for steps in (STEPS_A_TURN // 2, STEPS_A_TURN, 2 * STEPS_A_TURN):
         h = 2.0 * math.pi / COIN.rate / steps
-        observe = {"q": Trace(quantity=Orientation("coin"))}
+        observe = {"q": engine.Trace(quantity=engine.Orientation("coin"))}
         result = simulate(scene(COIN), time_step=h, steps=steps, observe=observe)
         leaning = np.degrees(np.arccos(axis(result["q"])[:, 2]))
         ends.append(float(leaning[-1]) - math.degrees(COIN.lean))
@@ -206,7 +185,7 @@ def draw(simulate: Simulate) -> Drawing:
     curves.append(
         line("steady", (0.0, 2.0 * math.pi / COIN.rate), (math.degrees(COIN.lean),) * 2, "reference")
     )
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="time [s]",
         y_label="angle of the axis from the vertical [°]",
@@ -215,13 +194,13 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
-def _asked(configuration: str, motion: Steady, note: str) -> Measurement:
+def _asked(configuration: str, motion: Steady, note: str) -> case.Measurement:
     limit = left_over(motion)
     source = (
         "first order drops out; what is left is of the order of (s h)², s h the coin's own turn in a step"
     )
 
-    def metric(name: str, description: str, unit: str, scale: float = 1.0) -> Metric:
+    def metric(name: str, description: str, unit: str, scale: float = 1.0) -> case.Metric:
         return error(
             name, description, unit, scale * limit, source, "gate" if name == "rate_error" else "companion"
         )
@@ -247,7 +226,7 @@ def _asked(configuration: str, motion: Steady, note: str) -> Measurement:
 
 SHAKEN = abs(COIN.spin) * step(COIN)
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Rolling coin",
     question="Does a coin roll steadily on its circle, and Euler's disk turn with its centre at rest?",
     why="A coin that rolls leaning is held by gyroscopic moments and by friction that does no work, at one point that "
@@ -275,10 +254,10 @@ TEST = ScalarTest(
         _asked("coin", COIN, "a coin on a circle, one turn"),
         _asked("disk", DISK, "Euler's disk, one turn"),
     ),
-    example=lambda: Example(scene=scene(COIN), time_step=step(COIN), duration=2.0 * math.pi / COIN.rate),
-    figures=(Figure(name="lean", title="Lean of the coin over one turn", draw=draw),),
+    example=lambda: case.Example(scene=scene(COIN), time_step=step(COIN), duration=2.0 * math.pi / COIN.rate),
+    figures=(case.Figure(name="lean", title="Lean of the coin over one turn", draw=draw),),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="least-friction",
             title="Least friction on which the coin rolls",
             configuration="plain",
@@ -303,7 +282,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="place",
             description="distance of the coin's centre from its place on the circle after about half a turn",
             unit="m",

@@ -7,30 +7,9 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import (
-    AngularVelocity,
-    Final,
-    Material,
-    Method,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-    Sphere,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
@@ -48,33 +27,35 @@ SLOWING = TORSIONAL * GRAVITY / (0.4 * RADIUS**2)  # rad/s²
 STOPPED = SPEED / BRAKE  # s
 
 
-def scene(speed: float = SPEED, spin: float = 0.0, slope: float = 0.0) -> Scene:
+def scene(speed: float = SPEED, spin: float = 0.0, slope: float = 0.0) -> engine.Scene:
     """A ball that rolls, or spins on the spot; gravity is tilted by atan(slope) towards the ball's way."""
     way = (math.cos(AWAY), math.sin(AWAY))
-    ground = RigidBody(
+    ground = engine.RigidBody(
         name="ground",
         motion="static",
-        shape=Plane(),
+        shape=engine.Plane(),
         position=(0.0, 0.0, 0.0),
-        material=Material(friction=FRICTION),
+        material=engine.Material(friction=FRICTION),
     )
-    ball = RigidBody(
+    ball = engine.RigidBody(
         name="ball",
         mass=MASS,
-        shape=Sphere(RADIUS),
+        shape=engine.Sphere(RADIUS),
         position=(0.0, 0.0, RADIUS),
         velocity=(speed * way[0], speed * way[1], 0.0),
         angular_velocity=(-speed * way[1] / RADIUS, speed * way[0] / RADIUS, spin),
-        material=Material(friction=FRICTION, rolling_friction=ROLLING, torsional_friction=TORSIONAL),
+        material=engine.Material(friction=FRICTION, rolling_friction=ROLLING, torsional_friction=TORSIONAL),
     )
     tilt = math.atan(slope)
     pull = GRAVITY * math.sin(tilt)
-    return Scene(bodies=(ground, ball), gravity=(pull * way[0], pull * way[1], -GRAVITY * math.cos(tilt)))
+    return engine.Scene(
+        bodies=(ground, ball), gravity=(pull * way[0], pull * way[1], -GRAVITY * math.cos(tilt))
+    )
 
 
-def roll(simulate: Simulate) -> dict[str, float]:
+def roll(simulate: case.Simulate) -> dict[str, float]:
     """A ball that rolls until it stands."""
-    observe = {"v": Trace(quantity=Velocity("ball"))}
+    observe = {"v": engine.Trace(quantity=engine.Velocity("ball"))}
     result = simulate(scene(), time_step=TIME_STEP, duration=1.5 * STOPPED, observe=observe)
     along = result["v"][:, 0] * math.cos(AWAY) + result["v"][:, 1] * math.sin(AWAY)
     across = result["v"][:, 1] * math.cos(AWAY) - result["v"][:, 0] * math.sin(AWAY)
@@ -82,9 +63,12 @@ def roll(simulate: Simulate) -> dict[str, float]:
     return {"speed_error": float(np.abs(along - exact).max()), "sideways": float(np.abs(across).max())}
 
 
-def turn(simulate: Simulate) -> dict[str, float]:
+def turn(simulate: case.Simulate) -> dict[str, float]:
     """A ball that spins on the spot until it stands."""
-    observe = {"w": Trace(quantity=AngularVelocity("ball")), "x": Final(quantity=Position("ball"))}
+    observe = {
+        "w": engine.Trace(quantity=engine.AngularVelocity("ball")),
+        "x": engine.Final(quantity=engine.Position("ball")),
+    }
     result = simulate(scene(0.0, SPIN), time_step=TIME_STEP, duration=2.0, observe=observe)
     exact = np.maximum(0.0, SPIN - SLOWING * TIME_STEP * np.arange(len(result["w"])))
     return {
@@ -93,29 +77,32 @@ def turn(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Way until it stands against v²/(2 a) [m]."""
-    observe = {"x": Final(quantity=Position("ball"))}
+    observe = {"x": engine.Final(quantity=engine.Position("ball"))}
     result = simulate(scene(), time_step=time_step, duration=2.0, method=method, observe=observe)
     return float(np.hypot(result["x"][0], result["x"][1])) - 0.5 * SPEED**2 / BRAKE
 
 
-def stands(simulate: Simulate, slope: float) -> bool:
+def stands(simulate: case.Simulate, slope: float) -> bool:
     """Whether a ball put down on the slope still stands after a second."""
-    observe = {"v": Final(quantity=Velocity("ball"))}
+    observe = {"v": engine.Final(quantity=engine.Velocity("ball"))}
     result = simulate(scene(0.0, 0.0, slope), time_step=TIME_STEP, steps=60, observe=observe)
     return result.completed and float(np.abs(result["v"]).max()) < 1e-6
 
 
-def steepest(simulate: Simulate) -> BreakPoint:
+def steepest(simulate: case.Simulate) -> case.BreakPoint:
     """The steepest slope it stands on."""
     top = ROLLING / RADIUS
     return break_point(lambda slope: stands(simulate, slope), 0.2 * top, 5.0 * top, resolution=1e-3)
 
 
-def slows(simulate: Simulate, time_step: float) -> bool:
+def slows(simulate: case.Simulate, time_step: float) -> bool:
     """Whether a ball loses its speed by (5/7) ρ g t/r, and spins no more, in three steps so long [s]."""
-    observe = {"v": Trace(quantity=Velocity("ball")), "w": Trace(quantity=AngularVelocity("ball"))}
+    observe = {
+        "v": engine.Trace(quantity=engine.Velocity("ball")),
+        "w": engine.Trace(quantity=engine.AngularVelocity("ball")),
+    }
     result = simulate(scene(spin=SPIN), time_step=time_step, steps=3, observe=observe)
     times = time_step * np.arange(4)
     slow = np.hypot(result["v"][:, 0], result["v"][:, 1]) - np.maximum(0.0, SPEED - BRAKE * times)
@@ -123,18 +110,18 @@ def slows(simulate: Simulate, time_step: float) -> bool:
     return result.completed and float(np.abs((slow, spun)).max()) < 1e-9
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step [s] in which it slows down as it should."""
     return break_point(functools.partial(slows, simulate), TIME_STEP, LONGEST, walk=6)
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Speed of the ball against time."""
-    observe = {"v": Trace(quantity=Velocity("ball"))}
+    observe = {"v": engine.Trace(quantity=engine.Velocity("ball"))}
     result = simulate(scene(), time_step=TIME_STEP, duration=1.5 * STOPPED, observe=observe)
     time, speed = result.sample_times["v"], np.hypot(result["v"][:, 0], result["v"][:, 1])
     exact = np.maximum(0.0, SPEED - BRAKE * time)
-    return Drawing(
+    return case.Drawing(
         curves=(line("ball", time, speed, "points"), line("v − (5/7) ρ g t/r", time, exact, "reference")),
         x_label="time [s]",
         y_label="speed [m/s]",
@@ -144,7 +131,7 @@ def draw(simulate: Simulate) -> Drawing:
 
 ROUNDED = "constant torque is exact in a step; the solver stops at 1e-10 of the load"
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Rolling friction",
     question="Does a ball with rolling friction stop where it must, stand on the slope it may and spin down in time?",
     why="Without rolling friction a ball on the floor never stops, and no heap of balls has a slope.",
@@ -199,9 +186,9 @@ TEST = ScalarTest(
             "spin",
         ),
     ),
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP, duration=1.5 * STOPPED),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP, duration=1.5 * STOPPED),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="slope",
             title="Steepest slope on which a ball stands",
             configuration="plain",
@@ -211,7 +198,7 @@ TEST = ScalarTest(
             expected=(0.998 * ROLLING / RADIUS, 1.002 * ROLLING / RADIUS),
             expected_source="tan θ = ρ/r = 0.04, to the resolution of the search",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest step in which a ball is slowed by rolling and torsional friction",
             configuration="plain",
@@ -222,9 +209,9 @@ TEST = ScalarTest(
             expected_source="a torque's impulse has the factor h, and no more is taken than there is; the search ends at 1000 s",
         ),
     ),
-    figures=(Figure(name="speed", title="Speed against time", draw=draw),),
+    figures=(case.Figure(name="speed", title="Speed against time", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="way",
             description="way until it stands, against v²/(2 a)",
             unit="m",

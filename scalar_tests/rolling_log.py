@@ -7,18 +7,9 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Method, Orientation, Trace
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.floating_box import (
@@ -42,9 +33,11 @@ def roll_rate(ratio: float) -> float:
     return math.sqrt(GRAVITY * metacentric_height(ratio) * 12.0 / (2.0 * SIDE**2))
 
 
-def swing(simulate: Simulate, ratio: float, time_step: float = TIME_STEP, method: Method = PLAIN) -> float:
+def swing(
+    simulate: case.Simulate, ratio: float, time_step: float = TIME_STEP, method: engine.Method = engine.PLAIN
+) -> float:
     """Frequency [rad/s] of a small roll."""
-    observe = {"q": Trace(quantity=Orientation("log"))}
+    observe = {"q": engine.Trace(quantity=engine.Orientation("log"))}
     asked = scene(ratio, roll=NUDGE)
     result = simulate(asked, time_step=time_step, duration=DURATION, method=method, observe=observe)
     x = 2.0 * result["q"][:, 1]
@@ -57,7 +50,7 @@ def swing_limit(ratio: float) -> float:
     return NUDGE**2 * (1.0 + SIDE / (12.0 * ratio) / metacentric_height(ratio))
 
 
-def swings(simulate: Simulate) -> dict[str, float]:
+def swings(simulate: case.Simulate) -> dict[str, float]:
     """Rolls outside of the densities at which it falls, against √(m g GM/I), slowed as the step does."""
     worst = 0.0
     for ratio in ROLLED:
@@ -69,9 +62,9 @@ def swings(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def upright(simulate: Simulate, ratio: float) -> bool:
+def upright(simulate: case.Simulate, ratio: float) -> bool:
     """Whether a nudge has not grown tenfold within 20 s."""
-    observe = {"q": Trace(quantity=Orientation("log"), every=12)}
+    observe = {"q": engine.Trace(quantity=engine.Orientation("log"), every=12)}
     result = simulate(scene(ratio, roll=NUDGE), time_step=TIME_STEP, duration=20.0, observe=observe)
     return result.completed and 2.0 * float(np.abs(result["q"][:, 1]).max()) < 10.0 * NUDGE
 
@@ -82,17 +75,17 @@ def blurred(place: float) -> float:
     return lacking / abs(0.5 * SIDE - SIDE / (12.0 * place**2)) + 1e-3 * place
 
 
-def edge(simulate: Simulate, easy: float, hard: float) -> BreakPoint:
+def edge(simulate: case.Simulate, easy: float, hard: float) -> case.BreakPoint:
     """The last density ratio at which it stands upright."""
     return break_point(functools.partial(upright, simulate), easy, hard, resolution=1e-3, walk=5)
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Relative error of the roll's frequency, ratio 0.15."""
     return swing(simulate, ROLLED[0], time_step, method) / roll_rate(ROLLED[0]) - 1.0
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Frequency of the roll against the density."""
     curves = []
     for name, ratios in (
@@ -101,7 +94,7 @@ def draw(simulate: Simulate) -> Drawing:
     ):
         curves.append(line(name, ratios, sweep(ratios, lambda ratio: swing(simulate, ratio)), "points"))
         curves.append(line(f"√(m g GM/I), {name}", ratios, map(roll_rate, ratios), "reference"))
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="density of the log over that of the water",
         y_label="frequency of the roll [rad/s]",
@@ -110,7 +103,7 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Rolling log",
     question="Does a log roll at the rate its metacentre says, and stand upright up to where that sinks below its centre?",
     why="Ships are judged by their metacentre. It is a difference of large moments: what is lost of them shows in the roll "
@@ -154,10 +147,10 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=scene(0.15, roll=0.1), time_step=TIME_STEP, duration=DURATION),
-    figures=(Figure(name="roll", title="Frequency of the roll", draw=draw),),
+    example=lambda: case.Example(scene=scene(0.15, roll=0.1), time_step=TIME_STEP, duration=DURATION),
+    figures=(case.Figure(name="roll", title="Frequency of the roll", draw=draw),),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="light",
             title="Largest low density ratio at which a square log stands upright",
             configuration="plain",
@@ -167,7 +160,7 @@ TEST = ScalarTest(
             expected=(LIGHT - blurred(LIGHT), LIGHT + blurred(LIGHT)),
             expected_source="GM = 0 at ½ − √(1/12) = .2113; where a nudge grows tenfold in 20 s, and what the search leaves",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="heavy",
             title="Smallest high density ratio at which a square log stands upright",
             configuration="plain",
@@ -180,7 +173,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="roll",
             description="relative error of the roll's frequency against √(m g GM/I)",
             unit="1",

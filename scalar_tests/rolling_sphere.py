@@ -4,33 +4,10 @@ from __future__ import annotations
 
 import math
 
-from spook_tracker.engine import (
-    PLAIN,
-    AngularVelocity,
-    Final,
-    Method,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-    Sphere,
-    Velocity,
-)
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.sweep import apart, line
 
 RADIUS = 0.5  # m
@@ -44,15 +21,19 @@ LADDER_DURATION = 2.0  # s
 ROLLING, SLIDING = 0.4, 1.0  # tan θ; a solid sphere rolls up to 3.5 µ = 0.7
 
 
-def scene(slope: float) -> Scene:
+def scene(slope: float) -> engine.Scene:
     """A sphere at rest on a level plane under gravity tilted by atan(slope) towards +x."""
     tilt = math.atan(slope)
     rough = Material(friction=FRICTION)
-    plane = RigidBody(name="plane", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
-    ball = RigidBody(
-        name="ball", mass=MASS, shape=Sphere(RADIUS), position=(0.0, 0.0, RADIUS), material=rough
+    plane = engine.RigidBody(
+        name="plane", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=rough
     )
-    return Scene(bodies=(plane, ball), gravity=(GRAVITY * math.sin(tilt), 0.0, -GRAVITY * math.cos(tilt)))
+    ball = engine.RigidBody(
+        name="ball", mass=MASS, shape=engine.Sphere(RADIUS), position=(0.0, 0.0, RADIUS), material=rough
+    )
+    return engine.Scene(
+        bodies=(plane, ball), gravity=(GRAVITY * math.sin(tilt), 0.0, -GRAVITY * math.cos(tilt))
+    )
 
 
 def accelerations(slope: float) -> tuple[float, float]:
@@ -65,17 +46,17 @@ def accelerations(slope: float) -> tuple[float, float]:
     return GRAVITY * math.sin(tilt) - FRICTION * normal, 2.5 * FRICTION * normal / RADIUS
 
 
-def speeds(simulate: Simulate, slope: float) -> tuple[float, float]:
+def speeds(simulate: case.Simulate, slope: float) -> tuple[float, float]:
     """Speed [m/s] down the slope and spin [rad/s] after STEPS steps."""
     observe = {
-        "velocity": Final(quantity=Velocity("ball")),
-        "spin": Final(quantity=AngularVelocity("ball")),
+        "velocity": engine.Final(quantity=engine.Velocity("ball")),
+        "spin": engine.Final(quantity=engine.AngularVelocity("ball")),
     }
     result = simulate(scene(slope), time_step=TIME_STEP, steps=STEPS, observe=observe)
     return float(result["velocity"][0]), float(result["spin"][1])
 
 
-def _measure(simulate: Simulate) -> dict[str, float]:
+def _measure(simulate: case.Simulate) -> dict[str, float]:
     seconds = STEPS * TIME_STEP
     values = {}
     for name, slope in (("rolling", ROLLING), ("sliding", SLIDING)):
@@ -86,11 +67,14 @@ def _measure(simulate: Simulate) -> dict[str, float]:
     return values
 
 
-def steepest_rolled(simulate: Simulate) -> BreakPoint:
+def steepest_rolled(simulate: case.Simulate) -> case.BreakPoint:
     """Steepest slope (its tangent) down which the sphere rolls without slip."""
 
     def rolls(slope: float) -> bool:
-        observe = {"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))}
+        observe = {
+            "v": engine.Final(quantity=engine.Velocity("ball")),
+            "w": engine.Final(quantity=engine.AngularVelocity("ball")),
+        }
         result = simulate(scene(slope), time_step=TIME_STEP, steps=STEPS, observe=observe)
         speed = float(result["v"][0])
         return abs(speed - RADIUS * float(result["w"][1])) <= 1e-9 * speed
@@ -98,13 +82,16 @@ def steepest_rolled(simulate: Simulate) -> BreakPoint:
     return break_point(rolls, 0.1, 2.0, resolution=0.002, walk=8)
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step [s] in which the sphere rolls and slides as it should."""
 
     def right(time_step: float) -> bool:
         off = []
         for slope in (ROLLING, SLIDING):
-            observe = {"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))}
+            observe = {
+                "v": engine.Final(quantity=engine.Velocity("ball")),
+                "w": engine.Final(quantity=engine.AngularVelocity("ball")),
+            }
             result = simulate(scene(slope), time_step=time_step, steps=10, observe=observe)
             linear, angular = (10.0 * time_step * rate for rate in accelerations(slope))
             off += [float(result["v"][0]) / linear - 1.0, float(result["w"][1]) / angular - 1.0]
@@ -113,12 +100,12 @@ def longest_step(simulate: Simulate) -> BreakPoint:
     return break_point(right, TIME_STEP, LONGEST, walk=6)
 
 
-def _draw(simulate: Simulate) -> Drawing:
+def _draw(simulate: case.Simulate) -> case.Drawing:
     slopes = tuple(0.1 * i for i in range(1, 13))
     seconds = STEPS * TIME_STEP
     found = [speeds(simulate, slope) for slope in slopes]
     right = [accelerations(slope) for slope in slopes]
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("speed", slopes, (speed for speed, _ in found), "points"),
             line("radius × spin", slopes, (RADIUS * spin for _, spin in found), "points"),
@@ -132,8 +119,8 @@ def _draw(simulate: Simulate) -> Drawing:
     )
 
 
-def _metric(name: str, description: str, role: str) -> Metric:
-    return Metric(
+def _metric(name: str, description: str, role: str) -> case.Metric:
+    return case.Metric(
         name=name,
         description=description,
         unit="1",
@@ -145,16 +132,16 @@ def _metric(name: str, description: str, role: str) -> Metric:
     )
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Distance rolled in 2 s minus ½ a t² [m]."""
-    observe = {"place": Final(quantity=Position("ball"), from_start=True)}
+    observe = {"place": engine.Final(quantity=engine.Position("ball"), from_start=True)}
     result = simulate(
         scene(ROLLING), time_step=time_step, duration=LADDER_DURATION, method=method, observe=observe
     )
     return float(result["place"][0]) - 0.5 * accelerations(ROLLING)[0] * LADDER_DURATION**2
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Rolling and sliding sphere",
     question="Does a sphere on a slope roll while friction can hold its contact, and slide beyond?",
     why="Rolling couples friction, rotation and translation: any error in one of them shows as a wrong acceleration.",
@@ -174,7 +161,7 @@ TEST = ScalarTest(
     conclusion="Green: friction and rotation agree. Red: inertia, friction bound or lever is wrong.",
     source="ours",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="cone",
             time_step=TIME_STEP,
             metrics=(
@@ -187,19 +174,23 @@ TEST = ScalarTest(
             note="Cone friction, direct solver.",
         ),
     ),
-    example=lambda: Example(scene=scene(ROLLING), time_step=TIME_STEP),
-    figures=(Figure(name="speed-against-slope", title="Speed and spin against slope", draw=_draw),),
+    example=lambda: case.Example(scene=scene(ROLLING), time_step=TIME_STEP),
+    figures=(case.Figure(name="speed-against-slope", title="Speed and spin against slope", draw=_draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="distance",
             description="distance rolled in 2 s against ½ a t²",
             unit="m",
             time_steps=tuple(1.0 / n for n in (15, 30, 60, 120, 240, 480, 960)),
             configurations=(
-                Configuration(name="direct", method=PLAIN, expected_order=1.0),
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
-                Configuration(  # exact, for constant forces
-                    name="half-step velocities", method=Method(half_step_velocities=True), expected_order=None
+                case.Configuration(name="direct", method=engine.PLAIN, expected_order=1.0),
+                case.Configuration(
+                    name="iterative", method=engine.Method(solver="iterative"), expected_order=None
+                ),
+                case.Configuration(  # exact, for constant forces
+                    name="half-step velocities",
+                    method=engine.Method(half_step_velocities=True),
+                    expected_order=None,
                 ),
             ),
             error=ladder_error,
@@ -208,7 +199,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="steepest-rolled",
             title="Steepest slope down which a sphere rolls",
             configuration="plain",
@@ -218,7 +209,7 @@ TEST = ScalarTest(
             expected=(0.998 * 3.5 * FRICTION, 3.5 * FRICTION),
             expected_source="7/2 µ, to the resolution of the search",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest step in which a sphere rolls and slides as it should",
             configuration="cone",

@@ -7,39 +7,10 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    AngularMomentum,
-    Ball,
-    Box,
-    Capsule,
-    ConstraintForce,
-    Energy,
-    Final,
-    Hinge,
-    MaximumAbsolute,
-    Method,
-    Momentum,
-    Position,
-    RigidBody,
-    Scene,
-    Shape,
-    Sphere,
-    Trace,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.heavier import heavier
 from spook_tracker.scalar_tests.sweep import line, told
@@ -61,7 +32,7 @@ def middle_pull() -> float:
 
 
 @functools.cache
-def rope(count: int, spin: float = SPIN, nudge: float = 0.0) -> Scene:
+def rope(count: int, spin: float = SPIN, nudge: float = 0.0) -> engine.Scene:
     """Thin rods on ball joints in a straight line along x, which turns about its middle; nothing else acts. `nudge` [rad/s]
     tilts every other rod up and down."""
     length, mass = LENGTH / count, MASS / count
@@ -70,10 +41,10 @@ def rope(count: int, spin: float = SPIN, nudge: float = 0.0) -> Scene:
     for k in range(count):
         x = (k + 0.5) * length - 0.5 * LENGTH
         links.append(
-            RigidBody(
+            engine.RigidBody(
                 name=f"link {k}",
                 mass=mass,
-                shape=Capsule(0.5 * THICK, length - THICK),
+                shape=engine.Capsule(0.5 * THICK, length - THICK),
                 inertia=(across, across, 0.5 * mass * THICK**2),
                 position=(x, 0.0, 0.0),
                 orientation=(math.sqrt(0.5), 0.0, math.sqrt(0.5), 0.0),
@@ -82,7 +53,7 @@ def rope(count: int, spin: float = SPIN, nudge: float = 0.0) -> Scene:
             )
         )
     joints = [
-        Ball(
+        engine.Ball(
             name=f"joint {k}",
             between=(f"link {k - 1}", f"link {k}"),
             at=(k * length - 0.5 * LENGTH, 0.0, 0.0),
@@ -90,21 +61,21 @@ def rope(count: int, spin: float = SPIN, nudge: float = 0.0) -> Scene:
         )
         for k in range(1, count)
     ]
-    return Scene(bodies=tuple(links), constraints=tuple(joints), contacts=False)
+    return engine.Scene(bodies=tuple(links), constraints=tuple(joints), contacts=False)
 
 
-BODIES: dict[str, tuple[Shape, float, tuple[float, float, float]]] = {  # kg, m
-    "pelvis": (Box((0.2, 0.3, 0.2)), 12.0, (0.0, 0.0, 0.0)),
-    "chest": (Box((0.2, 0.35, 0.4)), 25.0, (0.0, 0.0, 0.35)),
-    "head": (Sphere(0.12), 5.0, (0.0, 0.0, 0.72)),
+BODIES: dict[str, tuple[engine.Shape, float, tuple[float, float, float]]] = {  # kg, m
+    "pelvis": (engine.Box((0.2, 0.3, 0.2)), 12.0, (0.0, 0.0, 0.0)),
+    "chest": (engine.Box((0.2, 0.35, 0.4)), 25.0, (0.0, 0.0, 0.35)),
+    "head": (engine.Sphere(0.12), 5.0, (0.0, 0.0, 0.72)),
     **{
         f"{side} {part}": (shape, mass, (0.0, sign * y, z))
         for side, sign in (("left", 1.0), ("right", -1.0))
         for part, shape, mass, y, z in (
-            ("arm", Capsule(0.05, 0.25), 2.5, 0.25, 0.35),
-            ("forearm", Capsule(0.04, 0.22), 1.5, 0.25, 0.03),
-            ("thigh", Capsule(0.08, 0.32), 9.0, 0.1, -0.3),
-            ("shin", Capsule(0.05, 0.35), 4.0, 0.1, -0.75),
+            ("arm", engine.Capsule(0.05, 0.25), 2.5, 0.25, 0.35),
+            ("forearm", engine.Capsule(0.04, 0.22), 1.5, 0.25, 0.03),
+            ("thigh", engine.Capsule(0.08, 0.32), 9.0, 0.1, -0.3),
+            ("shin", engine.Capsule(0.05, 0.35), 4.0, 0.1, -0.75),
         )
     },
 }
@@ -131,13 +102,13 @@ HINGES = {
 DOLL = math.fsum(mass for _, mass, _ in BODIES.values())  # kg
 
 
-def ragdoll() -> Scene:
+def ragdoll() -> engine.Scene:
     """A body of eleven parts, thrown and tumbling as a whole."""
     parts = []
     for name, (shape, mass, place) in BODIES.items():
         turned = np.cross(TUMBLE, place) + THROWN
         parts.append(
-            RigidBody(
+            engine.RigidBody(
                 name=name,
                 mass=mass,
                 shape=shape,
@@ -147,14 +118,14 @@ def ragdoll() -> Scene:
             )
         )
     balls = [
-        Ball(name=name, between=(first, second), at=at, compliance=0.0)
+        engine.Ball(name=name, between=(first, second), at=at, compliance=0.0)
         for name, (first, second, at) in BALLS.items()
     ]
     hinges = [
-        Hinge(name=name, between=(first, second), at=at, axis=(0.0, 1.0, 0.0), compliance=0.0)
+        engine.Hinge(name=name, between=(first, second), at=at, axis=(0.0, 1.0, 0.0), compliance=0.0)
         for name, (first, second, at) in HINGES.items()
     ]
-    return Scene(
+    return engine.Scene(
         bodies=tuple(parts),
         constraints=(*balls, *hinges),
         gravity=(0.0, 0.0, -GRAVITY),
@@ -162,13 +133,13 @@ def ragdoll() -> Scene:
     )
 
 
-def spin(simulate: Simulate) -> dict[str, float]:
+def spin(simulate: case.Simulate) -> dict[str, float]:
     """Half a second of the long rope."""
     observe: dict[str, Observable] = {
-        "p": MaximumAbsolute(quantity=Momentum()),
-        "L": Trace(quantity=AngularMomentum()),
-        "E": Trace(quantity=Energy()),
-        "pull": Final(quantity=ConstraintForce(f"joint {LONG // 2}")),
+        "p": engine.MaximumAbsolute(quantity=engine.Momentum()),
+        "L": engine.Trace(quantity=engine.AngularMomentum()),
+        "E": engine.Trace(quantity=engine.Energy()),
+        "pull": engine.Final(quantity=engine.ConstraintForce(f"joint {LONG // 2}")),
     }
     long = simulate(rope(LONG), time_step=TIME_STEP, duration=DURATION, observe=observe)
     turning, energy = long["L"][:, 2], long["E"]
@@ -186,27 +157,27 @@ FEW = 40  # links of the study
 FASTEST = 2.50376  # rad/s
 
 
-def straight(simulate: Simulate, spin: float) -> bool:
+def straight(simulate: case.Simulate, spin: float) -> bool:
     """Whether a rope of few links that is nudged stays in its plane for 200 steps."""
-    observe = {"x": MaximumAbsolute(quantity=Position())}
+    observe = {"x": engine.MaximumAbsolute(quantity=engine.Position())}
     result = simulate(rope(FEW, spin, 1e-8), time_step=TIME_STEP, steps=200, observe=observe)
     return result.completed and float(result["x"].max(axis=0)[2]) < 1e-6
 
 
-def fastest(simulate: Simulate) -> BreakPoint:
+def fastest(simulate: case.Simulate) -> case.BreakPoint:
     """The fastest spin of a rope of few links."""
     return break_point(functools.partial(straight, simulate), 0.4 * FASTEST, 2.0 * FASTEST, resolution=0.005)
 
 
-def pulls(simulate: Simulate, whole: float) -> bool:
+def pulls(simulate: case.Simulate, whole: float) -> bool:
     """Whether forty links of that mass [kg] pull in their middle as Σ m ω² x asks, after thirty steps."""
-    observe = {"pull": Final(quantity=ConstraintForce("joint 20"))}
+    observe = {"pull": engine.Final(quantity=engine.ConstraintForce("joint 20"))}
     result = simulate(heavier(rope(40), whole / MASS), time_step=TIME_STEP, steps=30, observe=observe)
     pull = float(np.linalg.norm(result["pull"][:3])) * MASS / whole
     return result.completed and abs(pull / middle_pull() - 1.0) < 10.0 * (SPIN * TIME_STEP) ** 2
 
 
-def cost(simulate: Simulate) -> dict[str, float]:
+def cost(simulate: case.Simulate) -> dict[str, float]:
     """Exact work a link of the long rope over that of the short one."""
     work = []
     for count in (LONG, SHORT):
@@ -215,11 +186,11 @@ def cost(simulate: Simulate) -> dict[str, float]:
     return {"cost_error": work[0] / work[1] - 1.0}
 
 
-def throw(simulate: Simulate) -> dict[str, float]:
+def throw(simulate: case.Simulate) -> dict[str, float]:
     """The ragdoll in flight."""
     observe: dict[str, Observable] = {
-        "p": Trace(quantity=Momentum()),
-        "L": Trace(quantity=AngularMomentum()),
+        "p": engine.Trace(quantity=engine.Momentum()),
+        "L": engine.Trace(quantity=engine.AngularMomentum()),
     }
     asked = ragdoll()
     result = simulate(asked, time_step=TIME_STEP, duration=FLIGHT, observe=observe)
@@ -238,21 +209,21 @@ def throw(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest relative error of the energy of the ragdoll in half a second."""
-    observe = {"E": MaximumAbsolute(quantity=Energy(), from_start=True)}
+    observe = {"E": engine.MaximumAbsolute(quantity=engine.Energy(), from_start=True)}
     asked = ragdoll()
     result = simulate(asked, time_step=time_step, duration=FLIGHT, method=method, observe=observe)
     return float(result["E"]) / (0.5 * DOLL * float(np.dot(THROWN, THROWN)))
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Work a step and link against the number of links."""
     counts, works = [16, 32, 64, 125, 250, 500], []
     for count in counts:
         result = simulate(rope(count), time_step=TIME_STEP, steps=3)
         works.append(result.counters.get("block_operations", 0) / (3.0 * count))
-    return Drawing(
+    return case.Drawing(
         curves=(line("work per link", counts, works, "points"),),
         x_label="links",
         y_label="block operations a step and link",
@@ -270,7 +241,7 @@ TURNS = (
 )
 ROUNDING = "equal and opposite, about the same point: rounding of a thousand sums"
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Rope and ragdoll",
     question="Does a rope of a thousand links keep its momenta, pull as it must, and cost no more a link than a short one?",
     why="Cranes and tethers are long chains. A solver that fills in costs N³ and a tolerance that adds up along the chain "
@@ -357,10 +328,10 @@ TEST = ScalarTest(
             "ragdoll",
         ),
     ),
-    example=lambda: Example(scene=ragdoll(), time_step=TIME_STEP, duration=1.0),
-    figures=(Figure(name="cost", title="Work per link", draw=draw),),
+    example=lambda: case.Example(scene=ragdoll(), time_step=TIME_STEP, duration=1.0),
+    figures=(case.Figure(name="cost", title="Work per link", draw=draw),),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="fastest",
             title="Fastest spin at which a rope of forty links stays straight",
             configuration="plain",
@@ -383,16 +354,16 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="energy",
             description="largest relative error of the ragdoll's energy in half a second",
             unit="1",
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 480)),
             configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=1.0),
-                Configuration(
+                case.Configuration(name="plain", method=engine.PLAIN, expected_order=1.0),
+                case.Configuration(
                     name="order4",
-                    method=Method(composition="order4"),
+                    method=engine.Method(composition="order4"),
                     expected_order=None,  # the largest over ever fewer samples has none
                     time_steps=(1 / 8, 1 / 12, 1 / 20, 1 / 30),
                 ),

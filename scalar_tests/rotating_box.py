@@ -13,33 +13,9 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.special import ellipk, ellipkm1
 
-from spook_tracker.engine import (
-    PLAIN,
-    AngularMomentum,
-    AngularVelocity,
-    KineticEnergy,
-    MaximumAbsolute,
-    Method,
-    Orientation,
-    Result,
-    RigidBody,
-    Scene,
-    Trace,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.sweep import line
 
 INERTIA = (0.9144, 1.098, 1.66)  # kg m²
@@ -51,10 +27,12 @@ MOST_SPIN = 1e4  # rad a step
 PATIENCE = 60.0  # s
 
 
-def scene() -> Scene:
+def scene() -> engine.Scene:
     """One body, no force at all."""
-    body = RigidBody(name="body", mass=1.0, inertia=INERTIA, position=(0.0, 0.0, 0.0), angular_velocity=SPIN)
-    return Scene(bodies=(body,))
+    body = engine.RigidBody(
+        name="body", mass=1.0, inertia=INERTIA, position=(0.0, 0.0, 0.0), angular_velocity=SPIN
+    )
+    return engine.Scene(bodies=(body,))
 
 
 @functools.cache
@@ -73,11 +51,13 @@ def flip_time() -> float:
     return float(2.0 * ellipk(modulus2) / np.sqrt(rate2))
 
 
-def body_spin(simulate: Simulate, time_step: float, method: Method = PLAIN) -> tuple[np.ndarray, np.ndarray]:
+def body_spin(
+    simulate: case.Simulate, time_step: float, method: engine.Method = engine.PLAIN
+) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and (samples, 3) angular velocity [rad/s] in body axes."""
     observe = {
-        "spin": Trace(quantity=AngularVelocity("body")),
-        "turn": Trace(quantity=Orientation("body")),
+        "spin": engine.Trace(quantity=engine.AngularVelocity("body")),
+        "turn": engine.Trace(quantity=engine.Orientation("body")),
     }
     result = simulate(scene(), time_step=time_step, duration=DURATION, method=method, observe=observe)
     w, axis = result["turn"][:, :1], -result["turn"][:, 1:]
@@ -86,7 +66,9 @@ def body_spin(simulate: Simulate, time_step: float, method: Method = PLAIN) -> t
     return result.sample_times["spin"], spin + w * twice + np.cross(axis, twice)
 
 
-def measured_flip_time(simulate: Simulate, time_step: float = TIME_STEP, method: Method = PLAIN) -> float:
+def measured_flip_time(
+    simulate: case.Simulate, time_step: float = TIME_STEP, method: engine.Method = engine.PLAIN
+) -> float:
     """Mean time [s] between zero crossings of the spin about the middle axis; NaN with fewer than two."""
     times, spin = body_spin(simulate, time_step, method)
     middle = spin[:, 1]
@@ -97,10 +79,10 @@ def measured_flip_time(simulate: Simulate, time_step: float = TIME_STEP, method:
     return float((zero[-1] - zero[0]) / (len(zero) - 1))
 
 
-def _measure_conserved(simulate: Simulate) -> dict[str, float]:
+def _measure_conserved(simulate: case.Simulate) -> dict[str, float]:
     observe = {
-        "momentum": MaximumAbsolute(quantity=AngularMomentum(), from_start=True),
-        "energy": MaximumAbsolute(quantity=KineticEnergy(), from_start=True),
+        "momentum": engine.MaximumAbsolute(quantity=engine.AngularMomentum(), from_start=True),
+        "energy": engine.MaximumAbsolute(quantity=engine.KineticEnergy(), from_start=True),
     }
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=observe)
     moments, spin = np.array(INERTIA), np.array(SPIN)
@@ -112,19 +94,19 @@ def _measure_conserved(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def _measure_period(simulate: Simulate) -> dict[str, float]:
+def _measure_period(simulate: case.Simulate) -> dict[str, float]:
     return {
         "flip_time_error": measured_flip_time(simulate) / flip_time() - 1.0,
-        "turn_error": turn_error(simulate, TIME_STEP, PLAIN),
+        "turn_error": turn_error(simulate, TIME_STEP, engine.PLAIN),
     }
 
 
-def _draw_spin(simulate: Simulate) -> Drawing:
+def _draw_spin(simulate: case.Simulate) -> case.Drawing:
     times, spin = body_spin(simulate, TIME_STEP)
     turned = int(np.count_nonzero(np.diff(np.sign(spin[:, 1]))))
     every = slice(None, None, 10)
     x = tuple(map(float, times[every]))
-    return Drawing(
+    return case.Drawing(
         curves=tuple(line(f"axis {i + 1}", x, spin[every, i]) for i in range(3)),
         x_label="time [s]",
         y_label="angular velocity in body axes [rad/s]",
@@ -132,7 +114,7 @@ def _draw_spin(simulate: Simulate) -> Drawing:
     )
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Relative error of the mean time between flips."""
     return measured_flip_time(simulate, time_step, method) / flip_time() - 1.0
 
@@ -151,27 +133,27 @@ def exact_turn() -> np.ndarray:
     return np.asarray(solved.y[3:, -1])
 
 
-def turn_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+def turn_run(simulate: case.Simulate, time_step: float, method: engine.Method) -> engine.Result:
     """The tumbling up to where its orientation is compared."""
     return simulate(scene(), time_step=time_step, duration=TURN_DURATION, method=method)
 
 
-def turn_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def turn_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest error of a component of the orientation after 10 s."""
     exact, turn = exact_turn(), turn_run(simulate, time_step, method).final_state["body"][3:7]
     return float(np.abs(turn * np.sign(turn @ exact) - exact).max())
 
 
-def highest_spin(simulate: Simulate) -> BreakPoint:
+def highest_spin(simulate: case.Simulate) -> case.BreakPoint:
     """Largest h |ω| about the axis of largest inertia, a little off it."""
 
     def holds(turn: float) -> bool:
         spin = (1e-3 * turn / TIME_STEP, 0.0, turn / TIME_STEP)
-        body = RigidBody(
+        body = engine.RigidBody(
             name="body", mass=1.0, inertia=INERTIA, position=(0.0, 0.0, 0.0), angular_velocity=spin
         )
-        observe = {"turn": MaximumAbsolute(quantity=AngularMomentum(), from_start=True)}
-        result = simulate(Scene(bodies=(body,)), time_step=TIME_STEP, steps=2000, observe=observe)
+        observe = {"turn": engine.MaximumAbsolute(quantity=engine.AngularMomentum(), from_start=True)}
+        result = simulate(engine.Scene(bodies=(body,)), time_step=TIME_STEP, steps=2000, observe=observe)
         momentum = INERTIA[2] * turn / TIME_STEP
         return result.completed and float(result["turn"].max()) <= 1e-9 * momentum
 
@@ -190,19 +172,19 @@ def first_flip(nudge: float) -> float:
     return float(ellipkm1(1.0 - modulus)) / math.sqrt(rate2)
 
 
-def flips(simulate: Simulate, nudge: float) -> bool:
+def flips(simulate: case.Simulate, nudge: float) -> bool:
     """Whether a body spinning at 1 rad/s about its middle axis and at `nudge` about its first turns over within PATIENCE."""
-    body = RigidBody(
+    body = engine.RigidBody(
         name="body", mass=1.0, inertia=INERTIA, position=(0.0, 0.0, 0.0), angular_velocity=(nudge, 1.0, 0.0)
     )
-    observe = {"q": Trace(quantity=Orientation("body"))}
-    result = simulate(Scene(bodies=(body,)), time_step=TIME_STEP, duration=PATIENCE, observe=observe)
+    observe = {"q": engine.Trace(quantity=engine.Orientation("body"))}
+    result = simulate(engine.Scene(bodies=(body,)), time_step=TIME_STEP, duration=PATIENCE, observe=observe)
     w, x, y, z = result["q"].T
     momentum = INERTIA[0] * nudge * 2.0 * (x * y - w * z) + INERTIA[1] * (1.0 - 2.0 * (x * x + z * z))
     return result.completed and float(momentum.min()) < 0.0  # along the middle axis
 
 
-def gentlest(simulate: Simulate) -> BreakPoint:
+def gentlest(simulate: case.Simulate) -> case.BreakPoint:
     """The smallest nudge [rad/s] that turns the body over in time."""
     return break_point(functools.partial(flips, simulate), 0.1, 1e-12, resolution=5e-3, walk=6)
 
@@ -217,7 +199,7 @@ def gentlest_nudge() -> float:
 
 
 GENTLEST = gentlest_nudge()  # rad/s
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Rotating box",
     question="Does a free body spinning about its middle axis flip when it should, and lose nothing?",
     why=(
@@ -240,11 +222,11 @@ TEST = ScalarTest(
     conclusion="Green: rotation neither gains nor loses. Red: the gyroscopic term is missing or integrated wrongly.",
     source="thesis, section 5.4 (asked for); C. Lacoursière, Ghosts and Machines, 2007",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="flip_time_error",
                     description="relative error of the mean time between flips in 200 s",
                     unit="1",
@@ -255,7 +237,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-12,
                 ),
-                Metric(
+                case.Metric(
                     name="turn_error",
                     description="largest error of a component of the orientation after 10 s",
                     unit="1",
@@ -269,11 +251,11 @@ TEST = ScalarTest(
             measure=_measure_period,
             note="Euler's equations, step by step.",
         ),
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="momentum_drift",
                     description="largest change of a component of the angular momentum, over its magnitude",
                     unit="1",
@@ -283,7 +265,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-13,
                 ),
-                Metric(
+                case.Metric(
                     name="energy_deviation",
                     description="largest relative deviation of the kinetic energy",
                     unit="1",
@@ -298,31 +280,35 @@ TEST = ScalarTest(
             note="Euler's equations, step by step.",
         ),
     ),
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP),
-    figures=(Figure(name="spin", title="Angular velocity in body axes", draw=_draw_spin),),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP),
+    figures=(case.Figure(name="spin", title="Angular velocity in body axes", draw=_draw_spin),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="flip-time",
             description="relative error of the time between flips",
             unit="1",
             time_steps=tuple(1.0 / n for n in (7.5, 15.0, 30.0, 60.0, 120.0)),
             configurations=(
                 # What is left is the search for the flips between the steps.
-                Configuration(name="plain", method=PLAIN, expected_order=None),
-                Configuration(name="order4", method=Method(composition="order4"), expected_order=None),
+                case.Configuration(name="plain", method=engine.PLAIN, expected_order=None),
+                case.Configuration(
+                    name="order4", method=engine.Method(composition="order4"), expected_order=None
+                ),
             ),
             error=ladder_error,
             target_error=1e-3,
             target_seconds=0.05,
         ),
-        Ladder(
+        case.Ladder(
             name="turn",
             description="largest error of a component of the orientation after 10 s against Euler's equations",
             unit="1",
             time_steps=tuple(1.0 / n for n in (4, 6, 8, 12, 16, 32)),
             configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=None),  # no step errs
-                Configuration(name="order4", method=Method(composition="order4"), expected_order=None),
+                case.Configuration(name="plain", method=engine.PLAIN, expected_order=None),  # no step errs
+                case.Configuration(
+                    name="order4", method=engine.Method(composition="order4"), expected_order=None
+                ),
             ),
             error=turn_error,
             run=turn_run,
@@ -331,7 +317,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="highest-spin",
             title="Highest spin h |ω| about the axis of largest inertia",
             configuration="plain",
@@ -341,7 +327,7 @@ TEST = ScalarTest(
             expected=(MOST_SPIN, MOST_SPIN),
             expected_source="a turn has no limit; the search ends at 1e4",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="gentlest",
             title="Smallest nudge that turns a spin about the middle axis over within 60 s",
             configuration="plain",

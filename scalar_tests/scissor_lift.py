@@ -4,39 +4,11 @@ from __future__ import annotations
 
 import math
 
-from spook_tracker.engine import (
-    PLAIN,
-    WORLD,
-    ConstraintForce,
-    Distance,
-    Final,
-    MaximumAbsolute,
-    Method,
-    Motor,
-    Planar,
-    PointOnLine,
-    Position,
-    Prismatic,
-    RigidBody,
-    Scene,
-    Velocity,
-)
+from spook_tracker import engine
 from spook_tracker.engine.joints import Constraint
 from spook_tracker.engine.result import SimulationFailed
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_count, break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import error
 from spook_tracker.scalar_tests.sweep import line, told
 
@@ -57,7 +29,7 @@ ACROSS = (0.0, 1.0, 0.0)
 
 def scene(
     stages: int, angle: float = ANGLE, load: float = LOAD, arm: float = ARM, driven: bool = False
-) -> Scene:
+) -> engine.Scene:
     """Pairs of arms that cross, one on the other, in the plane of x and z; the lower left pin is fixed, the lower right
     one slides on the ground, and above them a platform hangs on one pin and slides on the other. The lowest pins are held
     apart by a rigid actuator, or the right one is driven inwards.
@@ -67,20 +39,24 @@ def scene(
     """
     width, height = BAR * math.cos(angle), BAR * math.sin(angle)
     moment = arm * BAR**2 / 12.0
-    bodies: list[RigidBody] = []
+    bodies: list[engine.RigidBody] = []
     rows: list[Constraint] = []
 
     def part(name: str, mass: float, x: float, z: float, inertia: float, guided: bool = False) -> None:
         bodies.append(
-            RigidBody(name=name, mass=mass, inertia=(inertia, inertia, inertia), position=(x, 0.0, z))
+            engine.RigidBody(name=name, mass=mass, inertia=(inertia, inertia, inertia), position=(x, 0.0, z))
         )
         if not guided:  # by a rail
-            rows.append(Planar(name=f"{name} plane", between=(WORLD, name), axis=ACROSS, compliance=0.0))
+            rows.append(
+                engine.Planar(name=f"{name} plane", between=(engine.WORLD, name), axis=ACROSS, compliance=0.0)
+            )
 
     def pin(first: str, second: str, x: float, z: float) -> None:
         name = f"{first} to {second}"
         rows.append(
-            PointOnLine(name=name, between=(first, second), at=(x, 0.0, z), axis=ACROSS, compliance=0.0)
+            engine.PointOnLine(
+                name=name, between=(first, second), at=(x, 0.0, z), axis=ACROSS, compliance=0.0
+            )
         )
 
     for k in range(stages):
@@ -95,7 +71,7 @@ def scene(
     pin(f"down {stages - 1}", "platform", 0.0, top)
     part("slide", 1.0, width, top, 1.0, guided=True)  # between the platform and the right pin
     rows.append(
-        Prismatic(
+        engine.Prismatic(
             name="rail",
             between=("platform", "slide"),
             at=(width, 0.0, top),
@@ -104,22 +80,24 @@ def scene(
         )
     )
     pin(f"up {stages - 1}", "slide", width, top)
-    pin(WORLD, "up 0", 0.0, 0.0)
+    pin(engine.WORLD, "up 0", 0.0, 0.0)
     part("foot", 1.0, width, 0.0, 1.0, guided=True)
-    motor = Motor(speed=-SPEED) if driven else None
+    motor = engine.Motor(speed=-SPEED) if driven else None
     rows.append(
-        Prismatic(name="ground", between=(WORLD, "foot"), axis=(1.0, 0.0, 0.0), motor=motor, compliance=0.0)
+        engine.Prismatic(
+            name="ground", between=(engine.WORLD, "foot"), axis=(1.0, 0.0, 0.0), motor=motor, compliance=0.0
+        )
     )
     pin("foot", "down 0", width, 0.0)
     if not driven:
         rows.append(
-            Distance(
+            engine.Distance(
                 name="actuator",
                 between=((0.0, 0.0, 0.0), "foot"),
                 compliance=0.0,
             )
         )
-    return Scene(bodies=tuple(bodies), constraints=tuple(rows), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=tuple(bodies), constraints=tuple(rows), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def holding_force(stages: int, angle: float, load: float, arm: float) -> float:
@@ -130,17 +108,17 @@ def holding_force(stages: int, angle: float, load: float, arm: float) -> float:
 
 
 def force(
-    simulate: Simulate, stages: int, angle: float = ANGLE, load: float = LOAD, arm: float = ARM
+    simulate: case.Simulate, stages: int, angle: float = ANGLE, load: float = LOAD, arm: float = ARM
 ) -> float:
     """Tension of the actuator after ten steps at rest over the closed form, minus one."""
-    observe = {"pull": Final(quantity=ConstraintForce("actuator"))}
+    observe = {"pull": engine.Final(quantity=engine.ConstraintForce("actuator"))}
     result = simulate(scene(stages, angle, load, arm), time_step=TIME_STEP, steps=10, observe=observe)
     return float(result["pull"]) / holding_force(stages, angle, load, arm) - 1.0
 
 
-def hold(simulate: Simulate) -> dict[str, float]:
+def hold(simulate: case.Simulate) -> dict[str, float]:
     """Over stages, angles and loads."""
-    rest = {"x": MaximumAbsolute(quantity=Position("platform"), from_start=True)}
+    rest = {"x": engine.MaximumAbsolute(quantity=engine.Position("platform"), from_start=True)}
     still = simulate(scene(20), time_step=TIME_STEP, steps=60, observe=rest)
     return {
         "force_error": max(abs(force(simulate, n)) for n in STAGES),
@@ -151,11 +129,11 @@ def hold(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def lift(simulate: Simulate) -> dict[str, float]:
+def lift(simulate: case.Simulate) -> dict[str, float]:
     """Speed of the platform in the first step of the driven lift over n cot θ times that of the pin, minus one."""
 
     def off(stages: int, angle: float) -> float:
-        observe = {"v": Final(quantity=Velocity("platform"))}
+        observe = {"v": engine.Final(quantity=engine.Velocity("platform"))}
         asked = scene(stages, angle, driven=True)
         v = simulate(asked, time_step=TIME_STEP, steps=1, observe=observe)["v"]
         return abs(float(v[2]) / (SPEED * stages / math.tan(angle)) - 1.0)
@@ -172,7 +150,7 @@ def loaded(ratio: float) -> float:
     return (4.0 * FLOOR * ratio) ** 2
 
 
-def heaviest(simulate: Simulate) -> BreakPoint:
+def heaviest(simulate: case.Simulate) -> case.BreakPoint:
     """The heaviest load over an arm that twenty stages hold to a millionth."""
 
     def holds(ratio: float) -> bool:
@@ -184,21 +162,21 @@ def heaviest(simulate: Simulate) -> BreakPoint:
     return break_point(holds, 1e6, 1e11, resolution=0.05)
 
 
-def tallest(simulate: Simulate) -> BreakPoint:
+def tallest(simulate: case.Simulate) -> case.BreakPoint:
     """The most stages that hold the load to 1e-9."""
     return break_count(lambda stages: abs(force(simulate, stages)) < 1e-9, TALL)
 
 
-def height_after(simulate: Simulate, time_step: float, method: Method) -> float:
+def height_after(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Height of three stages driven for a second, less n √(l² − (w − u t)²) [m]."""
-    observe = {"z": Final(quantity=Position("platform"))}
+    observe = {"z": engine.Final(quantity=engine.Position("platform"))}
     result = simulate(
         scene(3, driven=True), time_step=time_step, duration=1.0, method=method, observe=observe
     )
     return float(result["z"][2]) - 3.0 * math.sqrt(BAR**2 - (BAR * math.cos(ANGLE) - SPEED) ** 2)
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Force of the actuator against the angle."""
     degrees = [5.0, 10.0, 15.0, 20.0, 30.0, 40.0, 50.0, 60.0, 70.0, 80.0]
     curves = []
@@ -210,7 +188,7 @@ def draw(simulate: Simulate) -> Drawing:
         found = [f * (1.0 + error) for f, error in zip(right, errors, strict=True)]
         curves.append(line(f"n = {stages}", degrees, found))
         curves.append(line(f"n (W + ½ W_arms) cot θ, n = {stages}", degrees, right, "reference"))
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="angle of the arms from the horizontal [°]",
         y_label="force of the actuator [N]",
@@ -223,7 +201,7 @@ ROUNDING = (
     "statics are exact in one step; forces grow like n² along the arms, 400 roundings of 2e-16 are 1e-13"
 )
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Scissor lift",
     question="What force holds a scissor lift, and how fast does it rise when its foot is driven?",
     why="Forces add up along the arms: twenty stages multiply the load by twenty over the tangent of a small angle, "
@@ -248,7 +226,7 @@ TEST = ScalarTest(
     "held by a compliance that it was not given.",
     source="ours; the lift is asked for in the thesis, section 5.4",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
@@ -269,7 +247,7 @@ TEST = ScalarTest(
                     loaded(RATIOS[-1]),
                     "the floor of pivots, 1e-12, over m/4M, squared by the refinement",
                 ),
-                Metric(
+                case.Metric(
                     name="sag",
                     description="largest movement of the platform on 20 stages in 60 steps",
                     unit="m",
@@ -283,7 +261,7 @@ TEST = ScalarTest(
             measure=hold,
             note="held at rest",
         ),
-        Measurement(
+        case.Measurement(
             configuration="driven",
             time_step=TIME_STEP,
             metrics=(
@@ -307,9 +285,9 @@ TEST = ScalarTest(
             note="the foot driven at 0.1 m/s",
         ),
     ),
-    example=lambda: Example(scene=scene(5, driven=True), time_step=TIME_STEP, duration=4.0),
+    example=lambda: case.Example(scene=scene(5, driven=True), time_step=TIME_STEP, duration=4.0),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="heaviest",
             title="Heaviest load, over an arm, that twenty stages hold to a millionth",
             configuration="plain",
@@ -320,7 +298,7 @@ TEST = ScalarTest(
             expected_source="the floor of pivots, 1e-12, over m/4M is 1e-3 there, 1e-6 by the refinement, and not before; it is 1, "
             "so that nothing is left of the load, a thousand times further. Rigid arms have no swing that could run away",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="tallest",
             title="Most stages that hold a load of 200 arms",
             configuration="plain",
@@ -331,18 +309,20 @@ TEST = ScalarTest(
             expected_source="rounding grows like n², 3600 of 2e-16 are 8e-13, and nothing else does; the search ends at 60",
         ),
     ),
-    figures=(Figure(name="force", title="Force of the actuator", draw=draw),),
+    figures=(case.Figure(name="force", title="Force of the actuator", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="height",
             description="height of three driven stages after 1 s against n √(l² − w²)",
             unit="m",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480)),
             configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=2.0, order_range=(1 / 480, 1 / 120)),
-                Configuration(
+                case.Configuration(
+                    name="plain", method=engine.PLAIN, expected_order=2.0, order_range=(1 / 480, 1 / 120)
+                ),
+                case.Configuration(
                     name="curved",
-                    method=Method(corrections=1),
+                    method=engine.Method(corrections=1),
                     expected_order=3.0,
                     order_range=(1 / 480, 1 / 120),
                 ),

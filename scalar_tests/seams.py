@@ -8,31 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from spook_tracker.engine import (
-    AngularVelocity,
-    Box,
-    Final,
-    HeightField,
-    Material,
-    Method,
-    Position,
-    RigidBody,
-    Scene,
-    Sphere,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line
@@ -50,49 +28,49 @@ LONGEST = 1.2  # s, where the search for the longest step ends: 11 cells further
 PLACE = (0.5, 0.4)  # m, of both at the start
 
 
-def floor(friction: float, slope: float) -> RigidBody:
+def floor(friction: float, slope: float) -> engine.RigidBody:
     """A plane of 512 triangles that falls towards +x."""
     rows = tuple(tuple(-slope * CELL * i for _ in range(CELLS + 1)) for i in range(CELLS + 1))
-    return RigidBody(
+    return engine.RigidBody(
         name="floor",
         motion="static",
-        shape=HeightField((CELL, CELL), rows),
+        shape=engine.HeightField((CELL, CELL), rows),
         position=(0, 0, 0),
-        material=Material(friction=friction),
+        material=engine.Material(friction=friction),
     )
 
 
 @functools.cache
-def sliding(friction: float) -> Scene:
+def sliding(friction: float) -> engine.Scene:
     """A box that slides over the level floor."""
-    box = RigidBody(
+    box = engine.RigidBody(
         name="body",
         mass=2.0,
-        shape=Box((0.3, 0.2, 0.1)),
+        shape=engine.Box((0.3, 0.2, 0.1)),
         position=(*PLACE, 0.05),
         velocity=(*SPEED, 0.0),
-        material=Material(friction=friction),
+        material=engine.Material(friction=friction),
     )
-    return Scene(bodies=(floor(friction, 0.0), box), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(floor(friction, 0.0), box), gravity=(0.0, 0.0, -GRAVITY))
 
 
 @functools.cache
-def rolling() -> Scene:
+def rolling() -> engine.Scene:
     """A ball let go on the slope."""
     c, s = math.cos(TILT), math.sin(TILT)
-    ball = RigidBody(
+    ball = engine.RigidBody(
         name="body",
         mass=2.0,
-        shape=Sphere(RADIUS),
+        shape=engine.Sphere(RADIUS),
         position=(PLACE[0] + RADIUS * s, PLACE[1], -SLOPE * PLACE[0] + RADIUS * c),
-        material=Material(friction=FRICTION),
+        material=engine.Material(friction=FRICTION),
     )
-    return Scene(bodies=(floor(FRICTION, SLOPE), ball), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(floor(FRICTION, SLOPE), ball), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def measure(simulate: Simulate) -> dict[str, float]:
+def measure(simulate: case.Simulate) -> dict[str, float]:
     """A second each: without friction, with it, and rolling."""
-    observe = {"v": Trace(quantity=Velocity("body"))}
+    observe = {"v": engine.Trace(quantity=engine.Velocity("body"))}
     smooth, rough, ball = (
         simulate(scene, time_step=TIME_STEP, steps=STEPS, observe=observe)["v"]
         for scene in (sliding(0.0), sliding(0.05), rolling())
@@ -108,57 +86,60 @@ def measure(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Where the ball is after a second, less ½ a t² [m]: of first order, as everywhere."""
-    observe = {"x": Final(quantity=Position("body"), from_start=True)}
+    observe = {"x": engine.Final(quantity=engine.Position("body"), from_start=True)}
     x = simulate(rolling(), time_step=time_step, duration=1.0, method=method, observe=observe)["x"]
     return math.hypot(float(x[0]), float(x[2])) - 2.5 / 7.0 * GRAVITY * math.sin(TILT)
 
 
-def rolls(simulate: Simulate, slope: float) -> bool:
+def rolls(simulate: case.Simulate, slope: float) -> bool:
     """Whether the ball rolls down triangles so steep (tan θ) without slip, for half a second."""
     tilt = math.atan(slope)
     place = (PLACE[0] + RADIUS * math.sin(tilt), PLACE[1], -slope * PLACE[0] + RADIUS * math.cos(tilt))
     ball = replace(rolling().bodies[1], position=place)
     built = replace(rolling(), bodies=(floor(FRICTION, slope), ball))
-    observe = {"v": Final(quantity=Velocity("body")), "w": Final(quantity=AngularVelocity("body"))}
+    observe = {
+        "v": engine.Final(quantity=engine.Velocity("body")),
+        "w": engine.Final(quantity=engine.AngularVelocity("body")),
+    }
     result = simulate(built, time_step=TIME_STEP, duration=0.5, observe=observe)
     speed = math.hypot(*map(float, result["v"]))
     return result.completed and abs(speed - RADIUS * float(result["w"][1])) < 1e-9 * speed
 
 
-def crosses(simulate: Simulate, time_step: float) -> bool:
+def crosses(simulate: case.Simulate, time_step: float) -> bool:
     """Whether the box keeps its velocity on the smooth floor in steps so long [s], as far as the floor reaches."""
-    observe = {"v": Final(quantity=Velocity("body"))}
+    observe = {"v": engine.Final(quantity=engine.Velocity("body"))}
     steps = math.floor(LONGEST / time_step)
     result = simulate(sliding(0.0), time_step=time_step, steps=steps, observe=observe)
     return result.completed and float(np.abs(result["v"] - (*SPEED, 0.0)).max()) < 1e-12 * math.hypot(*SPEED)
 
 
-def steepest(simulate: Simulate) -> BreakPoint:
+def steepest(simulate: case.Simulate) -> case.BreakPoint:
     """The steepest slope (its tangent) of triangles down which the ball rolls."""
     return break_point(functools.partial(rolls, simulate), 0.2, 3.0, resolution=1e-3, walk=5)
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step [s] in which the box feels no seam."""
     return break_point(functools.partial(crosses, simulate), TIME_STEP, LONGEST, walk=5)
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """The box's speed with and without friction."""
     times = [k * TIME_STEP for k in range(STEPS + 1)]
     curves = []
     for friction in (0.0, 0.05, 0.2):
-        observe = {"v": Trace(quantity=Velocity("body"))}
+        observe = {"v": engine.Trace(quantity=engine.Velocity("body"))}
         v = simulate(sliding(friction), time_step=TIME_STEP, steps=STEPS, observe=observe)["v"]
         curves.append(line(f"µ = {friction:g}", times, np.hypot(v[:, 0], v[:, 1]), "points"))
         speeds = [max(0.0, math.hypot(*SPEED) - friction * GRAVITY * t) for t in times]
         curves.append(line(f"v − µ g t, µ = {friction:g}", times, speeds, "reference"))
-    return Drawing(curves=tuple(curves), x_label="time [s]", y_label="speed of the box [m/s]")
+    return case.Drawing(curves=tuple(curves), x_label="time [s]", y_label="speed of the box [m/s]")
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Seams",
     question="Does what slides or rolls over a surface of triangles feel the seams between them?",
     why="Floors, roads and terrains are triangles. An engine that meets each triangle alone trips over sides that are "
@@ -208,10 +189,10 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=rolling(), time_step=TIME_STEP, duration=1.5),
-    figures=(Figure(name="speed", title="A box over seams", draw=draw),),
+    example=lambda: case.Example(scene=rolling(), time_step=TIME_STEP, duration=1.5),
+    figures=(case.Figure(name="speed", title="A box over seams", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="rolled",
             description="distance rolled in a second less ½ a t²",
             unit="m",
@@ -221,7 +202,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="steepest",
             title="Steepest slope of triangles down which the ball rolls",
             configuration="plain",
@@ -232,7 +213,7 @@ TEST = ScalarTest(
             expected_source="rolling takes 2/7 of m g sin θ from friction, at most µ m g cos θ: tan θ = 7/2 µ, as on a plane; to "
             "the resolution of the search",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest step in which the box feels no seam",
             configuration="plain",

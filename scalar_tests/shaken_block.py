@@ -9,31 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    Box,
-    Final,
-    Material,
-    Method,
-    Orientation,
-    Plane,
-    RigidBody,
-    Scene,
-    Sinusoid,
-    Table,
-    Trace,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.rocking_block import (
@@ -63,39 +41,41 @@ FALLS = 1.6  # s
 FINE = 1.0 / 500.0  # s, of the integration
 
 
-def scene(pace: Sinusoid | Table, strength: float, frequency: float, friction: float = 2.0) -> Scene:
+def scene(
+    pace: engine.Sinusoid | engine.Table, strength: float, frequency: float, friction: float = 2.0
+) -> engine.Scene:
     """The block upright at rest; the floor's speed is the pace times that of (strength × UPLIFT) sin(2π frequency t)."""
-    rough = Material(friction=friction)
-    floor = RigidBody(
+    rough = engine.Material(friction=friction)
+    floor = engine.RigidBody(
         name="floor",
         motion="kinematic",
-        shape=Plane(),
+        shape=engine.Plane(),
         position=(0, 0, 0),
         velocity=(strength * UPLIFT / (2.0 * math.pi * frequency), 0.0, 0.0),
         pace=pace,
         material=rough,
     )
-    block = RigidBody(
+    block = engine.RigidBody(
         name="block",
         mass=MASS,
-        shape=Box((2 * HALF_WIDTH, DEPTH, 2 * HALF_HEIGHT)),
+        shape=engine.Box((2 * HALF_WIDTH, DEPTH, 2 * HALF_HEIGHT)),
         position=(0.0, 0.0, HALF_HEIGHT),
         material=rough,
     )
-    return Scene(bodies=(floor, block), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(floor, block), gravity=(0.0, 0.0, -GRAVITY))
 
 
 @functools.cache
-def shaken() -> Scene:
+def shaken() -> engine.Scene:
     """On and on: the speed is 1 − cos of the acceleration's sine."""
-    pace = Sinusoid(amplitude=-1.0, frequency=FREQUENCY, phase=0.5 * math.pi, offset=1.0)
+    pace = engine.Sinusoid(amplitude=-1.0, frequency=FREQUENCY, phase=0.5 * math.pi, offset=1.0)
     return scene(pace, SHAKE, FREQUENCY)
 
 
-def struck(strength: float, friction: float = 2.0) -> Scene:
+def struck(strength: float, friction: float = 2.0) -> engine.Scene:
     """By one half sine; then the floor goes on steadily."""
     times = [0.5 / PULSE * k / KNOTS for k in range(KNOTS + 1)]
-    pace = Table(tuple(times), tuple(1.0 - math.cos(2.0 * math.pi * PULSE * t) for t in times))
+    pace = engine.Table(tuple(times), tuple(1.0 - math.cos(2.0 * math.pi * PULSE * t) for t in times))
     return scene(pace, strength, PULSE, friction)
 
 
@@ -154,9 +134,9 @@ def rocking(kept: float = KEPT, late: float = 0.0, delay: float = 0.0) -> Rockin
     return Rocking(before, turned, blow, speed, after, returned)
 
 
-def leans(simulate: Simulate, time_step: float, method: Method = PLAIN) -> Any:
+def leans(simulate: case.Simulate, time_step: float, method: engine.Method = engine.PLAIN) -> Any:
     """The lean at every step [rad]."""
-    observe = {"q": Trace(quantity=Orientation("block"))}
+    observe = {"q": engine.Trace(quantity=engine.Orientation("block"))}
     q = simulate(shaken(), time_step=time_step, duration=whole(time_step), method=method, observe=observe)[
         "q"
     ]
@@ -181,7 +161,7 @@ def swings(lean: Any, time_step: float) -> tuple[float, float]:
     return largest(-lean[:blow]), largest(lean[blow:])
 
 
-def measure(simulate: Simulate) -> dict[str, float]:
+def measure(simulate: case.Simulate) -> dict[str, float]:
     """A swing, a blow and a swing."""
     lean, right = leans(simulate, TIME_STEP), rocking()
     before, after = swings(lean, TIME_STEP)
@@ -213,7 +193,7 @@ def after_limit(time_step: float) -> float:
     return abs(less.after / right - 1.0) + abs(later.after / right - 1.0) + before_limit(time_step)
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Relative error of the largest lean after the blow."""
     return swings(leans(simulate, time_step, method), time_step)[1] / rocking().after - 1.0
 
@@ -221,33 +201,33 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
 LEAST = 1.91538  # times UPLIFT: the least half sine that throws the block over, by integration in the test
 
 
-def stands(simulate: Simulate, strength: float) -> bool:
+def stands(simulate: case.Simulate, strength: float) -> bool:
     """Whether the block has not passed the lean at which it stands on its edge."""
-    observe = {"q": Final(quantity=Orientation("block"))}
+    observe = {"q": engine.Final(quantity=engine.Orientation("block"))}
     result = simulate(
         struck(strength), time_step=COARSE, duration=round(FALLS / COARSE) * COARSE, observe=observe
     )
     return result.completed and abs(2.0 * math.atan2(result["q"][2], result["q"][0])) < SLENDER
 
 
-def strongest(simulate: Simulate) -> BreakPoint:
+def strongest(simulate: case.Simulate) -> case.BreakPoint:
     """The strongest half sine that leaves the block standing."""
     return break_point(functools.partial(stands, simulate), 0.6, 4.0, resolution=1e-3)
 
 
-def lifts(simulate: Simulate, friction: float) -> bool:
+def lifts(simulate: case.Simulate, friction: float) -> bool:
     """Whether a floor of that friction lifts an edge, rather than draw itself away below the block."""
-    observe = {"q": Final(quantity=Orientation("block"))}
+    observe = {"q": engine.Final(quantity=engine.Orientation("block"))}
     result = simulate(struck(1.2, friction), time_step=COARSE, steps=15, observe=observe)
     return result.completed and abs(float(result["q"][2])) > 1e-6
 
 
-def smoothest(simulate: Simulate) -> BreakPoint:
+def smoothest(simulate: case.Simulate) -> case.BreakPoint:
     """The least friction of a floor that makes the block rock."""
     return break_point(functools.partial(lifts, simulate), 2.0, 0.02, resolution=1e-3, walk=6)
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """The lean over time at three steps."""
     curves, after = [], []
     right = rocking()
@@ -263,7 +243,7 @@ def draw(simulate: Simulate) -> Drawing:
         (math.degrees(right.before), 0.0, math.degrees(right.after)),
     )
     curves.append(line("by integration", times, places, "points"))
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="time [s]",
         y_label="lean [°]",
@@ -274,7 +254,7 @@ def draw(simulate: Simulate) -> Drawing:
 
 STEPS = tuple(rocking().blow / (n + 0.5) for n in (64, 128, 256, 512, 1024))
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Shaken block",
     question="Does a block on a shaken floor rock as Housner's equations say, and fall over when it must?",
     why="Columns, shelves and reactors stand or fall in earthquakes by rocking. The floor moves as it is told, whatever "
@@ -333,10 +313,10 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=shaken(), time_step=1.0 / 240.0, duration=4.0),
-    figures=(Figure(name="lean", title="A block on a shaken floor", draw=draw),),
+    example=lambda: case.Example(scene=shaken(), time_step=1.0 / 240.0, duration=4.0),
+    figures=(case.Figure(name="lean", title="A block on a shaken floor", draw=draw),),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="overturning",
             title="Strongest half sine of the floor that leaves the block standing",
             configuration="plain",
@@ -347,7 +327,7 @@ TEST = ScalarTest(
             expected_source="1.915 times the acceleration that lifts an edge, by integration of Housner's equation; steps of "
             "1/60 s give 0.02 % more, the search ends within 0.1 %",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="smoothest",
             title="Least friction with which the floor makes the block rock",
             configuration="plain",
@@ -360,7 +340,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="lean",
             description="relative error of the largest lean after the blow, which falls on the middle of a step",
             unit="1",

@@ -9,32 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import (
-    WORLD,
-    Final,
-    Fluid,
-    Hinge,
-    JointCoordinate,
-    Method,
-    RigidBody,
-    Scene,
-    Sphere,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.floating_box import period
 from spook_tracker.scalar_tests.sweep import line, told
@@ -57,37 +34,41 @@ RISE = TERMINAL / PULL  # s: v = v_t tanh(t/RISE)
 SWING_RATE = math.sqrt(PULL * ROD / (ROD**2 + 0.4 * RADIUS**2))  # rad/s
 
 
-def sinking(speed: float = 0.0) -> Scene:
+def sinking(speed: float = 0.0) -> engine.Scene:
     """A stone under water, moving down with `speed` [m/s]."""
-    stone = RigidBody(
+    stone = engine.RigidBody(
         name="stone",
         mass=MASS,
-        shape=Sphere(RADIUS),
+        shape=engine.Sphere(RADIUS),
         position=(0.0, 0.0, 0.0),
         velocity=(0.0, 0.0, -speed),
     )
-    water = Fluid(name="water", density=WATER, drag_coefficient=DRAG)
-    return Scene(bodies=(stone,), forces=(water,), gravity=(0.0, 0.0, -GRAVITY))
+    water = engine.Fluid(name="water", density=WATER, drag_coefficient=DRAG)
+    return engine.Scene(bodies=(stone,), forces=(water,), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def swinging() -> Scene:
+def swinging() -> engine.Scene:
     """The stone on a light rod, out by 1 mrad, in water without drag."""
-    stone = RigidBody(
+    stone = engine.RigidBody(
         name="stone",
         mass=MASS,
-        shape=Sphere(RADIUS),
+        shape=engine.Sphere(RADIUS),
         position=(ROD * math.sin(SWING), 0.0, -ROD * math.cos(SWING)),
     )
-    pivot = Hinge(
-        name="pivot", between=(WORLD, "stone"), at=(0.0, 0.0, 0.0), axis=(0.0, -1.0, 0.0), compliance=0.0
+    pivot = engine.Hinge(
+        name="pivot",
+        between=(engine.WORLD, "stone"),
+        at=(0.0, 0.0, 0.0),
+        axis=(0.0, -1.0, 0.0),
+        compliance=0.0,
     )
-    water = Fluid(name="water", density=WATER)
-    return Scene(bodies=(stone,), constraints=(pivot,), forces=(water,), gravity=(0.0, 0.0, -GRAVITY))
+    water = engine.Fluid(name="water", density=WATER)
+    return engine.Scene(bodies=(stone,), constraints=(pivot,), forces=(water,), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def sink(simulate: Simulate) -> dict[str, float]:
+def sink(simulate: case.Simulate) -> dict[str, float]:
     """Speeds at every step."""
-    observe = {"v": Trace(quantity=Velocity("stone"))}
+    observe = {"v": engine.Trace(quantity=engine.Velocity("stone"))}
     result = simulate(sinking(), time_step=TIME_STEP, duration=DURATION, observe=observe)
     down = -result["v"][:, 2]
     v, discrete = 0.0, [0.0]
@@ -101,41 +82,41 @@ def sink(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def swing(simulate: Simulate) -> dict[str, float]:
+def swing(simulate: case.Simulate) -> dict[str, float]:
     """The period under water."""
-    observe = {"angle": Trace(quantity=JointCoordinate("pivot"))}
+    observe = {"angle": engine.Trace(quantity=engine.JointCoordinate("pivot"))}
     result = simulate(swinging(), time_step=TIME_STEP, duration=60.0, observe=observe)
     angle = result["angle"] + SWING
     return {"swing_error": period(result.sample_times["angle"], angle) * SWING_RATE / (2.0 * math.pi) - 1.0}
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Speed at half a second against v_t tanh(t/τ) [m/s]."""
-    observe = {"v": Final(quantity=Velocity("stone"))}
+    observe = {"v": engine.Final(quantity=engine.Velocity("stone"))}
     result = simulate(sinking(), time_step=time_step, duration=0.5, method=method, observe=observe)
     return -float(result["v"][2]) - TERMINAL * math.tanh(0.5 / RISE)
 
 
-def stable(simulate: Simulate, time_step: float) -> bool:
+def stable(simulate: case.Simulate, time_step: float) -> bool:
     """Whether a stone at its terminal speed, off by 1 %, comes nearer to it in 40 steps."""
-    observe = {"v": Final(quantity=Velocity("stone"))}
+    observe = {"v": engine.Final(quantity=engine.Velocity("stone"))}
     result = simulate(sinking(1.01 * TERMINAL), time_step=time_step, steps=40, observe=observe)
     if not result.completed:
         return False
     return abs(-float(result["v"][2]) / TERMINAL - 1.0) < 0.01
 
 
-def largest_step(simulate: Simulate) -> BreakPoint:
+def largest_step(simulate: case.Simulate) -> case.BreakPoint:
     """Where that ends, walking from a quarter of τ to four times τ."""
     return break_point(lambda time_step: stable(simulate, time_step), 0.25 * RISE, 4.0 * RISE)
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Speed against time, from rest and from too fast."""
     curves, ends = [], []
     apart = 0.0
     for start in (0.0, 2.0 * TERMINAL):
-        observe = {"v": Trace(quantity=Velocity("stone"))}
+        observe = {"v": engine.Trace(quantity=engine.Velocity("stone"))}
         result = simulate(sinking(start), time_step=TIME_STEP, duration=2.0, observe=observe)
         time, down = result.sample_times["v"], -result["v"][:, 2]
         curves.append(line(f"from {told(start, 3)} m/s", time, down))
@@ -144,7 +125,7 @@ def draw(simulate: Simulate) -> Drawing:
             exact: Any = TERMINAL * np.tanh(time / RISE)
             curves.append(line("v_t tanh(t/τ)", time, exact, "reference"))
             apart = float(np.abs(down - exact).max())
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="time [s]",
         y_label="speed downwards [m/s]",
@@ -153,20 +134,20 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
-def sinks(simulate: Simulate, density: float) -> bool:
+def sinks(simulate: case.Simulate, density: float) -> bool:
     """Whether a sphere of that density [kg/m³] goes down."""
     stone = replace(sinking().bodies[0], mass=density * VOLUME)
-    observe = {"v": Final(quantity=Velocity("stone"))}
+    observe = {"v": engine.Final(quantity=engine.Velocity("stone"))}
     result = simulate(replace(sinking(), bodies=(stone,)), time_step=TIME_STEP, steps=10, observe=observe)
     return result.completed and float(result["v"][2]) < 0.0
 
 
-def lightest(simulate: Simulate) -> BreakPoint:
+def lightest(simulate: case.Simulate) -> case.BreakPoint:
     """The lightest sphere [kg/m³] that sinks."""
     return break_point(functools.partial(sinks, simulate), STONE, 0.1 * WATER, resolution=1e-4, walk=6)
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Sinking sphere",
     question="Does a stone sink at its terminal speed, and swing under water as its lost weight says?",
     why="Drag and buoyancy decide how fast things fall through a fluid. The terminal speed is exact for every time "
@@ -189,11 +170,11 @@ TEST = ScalarTest(
     "the power of the speed is wrong.",
     source="ours; buoyancy is asked for in the thesis, section 5.4",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="terminal_error",
                     description="speed after 10 s over √(2 (m − ρ V) g/(ρ C_d A)), minus one",
                     unit="1",
@@ -204,7 +185,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-14,
                 ),
-                Metric(
+                case.Metric(
                     name="speed_error",
                     description="largest difference to the recursion of one step in 10 s",
                     unit="m/s",
@@ -214,7 +195,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-14,
                 ),
-                Metric(
+                case.Metric(
                     name="sideways",
                     description="largest speed across",
                     unit="m/s",
@@ -228,11 +209,11 @@ TEST = ScalarTest(
             measure=sink,
             note="sinking with quadratic drag",
         ),
-        Measurement(
+        case.Measurement(
             configuration="pendulum",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="swing_error",
                     description="period of the pendulum under water over its closed form, minus one",
                     unit="1",
@@ -247,9 +228,9 @@ TEST = ScalarTest(
             note="no drag, 60 s of a small swing",
         ),
     ),
-    example=lambda: Example(scene=sinking(), time_step=TIME_STEP, duration=2.0),
+    example=lambda: case.Example(scene=sinking(), time_step=TIME_STEP, duration=2.0),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="time-step",
             title="Largest time step of a stone that sinks",
             configuration="plain",
@@ -259,7 +240,7 @@ TEST = ScalarTest(
             expected=(0.98 * RISE, 1.02 * RISE),
             expected_source="the slope of the map of one step at v_t is 1 − 2 h/τ: stable for h < τ = 0.491 s",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="lightest",
             title="Lightest sphere that sinks",
             configuration="plain",
@@ -271,9 +252,9 @@ TEST = ScalarTest(
             expected_source="Archimedes: one as dense as the water stays; to the resolution of the search",
         ),
     ),
-    figures=(Figure(name="speed", title="Speed against time", draw=draw),),
+    figures=(case.Figure(name="speed", title="Speed against time", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="speed",
             description="speed after 0.5 s against v_t tanh(t/τ)",
             unit="m/s",

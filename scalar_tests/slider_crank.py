@@ -8,32 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    WORLD,
-    Ball,
-    ConstraintForce,
-    Hinge,
-    Method,
-    Motor,
-    Position,
-    Prismatic,
-    RigidBody,
-    Scene,
-    SimulationFailed,
-    Trace,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
@@ -76,17 +53,17 @@ def torque(theta: Any, mass: float = SLIDER) -> Any:
 
 
 @functools.cache
-def scene(time_step: float, speed: float = SPEED, crank: float = CRANK, mass: float = SLIDER) -> Scene:
+def scene(time_step: float, speed: float = SPEED, crank: float = CRANK, mass: float = SLIDER) -> engine.Scene:
     """Crank, rod and a slider of a mass [kg] in the xy plane, moving as the motor wants."""
     x, lean, _ = (float(value) for value in pin(START, crank))
     rates = [speed * float(slope(lambda t, i=i: pin(t, crank)[i], START)) for i in (0, 1)]
     c, s = crank * math.cos(START), crank * math.sin(START)
     joint: dict[str, Any] = {"compliance": 0.0, "damping": RELAXATION * time_step}
     bodies = (
-        RigidBody(
+        engine.RigidBody(
             name="crank", mass=1.0, inertia=(TURNING,) * 3, position=(0, 0, 0), angular_velocity=(0, 0, speed)
         ),
-        RigidBody(
+        engine.RigidBody(
             name="rod",
             mass=ROD_MASS,
             inertia=(1e-4, ROD_MASS * ROD**2 / 12.0, ROD_MASS * ROD**2 / 12.0),
@@ -95,31 +72,34 @@ def scene(time_step: float, speed: float = SPEED, crank: float = CRANK, mass: fl
             velocity=(0.5 * (rates[0] - speed * s), 0.5 * speed * c, 0.0),
             angular_velocity=(0.0, 0.0, -rates[1]),
         ),
-        RigidBody(
+        engine.RigidBody(
             name="slider", mass=mass, inertia=(0.01,) * 3, position=(x, 0, 0), velocity=(rates[0], 0, 0)
         ),
     )
     joints = (
-        Hinge(
+        engine.Hinge(
             name="drive",
-            between=(WORLD, "crank"),
+            between=(engine.WORLD, "crank"),
             at=(0, 0, 0),
             axis=(0, 0, 1),
-            motor=Motor(speed=speed),
+            motor=engine.Motor(speed=speed),
             **joint,
         ),
-        Hinge(name="pin", between=("crank", "rod"), at=(c, s, 0.0), axis=(0, 0, 1), **joint),
-        Ball(name="wrist", between=("rod", "slider"), at=(x, 0.0, 0.0), **joint),
-        Prismatic(name="guide", between=(WORLD, "slider"), axis=(1, 0, 0), **joint),
+        engine.Hinge(name="pin", between=("crank", "rod"), at=(c, s, 0.0), axis=(0, 0, 1), **joint),
+        engine.Ball(name="wrist", between=("rod", "slider"), at=(x, 0.0, 0.0), **joint),
+        engine.Prismatic(name="guide", between=(engine.WORLD, "slider"), axis=(1, 0, 0), **joint),
     )
-    return Scene(bodies=bodies, constraints=joints, gravity=(0, 0, 0), contacts=False)
+    return engine.Scene(bodies=bodies, constraints=joints, gravity=(0, 0, 0), contacts=False)
 
 
 def errors(
-    simulate: Simulate, time_step: float, method: Method = PLAIN, mass: float = SLIDER
+    simulate: case.Simulate, time_step: float, method: engine.Method = engine.PLAIN, mass: float = SLIDER
 ) -> tuple[float, float]:
     """Largest errors of the slider's place [m] and of the motor's torque [N m] in a turn, after half a second."""
-    observe = {"x": Trace(quantity=Position("slider")), "f": Trace(quantity=ConstraintForce("drive"))}
+    observe = {
+        "x": engine.Trace(quantity=engine.Position("slider")),
+        "f": engine.Trace(quantity=engine.ConstraintForce("drive")),
+    }
     asked = scene(time_step, mass=mass)
     result = simulate(asked, time_step=time_step, duration=DURATION, method=method, observe=observe)
     first = round(SETTLED / time_step)
@@ -130,7 +110,7 @@ def errors(
     return float(np.abs(place[first:]).max()), float(np.abs(carried[first:]).max())
 
 
-def measure(simulate: Simulate) -> dict[str, float]:
+def measure(simulate: case.Simulate) -> dict[str, float]:
     """One turn."""
     place, carried = errors(simulate, TIME_STEP)
     return {"place_error": place, "torque_error": carried / float(np.abs(torque(TURN)).max())}
@@ -186,10 +166,10 @@ def torque_limit(time_step: float, mass: float = SLIDER) -> float:
 FASTEST = 179.8795  # rad/s, h ω = 0.749: by the planar step of the test
 TURNS_RUN, OFF, NARROWEST = 3, 0.01 * ROD, 2.52098e-3  # turns, m, and 1 − r/l of the fold, by the same step
 # kg: the crank's inertia is 1e-12 of what the slider's comes to at the crank, the floor of pivots
-HEAVIEST = TURNING / PLAIN.floor / float(np.abs(slope(lambda t: pin(t)[0], TURN)).max()) ** 2
+HEAVIEST = TURNING / engine.PLAIN.floor / float(np.abs(slope(lambda t: pin(t)[0], TURN)).max()) ** 2
 
 
-def fastest(simulate: Simulate) -> BreakPoint:
+def fastest(simulate: case.Simulate) -> case.BreakPoint:
     """The fastest crank that runs."""
 
     def runs(speed: float) -> bool:
@@ -198,9 +178,9 @@ def fastest(simulate: Simulate) -> BreakPoint:
     return break_point(runs, 0.3 * FASTEST, 2.0 * FASTEST, resolution=2e-3)
 
 
-def narrowest(simulate: Simulate) -> BreakPoint:
+def narrowest(simulate: case.Simulate) -> case.BreakPoint:
     """The least that a rod may be longer than its crank, over the rod."""
-    observe = {"x": Trace(quantity=Position("slider"))}
+    observe = {"x": engine.Trace(quantity=engine.Position("slider"))}
     turn = TIME_STEP * SPEED  # of a step
     steps = round(TURNS_RUN * math.tau / turn)
 
@@ -213,13 +193,13 @@ def narrowest(simulate: Simulate) -> BreakPoint:
     return break_point(folds, 0.1, 1e-4, resolution=0.01)
 
 
-def heaviest(simulate: Simulate) -> BreakPoint:
+def heaviest(simulate: case.Simulate) -> case.BreakPoint:
     """The heaviest slider that the motor moves and feels as it must."""
 
     def carries(mass: float) -> bool:
         try:
             place, carried = errors(simulate, TIME_STEP, mass=mass)
-        except SimulationFailed:
+        except engine.SimulationFailed:
             return False
         most = torque_limit(TIME_STEP, mass) * float(np.abs(torque(TURN, mass)).max())
         return place < place_limit(TIME_STEP) and carried < most
@@ -227,19 +207,19 @@ def heaviest(simulate: Simulate) -> BreakPoint:
     return break_point(carries, SLIDER, 1e4 * HEAVIEST, resolution=0.05)
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest error of the slider's place in a turn [m]."""
     return errors(simulate, time_step, method)[0]
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """The motor's torque over a turn."""
-    observe = {"f": Trace(quantity=ConstraintForce("drive"))}
+    observe = {"f": engine.Trace(quantity=engine.ConstraintForce("drive"))}
     result = simulate(scene(TIME_STEP), time_step=TIME_STEP, duration=DURATION, observe=observe)
     first = round(SETTLED / TIME_STEP)
     times = TIME_STEP * (np.arange(len(result["f"])) - 0.5)
     angles = np.degrees(SPEED * times) + math.degrees(START)
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulation", angles[first::4], result["f"][first::4, 5], "points"),
             line("dE/dθ", angles[first:], torque(np.radians(angles[first:])), "reference"),
@@ -249,7 +229,7 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Slider-crank",
     question="Does a slider-crank move as its geometry says, and does its motor carry what inverse dynamics asks?",
     why="Engines, pumps and presses are slider-cranks. A loop of joints closes over a turning and a sliding body, with a "
@@ -302,10 +282,10 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=scene(1.0 / 60.0), time_step=1.0 / 60.0, duration=4.0),
-    figures=(Figure(name="torque", title="Torque of the motor over a turn", draw=draw),),
+    example=lambda: case.Example(scene=scene(1.0 / 60.0), time_step=1.0 / 60.0, duration=4.0),
+    figures=(case.Figure(name="torque", title="Torque of the motor over a turn", draw=draw),),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="fastest",
             title="Fastest crank that runs at 1/240 s",
             configuration="plain",
@@ -316,7 +296,7 @@ TEST = ScalarTest(
             expected_source="five rows of the step in the plane for five speeds, run by themselves: h ω = 0.749; beyond it the rod "
             "lags until h w of its own reaches 1",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="narrowest-fold",
             title="Least that the rod may be longer than the crank, over the rod, for the slider to come through right",
             configuration="plain",
@@ -327,7 +307,7 @@ TEST = ScalarTest(
             expected=(0.999 * NARROWEST, 1.011 * NARROWEST),
             expected_source="the step in the plane, run by itself; the search ends 1 % short of it at most",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="heaviest-slider",
             title="Heaviest slider that the motor moves and feels as it must",
             configuration="plain",
@@ -340,7 +320,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="place",
             description="largest error of the slider's place in a turn",
             unit="m",

@@ -7,33 +7,9 @@ import random
 
 import numpy as np
 
-from spook_tracker.engine import (
-    Box,
-    ConstraintForce,
-    ContactForce,
-    Energy,
-    Final,
-    Material,
-    Method,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-    Sphere,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.door.scene import least_norm_forces
 from spook_tracker.scalar_tests.door.scene import scene as hung
@@ -53,24 +29,26 @@ SEARCHED = 1e-3
 FLOORS = (1e-16, 1e-14, 1e-10, 1e-8)  # from 1e-6 on the hinges share the door as they like
 THRESHOLDS = (0.3, 0.1, 0.03, 0.01)  # m/s, below what ten sweeps leave by themselves, 0.17, but for the first
 STACKED, LYING = 5, 3.0  # boxes, s
-SLEEPY = Method(sleep_speed=0.02)
+SLEEPY = engine.Method(sleep_speed=0.02)
 AFTER = SLEEPY.sleep_after  # s
 RADIUS = 0.1  # m, of the ball
 SLOPE = math.radians(30.0)
 PULL = GRAVITY * math.sin(SLOPE)  # m/s², along it
 FINE = TIME_STEP / 4.0  # s, on the slope
-ROUGH = Material(friction=0.5)
-FLOOR = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=ROUGH)
+ROUGH = engine.Material(friction=0.5)
+FLOOR = engine.RigidBody(
+    name="floor", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=ROUGH
+)
 
 
-def heap(count: int = HEAPED, side: int = 2) -> Scene:
+def heap(count: int = HEAPED, side: int = 2) -> engine.Scene:
     """Boxes dropped in square layers, a little aside."""
     draw = random.Random(5)
     boxes = tuple(
-        RigidBody(
+        engine.RigidBody(
             name=f"box {k}",
             mass=1.0 + k % 3,
-            shape=Box((EDGE, EDGE, EDGE)),
+            shape=engine.Box((EDGE, EDGE, EDGE)),
             position=(
                 0.55 * (k % side) + draw.uniform(-0.02, 0.02),
                 0.55 * (k // side % side) + draw.uniform(-0.02, 0.02),
@@ -80,74 +58,93 @@ def heap(count: int = HEAPED, side: int = 2) -> Scene:
         )
         for k in range(count)
     )
-    return Scene(bodies=(FLOOR, *boxes), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(FLOOR, *boxes), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def _reported(simulate: Simulate) -> dict[str, float]:
+def _reported(simulate: case.Simulate) -> dict[str, float]:
     """Thresholds that ten sweeps and those they call for reach: runs that left more, or are not called completed."""
     wrong = 0
     for threshold in THRESHOLDS:
-        method = Method(solver="iterative", iterations=10, unsettled_residual=threshold)
+        method = engine.Method(solver="iterative", iterations=10, unsettled_residual=threshold)
         result = simulate(heap(), time_step=TIME_STEP, duration=FALLING, method=method)
         wrong += result.residual > threshold or not result.completed
     return {"misreported": float(wrong)}
 
 
-def _swung(simulate: Simulate, cap: float) -> np.ndarray:
-    method = Method(corrections=2, correction_cap=cap)
-    observe = {"x": Trace(quantity=Position()), "energy": Trace(quantity=Energy())}
+def _swung(simulate: case.Simulate, cap: float) -> np.ndarray:
+    method = engine.Method(corrections=2, correction_cap=cap)
+    observe = {
+        "x": engine.Trace(quantity=engine.Position()),
+        "energy": engine.Trace(quantity=engine.Energy()),
+    }
     result = simulate(pendulum(TIME_STEP), time_step=TIME_STEP, duration=5.0, method=method, observe=observe)
     return np.hstack((result["x"].reshape(len(result["energy"]), -1), result["energy"][:, None]))
 
 
-def _capped(simulate: Simulate) -> dict[str, float]:
-    usual = _swung(simulate, Method().correction_cap)
+def _capped(simulate: case.Simulate) -> dict[str, float]:
+    usual = _swung(simulate, engine.Method().correction_cap)
     return {"bits_of_the_cap": float(sum((_swung(simulate, cap) != usual).sum() for cap in CAPS))}
 
 
-def _floored(simulate: Simulate) -> dict[str, float]:
+def _floored(simulate: case.Simulate) -> dict[str, float]:
     """How five hinges of compliance 0, which repeat each other, share a door as the pivots' floor is raised."""
     door, right = hung(5, damping=2.0 * TIME_STEP, compliance=0.0), least_norm_forces(5)
-    observe = {name: Final(quantity=ConstraintForce(name)) for name in (f"hinge {k + 1}" for k in range(5))}
+    observe = {
+        name: engine.Final(quantity=engine.ConstraintForce(name))
+        for name in (f"hinge {k + 1}" for k in range(5))
+    }
     worst = 0.0
     for floor in FLOORS:
         result = simulate(
-            door, time_step=TIME_STEP, duration=1.0, method=Method(floor=floor), observe=observe
+            door, time_step=TIME_STEP, duration=1.0, method=engine.Method(floor=floor), observe=observe
         )
         held = np.stack([result[name] for name in observe])
         worst = max(worst, float(np.abs(held - right).max() / np.abs(right).max()))
     return {"split_of_floors": worst}
 
 
-def stack() -> Scene:
+def stack() -> engine.Scene:
     """Boxes of 1 kg one on the other, at rest."""
     boxes = tuple(
-        RigidBody(
-            name=f"box {k}", mass=1.0, shape=Box((1.0,) * 3), position=(0.0, 0.0, 0.5 + k), material=ROUGH
+        engine.RigidBody(
+            name=f"box {k}",
+            mass=1.0,
+            shape=engine.Box((1.0,) * 3),
+            position=(0.0, 0.0, 0.5 + k),
+            material=ROUGH,
         )
         for k in range(STACKED)
     )
-    return Scene(bodies=(FLOOR, *boxes), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(FLOOR, *boxes), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def thrown(speed: float, slope: float = 0.5 * math.pi) -> Scene:
+def thrown(speed: float, slope: float = 0.5 * math.pi) -> engine.Scene:
     """A ball on its way straight up, or up a smooth slope [rad]; x is up the slope."""
-    ball = RigidBody(
-        name="ball", mass=1.0, shape=Sphere(RADIUS), position=(0.0, 0.0, RADIUS), velocity=(speed, 0.0, 0.0)
+    ball = engine.RigidBody(
+        name="ball",
+        mass=1.0,
+        shape=engine.Sphere(RADIUS),
+        position=(0.0, 0.0, RADIUS),
+        velocity=(speed, 0.0, 0.0),
     )
-    ground = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
-    return Scene(bodies=(ground, ball), gravity=(-GRAVITY * math.sin(slope), 0.0, -GRAVITY * math.cos(slope)))
+    ground = engine.RigidBody(name="floor", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0))
+    return engine.Scene(
+        bodies=(ground, ball), gravity=(-GRAVITY * math.sin(slope), 0.0, -GRAVITY * math.cos(slope))
+    )
 
 
-def _asleep(simulate: Simulate) -> dict[str, float]:
+def _asleep(simulate: case.Simulate) -> dict[str, float]:
     """What lies keeps its place and its weight, and what flies is left alone."""
-    observe = {"x": Trace(quantity=Position()), "load": Final(quantity=ContactForce("floor"))}
+    observe = {
+        "x": engine.Trace(quantity=engine.Position()),
+        "load": engine.Final(quantity=engine.ContactForce("floor")),
+    }
     result = simulate(stack(), time_step=TIME_STEP, duration=LYING, method=SLEEPY, observe=observe)
     late = result["x"][result.sample_times["x"] > AFTER + 2.0 * TIME_STEP]
-    flight = {"x": Trace(quantity=Position("ball"))}
+    flight = {"x": engine.Trace(quantity=engine.Position("ball"))}
     flown, free = (
         simulate(thrown(4.0), time_step=TIME_STEP, duration=1.0, method=method, observe=flight)["x"]
-        for method in (Method(sleep_speed=3.0), Method())
+        for method in (engine.Method(sleep_speed=3.0), engine.Method())
     )
     return {
         "awake": STACKED - float(result.counters.get("asleep", 0)),
@@ -157,42 +154,42 @@ def _asleep(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def comes_down(simulate: Simulate, slow: float) -> bool:
+def comes_down(simulate: case.Simulate, slow: float) -> bool:
     """Whether a ball thrown up the slope at twice the speed at which bodies sleep [m/s] comes down again."""
     result = simulate(
         thrown(2.0 * slow, SLOPE),
         time_step=FINE,
         duration=2.0 * slow / PULL + AFTER,
-        method=Method(sleep_speed=slow),
-        observe={"v": Final(quantity=Velocity("ball"))},
+        method=engine.Method(sleep_speed=slow),
+        observe={"v": engine.Final(quantity=engine.Velocity("ball"))},
     )
     return bool(result["v"][0] < 0.0)
 
 
-def laziest(simulate: Simulate) -> BreakPoint:
+def laziest(simulate: case.Simulate) -> case.BreakPoint:
     """The largest sleep speed [m/s] with which a ball is not put to sleep where it turns back on a smooth slope."""
     return break_point(lambda slow: comes_down(simulate, slow), 0.1, 20.0, resolution=1e-3, walk=9)
 
 
-def tightest(simulate: Simulate) -> BreakPoint:
+def tightest(simulate: case.Simulate) -> case.BreakPoint:
     """The smallest cap of a correction that leaves the pendulum alone, to the bit."""
-    usual = _swung(simulate, Method().correction_cap)
+    usual = _swung(simulate, engine.Method().correction_cap)
     return break_point(
         lambda cap: bool((_swung(simulate, cap) == usual).all()), 1.0, 1e-5, resolution=SEARCHED, walk=6
     )
 
 
-def told(simulate: Simulate, threshold: float) -> bool:
+def told(simulate: case.Simulate, threshold: float) -> bool:
     """Whether a run of few boxes is called unsettled if it has left more than its threshold [m/s], and only then."""
-    method = Method(solver="iterative", iterations=10, unsettled_residual=threshold)
+    method = engine.Method(solver="iterative", iterations=10, unsettled_residual=threshold)
     result = simulate(heap(FEW), time_step=TIME_STEP, duration=FALLING, method=method)
     return result.completed == (result.residual <= threshold)
 
 
-def _draw(simulate: Simulate) -> Drawing:
-    usual = _swung(simulate, Method().correction_cap)
+def _draw(simulate: case.Simulate) -> case.Drawing:
+    usual = _swung(simulate, engine.Method().correction_cap)
     moved = [float(np.abs(_swung(simulate, cap) - usual).max()) for cap in DRAWN]
-    return Drawing(
+    return case.Drawing(
         curves=(line("largest move of the bob or change of its energy", DRAWN, moved, "both"),),
         x_label="correction_cap",
         y_label="difference from the default's [m, J]",
@@ -200,8 +197,8 @@ def _draw(simulate: Simulate) -> Drawing:
     )
 
 
-def _none(name: str, description: str, unit: str, source: str) -> Metric:
-    return Metric(
+def _none(name: str, description: str, unit: str, source: str) -> case.Metric:
+    return case.Metric(
         name=name,
         description=description,
         unit=unit,
@@ -212,7 +209,7 @@ def _none(name: str, description: str, unit: str, source: str) -> Metric:
     )
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Options of the solver",
     question="Do options that shall only save work, or only report, leave the answer alone?",
     why="Sleeping and guards are set once and trusted. One that changes an answer a little is never suspected.",
@@ -311,10 +308,12 @@ TEST = ScalarTest(
             "floors",
         ),
     ),
-    example=lambda: Example(scene=heap(), time_step=TIME_STEP),
-    figures=(Figure(name="cap", title="From g h² on, 0.0027, a cap leaves the pendulum alone", draw=_draw),),
+    example=lambda: case.Example(scene=heap(), time_step=TIME_STEP),
+    figures=(
+        case.Figure(name="cap", title="From g h² on, 0.0027, a cap leaves the pendulum alone", draw=_draw),
+    ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="tightest",
             title="Smallest cap of a correction that leaves the pendulum alone",
             configuration="caps",
@@ -326,7 +325,7 @@ TEST = ScalarTest(
             expected_source="(v h)²/(2 l) with v² = 2 g l at the bottom, more or less by what is left of its next order, g h²/l of it; "
             "the search ends 0.1 % above it at most",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="laziest",
             title="Largest sleep speed with which a ball is not put to sleep where it turns back on a slope",
             configuration="sleeping",

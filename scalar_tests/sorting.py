@@ -8,31 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import (
-    Box,
-    Final,
-    Material,
-    Method,
-    Plane,
-    Position,
-    Result,
-    RigidBody,
-    Scene,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
@@ -55,53 +33,53 @@ SHARES = (0.8, 0.9, 0.97, 1.03, 1.1, 1.2)  # of it
 TABLE_STEP, TABLE_STEPS = 1.0 / 240.0, 120  # s; half a second
 
 
-def box(name: str, friction: float, place: complex, velocity: complex, spin: float = 0.0) -> RigidBody:
+def box(name: str, friction: float, place: complex, velocity: complex, spin: float = 0.0) -> engine.RigidBody:
     """A box that has this µ on a surface of friction 1."""
-    return RigidBody(
+    return engine.RigidBody(
         name=name,
         mass=MASS,
-        shape=Box(EDGE),
+        shape=engine.Box(EDGE),
         position=(place.real, place.imag, 0.5 * EDGE[2]),
         velocity=(velocity.real, velocity.imag, 0.0),
         angular_velocity=(0.0, 0.0, spin),
         orientation=(math.cos(0.5 * cmath.phase(place)), 0.0, 0.0, math.sin(0.5 * cmath.phase(place)))
         if spin
         else (1.0, 0.0, 0.0, 0.0),
-        material=Material(friction=friction**2),
+        material=engine.Material(friction=friction**2),
     )
 
 
-def belt(times: float = 1.0) -> Scene:
+def belt(times: float = 1.0) -> engine.Scene:
     """Boxes of different friction come in askew onto a belt, one behind the other, `times` as fast as seen from it."""
-    surface = RigidBody(
+    surface = engine.RigidBody(
         name="belt",
         motion="static",
-        shape=Plane(),
+        shape=engine.Plane(),
         position=(0.0, 0.0, 0.0),
-        material=Material(friction=1.0),
+        material=engine.Material(friction=1.0),
         surface_velocity=(BELT, 0.0, 0.0),
     )
     boxes = [
         box(f"box {k}", friction, complex(APART * k), BELT + times * SLIP) for k, friction in enumerate(SORTS)
     ]
-    return Scene(bodies=(surface, *boxes), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(surface, *boxes), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def table(shares: tuple[float, ...] = SHARES) -> Scene:
+def table(shares: tuple[float, ...] = SHARES) -> engine.Scene:
     """Boxes that ride a turntable on one circle, of so much times the friction that keeps them there."""
-    surface = RigidBody(
+    surface = engine.RigidBody(
         name="table",
         motion="kinematic",
-        shape=Plane(),
+        shape=engine.Plane(),
         position=(0.0, 0.0, 0.0),
         angular_velocity=(0.0, 0.0, RATE),
-        material=Material(friction=1.0),
+        material=engine.Material(friction=1.0),
     )
     boxes = []
     for k, share in enumerate(shares):
         place = cmath.rect(RADIUS, 2.0 * math.pi * k / len(shares))
         boxes.append(box(f"box {k}", share * LEAST, place, 1j * RATE * place, RATE))
-    return Scene(bodies=(surface, *boxes), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(surface, *boxes), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def lane(friction: float) -> complex:
@@ -123,16 +101,16 @@ def ride(start: complex, velocity: complex, friction: float, rate: float, h: flo
     return np.array(places)
 
 
-def off_the_way(result: Result, k: int, times: float = 1.0) -> tuple[Any, Any]:
+def off_the_way(result: engine.Result, k: int, times: float = 1.0) -> tuple[Any, Any]:
     """The way of a box as seen from the belt, and that by the method's own steps [m]."""
     way = result[f"x{k}"][:, 0] - APART * k - BELT * result.sample_times[f"x{k}"] + 1j * result[f"x{k}"][:, 1]
     return way, ride(0.0, times * SLIP, SORTS[k], 0.0, TIME_STEP, len(way) - 1)
 
 
-def on_the_belt(simulate: Simulate) -> dict[str, float]:
+def on_the_belt(simulate: case.Simulate) -> dict[str, float]:
     """Ways in the belt's frame, until all boxes rest in it."""
-    observe = {f"x{k}": Trace(quantity=Position(f"box {k}")) for k in range(len(SORTS))}
-    observe |= {f"v{k}": Trace(quantity=Velocity(f"box {k}")) for k in range(len(SORTS))}
+    observe = {f"x{k}": engine.Trace(quantity=engine.Position(f"box {k}")) for k in range(len(SORTS))}
+    observe |= {f"v{k}": engine.Trace(quantity=engine.Velocity(f"box {k}")) for k in range(len(SORTS))}
     result = simulate(belt(), time_step=TIME_STEP, duration=DURATION, observe=observe)
     place, straight, late, carried = 0.0, 0.0, 0.0, 0.0
     for k, friction in enumerate(SORTS):
@@ -151,9 +129,9 @@ def grown(time_step: float) -> float:
     return math.exp(0.25 / time_step * math.log1p((RATE * time_step) ** 2)) - 1.0
 
 
-def on_the_table(simulate: Simulate) -> dict[str, float]:
+def on_the_table(simulate: case.Simulate) -> dict[str, float]:
     """Half a second: which still ride, and where all are."""
-    observe = {f"x{k}": Trace(quantity=Position(f"box {k}")) for k in range(len(SHARES))}
+    observe = {f"x{k}": engine.Trace(quantity=engine.Position(f"box {k}")) for k in range(len(SHARES))}
     result = simulate(table(), time_step=TABLE_STEP, steps=TABLE_STEPS, observe=observe)
     place, kept = 0.0, 0
     for k, share in enumerate(SHARES):
@@ -165,17 +143,17 @@ def on_the_table(simulate: Simulate) -> dict[str, float]:
     return {"table_place_error": place, "kept": float(kept)}
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """How far the lane of the smoothest box is from its closed form [m]."""
-    observe = {"x": Final(quantity=Position("box 0"))}
+    observe = {"x": engine.Final(quantity=engine.Position("box 0"))}
     result = simulate(belt(), time_step=time_step, duration=DURATION, method=method, observe=observe)
     return float(result["x"][1]) - lane(SORTS[0]).imag
 
 
-def stays(simulate: Simulate, friction: float) -> bool:
+def stays(simulate: case.Simulate, friction: float) -> bool:
     """Whether a box of this µ rides the table for a quarter of a second."""
     steps = TABLE_STEPS // 2
-    observe = {"x": Final(quantity=Position("box 0"))}
+    observe = {"x": engine.Final(quantity=engine.Position("box 0"))}
     result = simulate(table((friction / LEAST,)), time_step=TABLE_STEP, steps=steps, observe=observe)
     if not result.completed:
         return False
@@ -183,22 +161,22 @@ def stays(simulate: Simulate, friction: float) -> bool:
     return abs(place - RADIUS * (1.0 + 1j * RATE * TABLE_STEP) ** steps) < 1e-6
 
 
-def smoothest(simulate: Simulate) -> BreakPoint:
+def smoothest(simulate: case.Simulate) -> case.BreakPoint:
     """The least µ that keeps a box, walking from three times the least to a third of it."""
     return break_point(lambda mu: stays(simulate, mu), 3.0 * LEAST, LEAST / 3.0, resolution=1e-3)
 
 
-def sorted_at(simulate: Simulate, times: float) -> bool:
+def sorted_at(simulate: case.Simulate, times: float) -> bool:
     """Whether boxes so many times as fast keep their ways for a second, to 1e-9 of them."""
-    observe = {f"x{k}": Trace(quantity=Position(f"box {k}")) for k in range(len(SORTS))}
+    observe = {f"x{k}": engine.Trace(quantity=engine.Position(f"box {k}")) for k in range(len(SORTS))}
     result = simulate(belt(times), time_step=TIME_STEP, steps=60, observe=observe)
     ways = [off_the_way(result, k, times) for k in range(len(SORTS))]
     return result.completed and all(np.abs(a - b).max() < 1e-9 * np.abs(b).max() for a, b in ways)
 
 
-def draw_belt(simulate: Simulate) -> Drawing:
+def draw_belt(simulate: case.Simulate) -> case.Drawing:
     """Ways in the belt's frame."""
-    observe = {f"x{k}": Trace(quantity=Position(f"box {k}")) for k in range(len(SORTS))}
+    observe = {f"x{k}": engine.Trace(quantity=engine.Position(f"box {k}")) for k in range(len(SORTS))}
     result = simulate(belt(), time_step=TIME_STEP, duration=DURATION, observe=observe)
     curves = []
     for k, friction in enumerate(SORTS):
@@ -209,7 +187,7 @@ def draw_belt(simulate: Simulate) -> Drawing:
         line("closed form: where they rest", [e.real for e in ends], [e.imag for e in ends], "limit")
     )
     widest, narrowest = result["x0"][-1, 1], result[f"x{len(SORTS) - 1}"][-1, 1]
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="along the belt, seen from it [m]",
         y_label="across the belt [m]",
@@ -217,9 +195,9 @@ def draw_belt(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_table(simulate: Simulate) -> Drawing:
+def draw_table(simulate: case.Simulate) -> case.Drawing:
     """Distances from the axis against time."""
-    observe = {f"x{k}": Trace(quantity=Position(f"box {k}")) for k in range(len(SHARES))}
+    observe = {f"x{k}": engine.Trace(quantity=engine.Position(f"box {k}")) for k in range(len(SHARES))}
     result = simulate(table(), time_step=TABLE_STEP, steps=2 * TABLE_STEPS, observe=observe)
     curves = [
         line(
@@ -229,7 +207,7 @@ def draw_table(simulate: Simulate) -> Drawing:
         )
         for k, share in enumerate(SHARES)
     ]
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="time [s]",
         y_label="distance from the axis [m]",
@@ -240,7 +218,7 @@ def draw_table(simulate: Simulate) -> Drawing:
 
 ROUNDED = "constant friction is exact in a step; the solver stops at 1e-10 of the load"
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Sorting",
     question="Do a belt and a turntable sort bodies by their friction, as Coulomb's law says?",
     why="Belts and tables that sort work by slip alone: a body's lane tells its friction, if slip is against the surface's "
@@ -300,7 +278,7 @@ TEST = ScalarTest(
         ask(
             on_the_table,
             (
-                Metric(
+                case.Metric(
                     name="kept",
                     description="boxes of six that still ride: those of 1.03, 1.1 and 1.2 times the least friction",
                     unit="1",
@@ -325,9 +303,9 @@ TEST = ScalarTest(
             "table",
         ),
     ),
-    example=lambda: Example(scene=belt(), time_step=TIME_STEP, duration=DURATION),
+    example=lambda: case.Example(scene=belt(), time_step=TIME_STEP, duration=DURATION),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="friction",
             title="Least friction that keeps a box on the turntable",
             configuration="table",
@@ -350,11 +328,11 @@ TEST = ScalarTest(
         ),
     ),
     figures=(
-        Figure(name="lanes", title="Ways seen from the belt", draw=draw_belt),
-        Figure(name="table", title="Distance from the axis of the turntable", draw=draw_table),
+        case.Figure(name="lanes", title="Ways seen from the belt", draw=draw_belt),
+        case.Figure(name="table", title="Distance from the axis of the turntable", draw=draw_table),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="lane",
             description="lane of the smoothest box, against |s| s/(2 µ g)",
             unit="m",

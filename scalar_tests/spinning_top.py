@@ -8,41 +8,15 @@ from typing import Any, Literal
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    WORLD,
-    Ball,
-    Energy,
-    MaximumAbsolute,
-    Method,
-    Position,
-    Result,
-    RigidBody,
-    Scene,
-    Trace,
-    Violation,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, cell, is_stable, table
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityMap,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.sweep import line, told
 
-HALF_STEP_CURVED = Method(half_step_velocities=True, corrections=2)
-ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")
-ORDER_8 = Method(composition="order8")
+HALF_STEP_CURVED = engine.Method(half_step_velocities=True, corrections=2)
+ORDER_4, ORDER_6 = engine.Method(composition="order4"), engine.Method(composition="order6")
+ORDER_8 = engine.Method(composition="order8")
 MASS = 1.0  # kg
 ARM = 0.5  # m, from the tip to the centre of mass
 ACROSS, ALONG = 0.3, 0.5  # kg m², about the centre of mass
@@ -59,9 +33,9 @@ MAP_SPINS = tuple(float(s) for s in np.geomspace(2.0, 400.0, 9))  # rad/s
 MAP_STEPS = tuple(float(h) for h in np.geomspace(1.0 / 480.0, 1.0 / 15.0, 6))  # s
 ORDERS: tuple[Literal["order4", "order6", "order8"], ...] = ("order4", "order6", "order8")
 OBSERVE: dict[str, Observable] = {
-    "place": Trace(quantity=Position("top")),
-    "energy": MaximumAbsolute(quantity=Energy(), from_start=True),
-    "violation": MaximumAbsolute(quantity=Violation("tip")),
+    "place": engine.Trace(quantity=engine.Position("top")),
+    "energy": engine.MaximumAbsolute(quantity=engine.Energy(), from_start=True),
+    "violation": engine.MaximumAbsolute(quantity=engine.Violation("tip")),
 }
 
 
@@ -72,12 +46,12 @@ def _around(value: float) -> tuple[float, float]:
     return (value * (1.0 - 1e-6), value * (1.0 + 1e-6))
 
 
-def scene(damping: float = TIME_STEP) -> Scene:
+def scene(damping: float = TIME_STEP) -> engine.Scene:
     """The top on its tip at the origin, started in steady precession; damping of the joint in s."""
     axis = np.array([math.sin(LEAN), 0.0, math.cos(LEAN)])
     turn = (SPIN - PRECESSION * math.cos(LEAN)) * axis + np.array([0.0, 0.0, PRECESSION])
     x, y, z = np.cross(turn, ARM * axis).tolist()
-    top = RigidBody(
+    top = engine.RigidBody(
         name="top",
         mass=MASS,
         inertia=(ACROSS, ACROSS, ALONG),
@@ -86,8 +60,10 @@ def scene(damping: float = TIME_STEP) -> Scene:
         velocity=(x, y, z),
         angular_velocity=(turn[0], turn[1], turn[2]),
     )
-    tip = Ball(name="tip", between=(WORLD, "top"), at=(0.0, 0.0, 0.0), compliance=1e-12, damping=damping)
-    return Scene(bodies=(top,), constraints=(tip,), gravity=(0.0, 0.0, -GRAVITY))
+    tip = engine.Ball(
+        name="tip", between=(engine.WORLD, "top"), at=(0.0, 0.0, 0.0), compliance=1e-12, damping=damping
+    )
+    return engine.Scene(bodies=(top,), constraints=(tip,), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def lean_and_round(places: Any) -> tuple[Any, Any]:
@@ -96,7 +72,7 @@ def lean_and_round(places: Any) -> tuple[Any, Any]:
     return lean, np.unwrap(np.arctan2(places[:, 1], places[:, 0]))
 
 
-def steady(simulate: Simulate) -> dict[str, float]:
+def steady(simulate: case.Simulate) -> dict[str, float]:
     """Rate, lean, energy and joint over 20 s."""
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=OBSERVE)
     lean, turned = lean_and_round(result["place"])
@@ -109,7 +85,7 @@ def steady(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def _off_the_circle(result: Result) -> float:
+def _off_the_circle(result: engine.Result) -> float:
     """Largest distance [m] of the centre of mass from where steady precession has it."""
     time, radius, height = result.sample_times["place"], ARM * math.sin(LEAN), ARM * math.cos(LEAN)
     exact = np.column_stack(
@@ -118,18 +94,18 @@ def _off_the_circle(result: Result) -> float:
     return float(np.linalg.norm(result["place"] - exact, axis=1).max())
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest distance of the centre of mass from its circle in 20 s [m]."""
-    place = {"place": Trace(quantity=Position("top"))}
+    place = {"place": engine.Trace(quantity=engine.Position("top"))}
     built = scene(time_step / method.substeps)
     return _off_the_circle(
         simulate(built, time_step=time_step, duration=DURATION, method=method, observe=place)
     )
 
 
-def sleeping_scene(spin: float) -> Scene:
+def sleeping_scene(spin: float) -> engine.Scene:
     """The same top upright, spinning at `spin` [rad/s] and nudged by NUDGE [rad/s] across."""
-    top = RigidBody(
+    top = engine.RigidBody(
         name="top",
         mass=MASS,
         inertia=(ACROSS, ACROSS, ALONG),
@@ -137,8 +113,8 @@ def sleeping_scene(spin: float) -> Scene:
         velocity=(NUDGE * ARM, 0.0, 0.0),
         angular_velocity=(0.0, NUDGE, spin),
     )
-    tip = Ball(name="tip", between=(WORLD, "top"), at=(0.0, 0.0, 0.0), compliance=0.0)
-    return Scene(bodies=(top,), constraints=(tip,), gravity=(0.0, 0.0, -GRAVITY))
+    tip = engine.Ball(name="tip", between=(engine.WORLD, "top"), at=(0.0, 0.0, 0.0), compliance=0.0)
+    return engine.Scene(bodies=(top,), constraints=(tip,), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def falling_rate(spin: float) -> float:
@@ -147,31 +123,31 @@ def falling_rate(spin: float) -> float:
     return math.sqrt(max(0.0, MASS * GRAVITY * ARM / upright - (0.5 * ALONG * spin / upright) ** 2))
 
 
-def _sleeps(simulate: Simulate, spin: float, time_step: float, method: Method) -> str:
+def _sleeps(simulate: case.Simulate, spin: float, time_step: float, method: engine.Method) -> str:
     """Asleep while the lean stays within a thousand nudges; their own nutation has one over its rate."""
-    place = {"place": Trace(quantity=Position("top"))}
+    place = {"place": engine.Trace(quantity=engine.Position("top"))}
     built, steps = sleeping_scene(spin), round(SLEEP / time_step)
     result = simulate(built, time_step=time_step, steps=steps, method=method, observe=place)
     lean = np.hypot(result.partial["place"][:, 0], result.partial["place"][:, 1]) / ARM
     return cell(result, lean / (1e3 * NUDGE), bound=1.0)
 
 
-def slowest(simulate: Simulate) -> BreakPoint:
+def slowest(simulate: case.Simulate) -> case.BreakPoint:
     """Slowest spin [rad/s] at which the upright top sleeps, order 4."""
     return break_point(
         lambda spin: is_stable(_sleeps(simulate, spin, TIME_STEP, ORDER_4)), 20.0, 2.0, resolution=1e-3
     )
 
 
-def _growth(spin: float, time_step: float, method: Method) -> float:
-    if method is PLAIN and time_step * spin > 1.0:
+def _growth(spin: float, time_step: float, method: engine.Method) -> float:
+    if method is engine.PLAIN and time_step * spin > 1.0:
         return math.inf
     return math.exp(time_step * falling_rate(spin))
 
 
-def _sleeping_map(method: Method) -> Callable[[Simulate], StabilityMap]:
-    def study(simulate: Simulate) -> StabilityMap:
-        return StabilityMap(
+def _sleeping_map(method: engine.Method) -> Callable[[case.Simulate], case.StabilityMap]:
+    def study(simulate: case.Simulate) -> case.StabilityMap:
+        return case.StabilityMap(
             x=MAP_SPINS,
             y=MAP_STEPS,
             cells=table(MAP_STEPS, MAP_SPINS, lambda s, h: _sleeps(simulate, s, h, method)),
@@ -185,14 +161,14 @@ def _sleeping_map(method: Method) -> Callable[[Simulate], StabilityMap]:
     return study
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Path of the centre of mass from above."""
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=OBSERVE)
     places = result["place"][::4]
     around = np.linspace(0.0, 2.0 * math.pi, 90)
     radius = ARM * math.sin(LEAN)
     off = float(np.abs(np.hypot(places[:, 0], places[:, 1]) - radius).max())
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulation", places[:, 0], places[:, 1]),
             line("steady precession", radius * np.cos(around), radius * np.sin(around), "reference"),
@@ -207,7 +183,7 @@ ASLEEP = "20 s upright, nudged by 1e-7 rad/s, without a lean above 1e-4 rad, or 
 # s: turns are exact, so that only the axis' nutation is left; at 1/40 order 8 is off by 3e-14 m, rounding of the steps
 COARSE = tuple(1.0 / n for n in (20, 24, 30))
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Spinning top",
     question="Does a leaning top precess steadily, at the rate that gravity and spin give it?",
     why="A top stands only by its gyroscopic torque. An engine that leaves it out, or steps it badly, lets it fall or "
@@ -232,11 +208,11 @@ TEST = ScalarTest(
     "explicit, or the joint takes momentum away.",
     source="ours; conservation of angular momentum is asked for in the thesis, section 5.4",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="path_error",
                     description="largest distance of the centre of mass from its circle in 20 s",
                     unit="m",
@@ -248,7 +224,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     relative_tolerance=1e-6,
                 ),
-                Metric(
+                case.Metric(
                     name="rate_error",
                     description="mean rate of precession over 1 rad/s, minus one",
                     unit="1",
@@ -262,7 +238,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     relative_tolerance=1e-5,
                 ),
-                Metric(
+                case.Metric(
                     name="nutation",
                     description="largest deviation of the lean from 30°",
                     unit="rad",
@@ -274,7 +250,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     relative_tolerance=1e-6,
                 ),
-                Metric(
+                case.Metric(
                     name="energy_deviation",
                     description="largest |E − E₀| over m g l",
                     unit="1",
@@ -286,7 +262,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     relative_tolerance=1e-6,
                 ),
-                Metric(
+                case.Metric(
                     name="joint_violation",
                     description="largest violation of the ball joint",
                     unit="m",
@@ -303,43 +279,49 @@ TEST = ScalarTest(
             note="Plain SPOOK.",
         ),
     ),
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP, observe=OBSERVE),
-    figures=(Figure(name="path", title="Path of the centre of mass", draw=draw),),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP, observe=OBSERVE),
+    figures=(case.Figure(name="path", title="Path of the centre of mass", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="path",
             description="largest distance of the centre of mass from its circle in 20 s",
             unit="m",
             time_steps=tuple(1.0 / n for n in (30, 40, 48, 60, 120, 240, 480)),
             configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=1.0),
-                Configuration(name="two substeps", method=Method(substeps=2), expected_order=1.0),
-                Configuration(name="half-step, curved twice", method=HALF_STEP_CURVED, expected_order=2.0),
-                Configuration(
+                case.Configuration(name="plain", method=engine.PLAIN, expected_order=1.0),
+                case.Configuration(name="two substeps", method=engine.Method(substeps=2), expected_order=1.0),
+                case.Configuration(
+                    name="half-step, curved twice", method=HALF_STEP_CURVED, expected_order=2.0
+                ),
+                case.Configuration(
                     name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1 / 240, 1 / 40)
                 ),
-                Configuration(
+                case.Configuration(
                     name="order 6", method=ORDER_6, expected_order=6.0, order_range=(1 / 120, 1 / 40)
                 ),
-                Configuration(name="order 8", method=ORDER_8, expected_order=8.0, time_steps=COARSE),
-                Configuration(name="half step", method=Method(half_step_velocities=True), expected_order=2.0),
-                Configuration(
-                    name="curved", method=Method(half_step_velocities=True, corrections=1), expected_order=2.0
+                case.Configuration(name="order 8", method=ORDER_8, expected_order=8.0, time_steps=COARSE),
+                case.Configuration(
+                    name="half step", method=engine.Method(half_step_velocities=True), expected_order=2.0
+                ),
+                case.Configuration(
+                    name="curved",
+                    method=engine.Method(half_step_velocities=True, corrections=1),
+                    expected_order=2.0,
                 ),
             ),
             error=ladder_error,
             target_error=1e-3,
             target_seconds=0.1,
         ),
-        Ladder(
+        case.Ladder(
             name="high-order",
             description="largest distance of the centre of mass from its circle in 20 s",
             unit="m",
             time_steps=tuple(1.0 / n for n in (32, 48, 64, 80)),
             configurations=tuple(
-                Configuration(
+                case.Configuration(
                     name=order,
-                    method=Method(composition=order),
+                    method=engine.Method(composition=order),
                     expected_order=float(order[-1]),
                     order_range=None if order == "order8" else (1 / 80, 1 / 48),
                     time_steps=COARSE if order == "order8" else (),
@@ -352,7 +334,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="slowest-spin",
             title="Slowest spin of the upright top, order 4",
             configuration="order 4",
@@ -364,14 +346,14 @@ TEST = ScalarTest(
             expected_source="C s = 2 √(m g l (A + m l²)), less the 0.05 % below it at which sinh doubles from 13 s to 20 s, and the "
             "resolution of 0.1 %",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="map-spin-plain",
             title="Spin and time step of the upright top, plain SPOOK",
             configuration="plain",
             definition=ASLEEP,
-            study=_sleeping_map(PLAIN),
+            study=_sleeping_map(engine.PLAIN),
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="map-spin-order-4",
             title="Spin and time step of the upright top, order 4",
             configuration="order 4",

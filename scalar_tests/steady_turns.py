@@ -8,35 +8,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    WORLD,
-    Final,
-    Hinge,
-    JointCoordinate,
-    Material,
-    Method,
-    Motor,
-    Orientation,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-    Sphere,
-    Trace,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.sweep import line, told
 
@@ -52,46 +26,50 @@ RIGHT, FASTEST = 1e-4, 1e9  # rad, and where the search ends, rad/s: 2.7 million
 NUDGE, GROWN = 1e-6, 10.0  # rad/s, and how many times as far off its momentum an axis is no longer steady
 
 
-def driven(rate: float = RATE) -> Scene:
+def driven(rate: float = RATE) -> engine.Scene:
     """A wheel whose motor holds a rate [rad/s] from the start."""
-    wheel = RigidBody(
+    wheel = engine.RigidBody(
         name="wheel",
         mass=1.0,
         inertia=MOMENTS,
         position=(0.0, 0.0, 0.0),
         angular_velocity=(0.0, 0.0, rate),
     )
-    axle = Hinge(name="axle", between=(WORLD, "wheel"), axis=Z, motor=Motor(speed=rate))
-    return Scene(bodies=(wheel,), constraints=(axle,))
+    axle = engine.Hinge(name="axle", between=(engine.WORLD, "wheel"), axis=Z, motor=engine.Motor(speed=rate))
+    return engine.Scene(bodies=(wheel,), constraints=(axle,))
 
 
-def free(rate: float = RATE) -> Scene:
+def free(rate: float = RATE) -> engine.Scene:
     """A body of three moments that spins about its axis of largest inertia, touched by nothing."""
-    body = RigidBody(
+    body = engine.RigidBody(
         name="body", mass=1.0, inertia=MOMENTS, position=(0.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, rate)
     )
-    return Scene(bodies=(body,))
+    return engine.Scene(bodies=(body,))
 
 
-def rolling() -> Scene:
+def rolling() -> engine.Scene:
     """A ball that rolls on a rough floor from the start."""
-    rough = Material(friction=0.5)
-    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
-    ball = RigidBody(
+    rough = engine.Material(friction=0.5)
+    floor = engine.RigidBody(
+        name="floor", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=rough
+    )
+    ball = engine.RigidBody(
         name="ball",
         mass=1.0,
-        shape=Sphere(RADIUS),
+        shape=engine.Sphere(RADIUS),
         position=(0.0, 0.0, RADIUS),
         velocity=(SPEED, 0.0, 0.0),
         angular_velocity=(0.0, SPEED / RADIUS, 0.0),
         material=rough,
     )
-    return Scene(bodies=(floor, ball), gravity=(0.0, 0.0, -9.81))
+    return engine.Scene(bodies=(floor, ball), gravity=(0.0, 0.0, -9.81))
 
 
-def motor_error(simulate: Simulate, time_step: float = TIME_STEP, method: Method = PLAIN) -> float:
+def motor_error(
+    simulate: case.Simulate, time_step: float = TIME_STEP, method: engine.Method = engine.PLAIN
+) -> float:
     """Angle of the axle after DURATION less rate times time [rad]."""
-    observe = {"angle": Final(quantity=JointCoordinate("axle"))}
+    observe = {"angle": engine.Final(quantity=engine.JointCoordinate("axle"))}
     result = simulate(driven(), time_step=time_step, duration=DURATION, method=method, observe=observe)
     return float(result["angle"]) - RATE * DURATION
 
@@ -101,9 +79,9 @@ def turned(orientation: np.ndarray, axis: int) -> np.ndarray:
     return np.unwrap(2.0 * np.arctan2(orientation[:, 1 + axis], orientation[:, 0]))
 
 
-def free_error(simulate: Simulate, rate: float) -> float:
+def free_error(simulate: case.Simulate, rate: float) -> float:
     """Angle in DURATION less rate times time, whole turns aside [rad]."""
-    observe = {"q": Final(quantity=Orientation("body"))}
+    observe = {"q": engine.Final(quantity=engine.Orientation("body"))}
     q = simulate(free(rate), time_step=TIME_STEP, duration=DURATION, observe=observe)["q"]
     half = 0.5 * rate * DURATION
     return float(
@@ -114,9 +92,12 @@ def free_error(simulate: Simulate, rate: float) -> float:
     )
 
 
-def measure(simulate: Simulate) -> dict[str, float]:
+def measure(simulate: case.Simulate) -> dict[str, float]:
     """All four."""
-    observe = {"q": Trace(quantity=Orientation("ball")), "x": Final(quantity=Position("ball"))}
+    observe = {
+        "q": engine.Trace(quantity=engine.Orientation("ball")),
+        "x": engine.Final(quantity=engine.Position("ball")),
+    }
     rolled = simulate(rolling(), time_step=TIME_STEP, duration=DURATION, observe=observe)
     return {
         "motor_error": motor_error(simulate),
@@ -141,16 +122,16 @@ def tenfold() -> float:
     return low
 
 
-def steady(simulate: Simulate, moment: float) -> bool:
+def steady(simulate: case.Simulate, moment: float) -> bool:
     """Whether a body of that third moment [kg m²], nudged about its second axis, keeps its third one by its momentum."""
-    nudged = RigidBody(
+    nudged = engine.RigidBody(
         name="body",
         mass=1.0,
         inertia=(*MOMENTS[:2], moment),
         position=(0.0, 0.0, 0.0),
         angular_velocity=(0.0, NUDGE, RATE),
     )
-    observe = {"q": Trace(quantity=Orientation("body"))}
+    observe = {"q": engine.Trace(quantity=engine.Orientation("body"))}
     result = simulate(
         replace(free(), bodies=(nudged,)), time_step=TIME_STEP, duration=DURATION, observe=observe
     )
@@ -160,23 +141,26 @@ def steady(simulate: Simulate, moment: float) -> bool:
     return result.completed and float(off.max()) < GROWN * start
 
 
-def smallest_moment(simulate: Simulate) -> BreakPoint:
+def smallest_moment(simulate: case.Simulate) -> case.BreakPoint:
     """The smallest moment [kg m²] of an axis about which a body spins on."""
     return break_point(functools.partial(steady, simulate), MOMENTS[2], 0.12, resolution=2e-4, walk=5)
 
 
-def fastest(simulate: Simulate) -> BreakPoint:
+def fastest(simulate: case.Simulate) -> case.BreakPoint:
     """The fastest spin [rad/s] whose angle is right."""
     return break_point(lambda rate: abs(free_error(simulate, rate)) < RIGHT, RATE, FASTEST, walk=9)
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Angle of the ball against the way it rolled."""
-    observe = {"q": Trace(quantity=Orientation("ball")), "x": Trace(quantity=Position("ball"))}
+    observe = {
+        "q": engine.Trace(quantity=engine.Orientation("ball")),
+        "x": engine.Trace(quantity=engine.Position("ball")),
+    }
     result = simulate(rolling(), time_step=TIME_STEP, duration=DURATION, observe=observe)
     way, angle = result["x"][::6, 0], turned(result["q"], 1)[::6]
     off = float(np.abs(angle * RADIUS - way).max())
-    return Drawing(
+    return case.Drawing(
         curves=(line("ball", way, angle, "points"), line("way over radius", way, way / RADIUS, "reference")),
         x_label="way [m]",
         y_label="angle [rad]",
@@ -186,7 +170,7 @@ def draw(simulate: Simulate) -> Drawing:
 
 EXACT = "a steady spin turns by h ω a step: rounding of the angle, and of its sum, remains"
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Steady turns",
     question="Does what spins steadily turn by its rate times the time?",
     why="A step that turns by tan or asin of h ω has the right rate and the wrong angle: motors overrun, gears slip a tooth, "
@@ -225,17 +209,19 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=rolling(), time_step=TIME_STEP, duration=DURATION),
-    figures=(Figure(name="rolling", title="Angle against way", draw=draw),),
+    example=lambda: case.Example(scene=rolling(), time_step=TIME_STEP, duration=DURATION),
+    figures=(case.Figure(name="rolling", title="Angle against way", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="motor",
             description="angle of the motor's axle after 3 s against ω t",
             unit="rad",
             time_steps=tuple(1.0 / n for n in STEPS),
             configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=None),  # no step errs
-                Configuration(name="iterative", method=Method(solver="iterative"), expected_order=None),
+                case.Configuration(name="plain", method=engine.PLAIN, expected_order=None),  # no step errs
+                case.Configuration(
+                    name="iterative", method=engine.Method(solver="iterative"), expected_order=None
+                ),
             ),
             error=motor_error,
             target_error=1e-3,
@@ -243,7 +229,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="smallest-moment",
             title="Smallest third moment about which a free body spins on",
             configuration="plain",
@@ -255,7 +241,7 @@ TEST = ScalarTest(
             expected_source="Euler: steady unless the axis is that of the middle moment, below 0.15 kg m²; there a nudge grows by "
             "cosh(√((B − C)(C − A)/(A B)) ω t), tenfold at 0.1493 kg m²",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="fastest",
             title="Fastest spin of a free body whose angle is right at h = 1/60 s",
             configuration="plain",

@@ -5,32 +5,9 @@ from __future__ import annotations
 import functools
 import math
 
-from spook_tracker.engine import (
-    PLAIN,
-    ContactForce,
-    ConvexHull,
-    Final,
-    Load,
-    Material,
-    Method,
-    Position,
-    RigidBody,
-    Scene,
-    Table,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, sweep, told
 
@@ -70,18 +47,18 @@ def wedge(left: float, right: float) -> list[tuple[float, float, float]]:
 
 
 @functools.cache
-def bridge() -> tuple[RigidBody, ...]:
+def bridge() -> tuple[engine.RigidBody, ...]:
     """Stones between two abutments, touching and at rest."""
-    rough = Material(friction=FRICTION, compliance=COMPLIANCE, slip_compliance=CREEP)
+    rough = engine.Material(friction=FRICTION, compliance=COMPLIANCE, slip_compliance=CREEP)
     at, one = joints(), 2.0 * HALF / STONES
     places = [("left", at[0] + one, at[0]), ("right", at[-1], at[-1] - one)]
     places += [(f"stone {k}", at[k], at[k + 1]) for k in range(STONES)]
     bodies = []
     for name, left, right in places:
-        shape, position, orientation = ConvexHull.placed(wedge(left, right))
+        shape, position, orientation = engine.ConvexHull.placed(wedge(left, right))
         stone = name.startswith("stone")
         bodies.append(
-            RigidBody(
+            engine.RigidBody(
                 name=name,
                 motion="dynamic" if stone else "static",
                 mass=DENSITY * shape.volume if stone else None,
@@ -100,21 +77,21 @@ def weight() -> float:
     return GRAVITY * sum(body.mass for body in bridge() if body.mass)
 
 
-def scene(stone: int, load: float) -> Scene:
+def scene(stone: int, load: float) -> engine.Scene:
     """The bridge with so many times its weight on one stone."""
-    on = Load(name="load", body=f"stone {stone}", force=(0.0, 0.0, -load * weight()))
-    return Scene(bodies=bridge(), forces=(on,), gravity=(0.0, 0.0, -GRAVITY))
+    on = engine.Load(name="load", body=f"stone {stone}", force=(0.0, 0.0, -load * weight()))
+    return engine.Scene(bodies=bridge(), forces=(on,), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def crossed(load: float) -> Scene:
+def crossed(load: float) -> engine.Scene:
     """So many times its weight goes over it at constant speed, shared by the two stones it stands between."""
     forces = []
     for stone in range(STONES):
         times = tuple(CROSSING * (stone + k) / (STONES + 1) for k in range(3))
-        hat = Table(times=times, values=(0.0, 1.0, 0.0))
+        hat = engine.Table(times=times, values=(0.0, 1.0, 0.0))
         force = (0.0, 0.0, -load * weight())
-        forces.append(Load(name=f"load {stone}", body=f"stone {stone}", force=force, factor=hat))
-    return Scene(bodies=bridge(), forces=tuple(forces), gravity=(0.0, 0.0, -GRAVITY))
+        forces.append(engine.Load(name=f"load {stone}", body=f"stone {stone}", force=force, factor=hat))
+    return engine.Scene(bodies=bridge(), forces=tuple(forces), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def most_sinking(load: float, duration: float = DURATION) -> float:
@@ -125,28 +102,28 @@ def most_sinking(load: float, duration: float = DURATION) -> float:
 
 
 def sinking(
-    simulate: Simulate,
+    simulate: case.Simulate,
     stone: int,
     load: float,
     time_step: float = TIME_STEP,
-    method: Method = PLAIN,
+    method: engine.Method = engine.PLAIN,
     duration: float = DURATION,
 ) -> float:
     """How far the loaded stone sinks [m]."""
     asked = scene(stone, load)
-    observe = {"x": Final(quantity=Position(f"stone {stone}"))}
+    observe = {"x": engine.Final(quantity=engine.Position(f"stone {stone}"))}
     result = simulate(asked, time_step=time_step, duration=duration, method=method, observe=observe)
     return float(asked.body(f"stone {stone}").position[2]) - float(result["x"][2])
 
 
-def measure(simulate: Simulate, stone: int) -> dict[str, float]:
+def measure(simulate: case.Simulate, stone: int) -> dict[str, float]:
     """One per cent less than the limit load, and one per cent more."""
     load = LESS * LIMIT[stone]
     asked = scene(stone, load)
     observe = {
-        "x": Final(quantity=Position(f"stone {stone}")),
-        "left": Final(quantity=ContactForce("left")),
-        "right": Final(quantity=ContactForce("right")),
+        "x": engine.Final(quantity=engine.Position(f"stone {stone}")),
+        "left": engine.Final(quantity=engine.ContactForce("left")),
+        "right": engine.Final(quantity=engine.ContactForce("right")),
     }
     result = simulate(asked, time_step=TIME_STEP, duration=DURATION, observe=observe)
     sunk = float(asked.body(f"stone {stone}").position[2]) - float(result["x"][2])
@@ -160,9 +137,9 @@ def measure(simulate: Simulate, stone: int) -> dict[str, float]:
     }
 
 
-def cross(simulate: Simulate) -> dict[str, float]:
+def cross(simulate: case.Simulate) -> dict[str, float]:
     """A load of 0.99 of the least limit goes over the bridge."""
-    observe = {f"x{k}": Final(quantity=Position(f"stone {k}")) for k in range(STONES)}
+    observe = {f"x{k}": engine.Final(quantity=engine.Position(f"stone {k}")) for k in range(STONES)}
     load = LESS * LEAST
     asked = crossed(load)
     result = simulate(asked, time_step=TIME_STEP, duration=CROSSING, observe=observe)
@@ -173,12 +150,12 @@ def cross(simulate: Simulate) -> dict[str, float]:
     return {"stays": moved / most_sinking(load, CROSSING)}
 
 
-def stands(simulate: Simulate, load: float) -> bool:
+def stands(simulate: case.Simulate, load: float) -> bool:
     """Whether the weakest stone sinks by no more than it can while the bridge stands."""
     return sinking(simulate, 2, load) < most_sinking(load)
 
 
-def heaviest(simulate: Simulate) -> BreakPoint:
+def heaviest(simulate: case.Simulate) -> case.BreakPoint:
     """The heaviest load that the weakest stone carries, over the weight."""
     limit = LIMIT[2]
     return break_point(
@@ -186,12 +163,12 @@ def heaviest(simulate: Simulate) -> BreakPoint:
     )
 
 
-def carries(simulate: Simulate, load: float) -> bool:
+def carries(simulate: case.Simulate, load: float) -> bool:
     """Whether the keystone sinks by no more than it can under so many times the weight."""
     return sinking(simulate, STONES // 2, load, duration=SHORT) < most_sinking(load, SHORT)
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Sinking of the loaded stone against the load over its limit."""
     ratios = (0.9, 0.97, 0.99, 1.01, 1.03)
     curves = [
@@ -204,7 +181,7 @@ def draw(simulate: Simulate) -> Drawing:
         for stone in (1, 2)
     ]
     standing, falling = curves[1].y[2], curves[1].y[3]
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="load over the limit load of its place",
         y_label="sinking of the loaded stone in 0.5 s [m]",
@@ -214,14 +191,14 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
-def _asked(stone: int) -> Measurement:
+def _asked(stone: int) -> case.Measurement:
     low, high = THRUST[stone]
-    return Measurement(
+    return case.Measurement(
         configuration="plain",
         time_step=TIME_STEP,
         parameters={"stone": float(stone + 1)},
         metrics=(
-            Metric(
+            case.Metric(
                 name="stands",
                 description="sinking under less than the limit load, over the most that a standing bridge can",
                 unit="1",
@@ -231,7 +208,7 @@ def _asked(stone: int) -> Measurement:
                 reference=0.0,
                 relative_tolerance=1e-3,
             ),
-            Metric(
+            case.Metric(
                 name="falls",
                 description="sinking under more than the limit load, over the most that a standing bridge can",
                 unit="1",
@@ -242,7 +219,7 @@ def _asked(stone: int) -> Measurement:
                 limit_kind="physical",
                 relative_tolerance=1e-3,
             ),
-            Metric(
+            case.Metric(
                 name="weight_error",
                 description="force on both abutments over weight and load, minus one",
                 unit="1",
@@ -252,7 +229,7 @@ def _asked(stone: int) -> Measurement:
                 reference=0.0,
                 tolerance=1e-4,
             ),
-            Metric(
+            case.Metric(
                 name="thrust",
                 description="horizontal force on the left abutment over the weight, under less than the limit load",
                 unit="1",
@@ -269,11 +246,11 @@ def _asked(stone: int) -> Measurement:
     )
 
 
-CROSSED = Measurement(
+CROSSED = case.Measurement(
     configuration="crossed",
     time_step=TIME_STEP,
     metrics=(
-        Metric(
+        case.Metric(
             name="stays",
             description="largest way of a stone while a load crosses, over the most that a standing bridge can give",
             unit="1",
@@ -288,7 +265,7 @@ CROSSED = Measurement(
     note="0.99 of the least limit load crosses in 2 s, shared by the two stones it is between",
 )
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Stone bridge",
     question="How much does a stone bridge carry, and where?",
     why="A load bends the line of thrust, and where the line leaves the stones, joints open. The engine must find the same "
@@ -316,9 +293,9 @@ TEST = ScalarTest(
     "too early), or joints hold that should open (it carries too much).",
     source="ours; J. Heyman, The stone skeleton, 1966",
     measurements=(_asked(1), _asked(2), _asked(3), CROSSED),
-    example=lambda: Example(scene=crossed(LESS * LEAST), time_step=TIME_STEP, duration=CROSSING),
+    example=lambda: case.Example(scene=crossed(LESS * LEAST), time_step=TIME_STEP, duration=CROSSING),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="load",
             title="Heaviest load that the third stone carries, over the weight",
             configuration="plain",
@@ -341,9 +318,9 @@ TEST = ScalarTest(
             walk=3,
         ),
     ),
-    figures=(Figure(name="load", title="Sinking of the loaded stone against the load", draw=draw),),
+    figures=(case.Figure(name="load", title="Sinking of the loaded stone against the load", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="sinking",
             description="sinking of the third stone under 0.99 of its limit load in 0.1 s: none is right",
             unit="m",

@@ -7,31 +7,10 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    Box,
-    Final,
-    MaximumAbsolute,
-    Method,
-    Orientation,
-    Position,
-    RigidBody,
-    Scene,
-    Spring,
-    Trace,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import apart, line, told
@@ -61,14 +40,14 @@ CORNERS = {
 }
 
 
-def scene(heave: float = 0.0, tilt: float = 0.0, lean: float = 0.0, weight: float = 1.0) -> Scene:
+def scene(heave: float = 0.0, tilt: float = 0.0, lean: float = 0.0, weight: float = 1.0) -> engine.Scene:
     """A chassis on four upright springs at the height of its centre, let go `heave` [m] too high and turned by `tilt` about
     its axles' direction or by `lean` along it; of so many times its mass."""
-    chassis = RigidBody(
+    chassis = engine.RigidBody(
         name="chassis",
         mass=weight * MASS,
         inertia=(weight * ROLLING, weight * PITCHING, weight * 1700.0),
-        shape=Box((3.6, 1.2, 0.5)),
+        shape=engine.Box((3.6, 1.2, 0.5)),
         position=(0.0, 0.0, LENGTH + heave),
         orientation=_turned(tilt, lean),
     )
@@ -76,7 +55,7 @@ def scene(heave: float = 0.0, tilt: float = 0.0, lean: float = 0.0, weight: floa
     for name, (x, side, stiffness) in CORNERS.items():
         carried = 0.5 * weight * MASS * GRAVITY * (REAR if x > 0.0 else FRONT) / (FRONT + REAR)  # N
         springs.append(
-            Spring(
+            engine.Spring(
                 name=name,
                 between=((x, 0.5 * side * TRACK, 0.0), "chassis"),
                 anchors=((0.0, 0.0, 0.0), (x, 0.5 * side * TRACK, 0.0)),
@@ -84,7 +63,9 @@ def scene(heave: float = 0.0, tilt: float = 0.0, lean: float = 0.0, weight: floa
                 rest_length=LENGTH + carried / stiffness,
             )
         )
-    return Scene(bodies=(chassis,), forces=tuple(springs), gravity=(0.0, 0.0, -GRAVITY), contacts=False)
+    return engine.Scene(
+        bodies=(chassis,), forces=tuple(springs), gravity=(0.0, 0.0, -GRAVITY), contacts=False
+    )
 
 
 def _turned(tilt: float, lean: float) -> tuple[float, float, float, float]:
@@ -93,12 +74,12 @@ def _turned(tilt: float, lean: float) -> tuple[float, float, float, float]:
     return (math.cos(0.5 * angle), share * lean, share * tilt, 0.0)
 
 
-def bounded(simulate: Simulate, time_step: float, weight: float = 1.0) -> bool:
+def bounded(simulate: case.Simulate, time_step: float, weight: float = 1.0) -> bool:
     """Whether a nudge in bounce, pitch and roll stays small for 30 steps; struts that carry a load fall over sideways, but
     not so soon."""
     observe: dict[str, Observable] = {
-        "x": Trace(quantity=Position("chassis")),
-        "q": Trace(quantity=Orientation("chassis")),
+        "x": engine.Trace(quantity=engine.Position("chassis")),
+        "q": engine.Trace(quantity=engine.Orientation("chassis")),
     }
     result = simulate(scene(NUDGE, NUDGE, NUDGE, weight), time_step=time_step, steps=30, observe=observe)
     if not result.completed:
@@ -107,7 +88,7 @@ def bounded(simulate: Simulate, time_step: float, weight: float = 1.0) -> bool:
     return max(float(np.abs(one).max()) for one in swings) < 100.0 * NUDGE
 
 
-def longest(simulate: Simulate) -> BreakPoint:
+def longest(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step that carries the springs."""
     fastest = 2.0 / ROLL
     return break_point(functools.partial(bounded, simulate), 0.4 * fastest, 2.0 * fastest, resolution=0.002)
@@ -116,18 +97,20 @@ def longest(simulate: Simulate) -> BreakPoint:
 LIGHTEST = (0.5 * TIME_STEP * ROLL) ** 2  # of its mass: h ω = 2 of the roll
 
 
-def lightest(simulate: Simulate) -> BreakPoint:
+def lightest(simulate: case.Simulate) -> case.BreakPoint:
     """The least part of its mass with which the chassis rests on its springs."""
     return break_point(
         functools.partial(bounded, simulate, TIME_STEP), 1.0, 0.25 * LIGHTEST, resolution=2e-3, walk=6
     )
 
 
-def swings(simulate: Simulate, time_step: float, method: Method = PLAIN) -> dict[str, float]:
+def swings(
+    simulate: case.Simulate, time_step: float, method: engine.Method = engine.PLAIN
+) -> dict[str, float]:
     """Frequencies [rad/s] of bounce and pitch."""
     observe: dict[str, Observable] = {
-        "x": Trace(quantity=Position("chassis")),
-        "q": Trace(quantity=Orientation("chassis")),
+        "x": engine.Trace(quantity=engine.Position("chassis")),
+        "q": engine.Trace(quantity=engine.Orientation("chassis")),
     }
     up = simulate(scene(heave=HEAVE), time_step=time_step, duration=DURATION, method=method, observe=observe)
     turn = simulate(scene(tilt=TILT), time_step=time_step, duration=DURATION, method=method, observe=observe)
@@ -142,12 +125,12 @@ def discrete(frequency: float, time_step: float) -> float:
     return math.acos(1.0 - 0.5 * (time_step * frequency) ** 2) / time_step
 
 
-def measure(simulate: Simulate) -> dict[str, float]:
+def measure(simulate: case.Simulate) -> dict[str, float]:
     """Frequencies, and whether what is let go at rest stays there."""
     found = swings(simulate, TIME_STEP)
     observe: dict[str, Observable] = {
-        "x": MaximumAbsolute(quantity=Position("chassis"), from_start=True),
-        "q": Final(quantity=Orientation("chassis")),
+        "x": engine.MaximumAbsolute(quantity=engine.Position("chassis"), from_start=True),
+        "q": engine.Final(quantity=engine.Orientation("chassis")),
     }
     rest = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=observe)
     both = simulate(scene(heave=HEAVE), time_step=TIME_STEP, duration=DURATION, observe=observe)
@@ -160,21 +143,21 @@ def measure(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Relative error of the bounce against √(Σk/m)."""
     return swings(simulate, time_step, method)["bounce"] / BOUNCE - 1.0
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Height and nose of the chassis, let go from rest."""
     observe: dict[str, Observable] = {
-        "x": Trace(quantity=Position("chassis")),
-        "q": Trace(quantity=Orientation("chassis")),
+        "x": engine.Trace(quantity=engine.Position("chassis")),
+        "q": engine.Trace(quantity=engine.Orientation("chassis")),
     }
     result = simulate(scene(HEAVE, 5.0 * TILT), time_step=TIME_STEP, duration=DURATION, observe=observe)
     time = result.sample_times["x"]
     smooth = np.linspace(0.0, DURATION, 201)
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("bounce [cm]", time, 100.0 * (result["x"][:, 2] - LENGTH), "points"),
             line("√(Σk/m)", smooth, 100.0 * HEAVE * np.cos(BOUNCE * smooth), "reference"),
@@ -189,7 +172,7 @@ def draw(simulate: Simulate) -> Drawing:
 
 
 SLOW = (TIME_STEP * BOUNCE) ** 2 / 24.0
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Suspension",
     question="Does a vehicle on its springs bounce and pitch at the frequencies of mechanics?",
     why="Ride comfort is these two frequencies. They come out wrong when springs pull at a body's centre instead of at its "
@@ -253,10 +236,10 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=scene(0.1, 0.05), time_step=TIME_STEP, duration=DURATION),
-    figures=(Figure(name="swings", title="Bounce and pitch", draw=draw),),
+    example=lambda: case.Example(scene=scene(0.1, 0.05), time_step=TIME_STEP, duration=DURATION),
+    figures=(case.Figure(name="swings", title="Bounce and pitch", draw=draw),),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest time step that carries the springs",
             configuration="plain",
@@ -267,7 +250,7 @@ TEST = ScalarTest(
             expected_source="springs are plain forces: h ω = 2 of the fastest swing, the roll at √(Σk y²/I); 0.5 % more grow "
             "four hundredfold in 30 steps",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="lightest",
             title="Least part of its mass with which the chassis rests on its springs at 1/60 s",
             configuration="plain",
@@ -280,7 +263,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="bounce",
             description="relative error of the bounce's frequency against √(Σk/m)",
             unit="1",

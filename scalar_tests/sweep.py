@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from spook_tracker.engine.result import SimulationFailed
-from spook_tracker.scalar_tests.case import Curve
+from spook_tracker.scalar_tests import case
 
 
 def sweep(values: Iterable[float], measure: Callable[[float], float]) -> tuple[float, ...]:
@@ -21,9 +21,9 @@ def sweep(values: Iterable[float], measure: Callable[[float], float]) -> tuple[f
     return tuple(found)
 
 
-def line(name: str, x: Iterable[Any], y: Iterable[Any], style: Any = "line") -> Curve:
+def line(name: str, x: Iterable[Any], y: Iterable[Any], style: Any = "line") -> case.Curve:
     """A curve from anything that gives numbers."""
-    return Curve(name=name, x=tuple(map(float, x)), y=tuple(map(float, y)), style=style)
+    return case.Curve(name=name, x=tuple(map(float, x)), y=tuple(map(float, y)), style=style)
 
 
 def told(value: float, digits: int = 2) -> str:

@@ -12,43 +12,15 @@ from typing import Literal
 import numpy as np
 from scipy.special import ellipj, ellipk
 
-from spook_tracker.engine import (
-    PLAIN,
-    WORLD,
-    Box,
-    Energy,
-    Hinge,
-    JointCoordinate,
-    MaximumAbsolute,
-    Method,
-    Result,
-    RigidBody,
-    Scene,
-    Trace,
-    Violation,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, cell, table
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityMap,
-    StabilityStudy,
-    Unobserved,
-)
 from spook_tracker.scalar_tests.sweep import line
 
-HALF_STEP_CURVED = Method(half_step_velocities=True, corrections=2)
-ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")
-ORDER_8 = Method(composition="order8")
+HALF_STEP_CURVED = engine.Method(half_step_velocities=True, corrections=2)
+ORDER_4, ORDER_6 = engine.Method(composition="order4"), engine.Method(composition="order6")
+ORDER_8 = engine.Method(composition="order8")
 SIZE = (1.0, 0.06, 2.0)  # m
 MASS = 45.0  # kg
 GRAVITY = 10.0  # m/s²
@@ -74,33 +46,39 @@ def _around(value: float) -> tuple[float, float]:
     return (value - 1e-6 * abs(value), value + 1e-6 * abs(value))
 
 
-def scene(damping: float = TIME_STEP) -> Scene:
+def scene(damping: float = TIME_STEP) -> engine.Scene:
     """`damping` in s. Door with its hinge axis along z through the origin; gravity leans towards +x instead of the axis."""
     pull = (GRAVITY * math.sin(LEAN), 0.0, -GRAVITY * math.cos(LEAN))
     turn = (math.cos(0.5 * START), 0.0, 0.0, math.sin(0.5 * START))
     place = (LEVER * math.cos(START), LEVER * math.sin(START), 0.0)
-    door = RigidBody(name="door", mass=MASS, shape=Box(SIZE), position=place, orientation=turn)
+    door = engine.RigidBody(name="door", mass=MASS, shape=engine.Box(SIZE), position=place, orientation=turn)
     hinges = tuple(
-        Hinge(name=name, between=(WORLD, "door"), at=(0.0, 0.0, height), compliance=1e-13, damping=damping)
+        engine.Hinge(
+            name=name,
+            between=(engine.WORLD, "door"),
+            at=(0.0, 0.0, height),
+            compliance=1e-13,
+            damping=damping,
+        )
         for name, height in (("lower", -0.75), ("upper", 0.75))
     )
-    return Scene(bodies=(door,), constraints=hinges, gravity=pull, contacts=False)
+    return engine.Scene(bodies=(door,), constraints=hinges, gravity=pull, contacts=False)
 
 
 OBSERVE: dict[str, Observable] = {
-    "angle": Trace(quantity=JointCoordinate("upper")),
-    "energy": MaximumAbsolute(quantity=Energy(), from_start=True),
-    "lower": MaximumAbsolute(quantity=Violation("lower")),
-    "upper": MaximumAbsolute(quantity=Violation("upper")),
+    "angle": engine.Trace(quantity=engine.JointCoordinate("upper")),
+    "energy": engine.MaximumAbsolute(quantity=engine.Energy(), from_start=True),
+    "lower": engine.MaximumAbsolute(quantity=engine.Violation("lower")),
+    "upper": engine.MaximumAbsolute(quantity=engine.Violation("upper")),
 }
 
 
-def angles(result: Result) -> tuple[np.ndarray, np.ndarray]:
+def angles(result: engine.Result) -> tuple[np.ndarray, np.ndarray]:
     """Times [s] and angle [rad] of the door from its lowest position."""
     return result.sample_times["angle"], START + result["angle"]
 
 
-def measured_period(result: Result) -> float:
+def measured_period(result: engine.Result) -> float:
     """Mean period [s] from the zero crossings of the angle; NaN with fewer than three."""
     times, angle = angles(result)
     crossing = np.nonzero((angle[:-1] > 0.0) != (angle[1:] > 0.0))[0]
@@ -110,7 +88,7 @@ def measured_period(result: Result) -> float:
     return float(2.0 * (zero[-1] - zero[0]) / (len(zero) - 1))
 
 
-def swing(simulate: Simulate) -> dict[str, float]:
+def swing(simulate: case.Simulate) -> dict[str, float]:
     """Period, energy and hinges over 22 s."""
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=OBSERVE)
     return {
@@ -129,14 +107,16 @@ def predicted_violation(damping: float, time_step: float) -> float:
 MOST_DAMPING = 0.5 * (WITHIN / predicted_violation(0.0, TIME_STEP) - 1.0)  # time steps
 
 
-def _violations(simulate: Simulate, damping: float, time_step: float) -> tuple[Result, np.ndarray]:
-    observe = {"upper": Trace(quantity=Violation("upper"))}
+def _violations(
+    simulate: case.Simulate, damping: float, time_step: float
+) -> tuple[engine.Result, np.ndarray]:
+    observe = {"upper": engine.Trace(quantity=engine.Violation("upper"))}
     steps = round(DURATION / time_step)
     result = simulate(scene(damping), time_step=time_step, steps=steps, observe=observe)
     return result, np.abs(result.partial["upper"][:, :3]).max(axis=1)
 
 
-def most_damping(simulate: Simulate) -> BreakPoint:
+def most_damping(simulate: case.Simulate) -> case.BreakPoint:
     """Largest damping, in time steps, with which the hinges stay within WITHIN at 1/60 s."""
 
     def holds(relaxation: float) -> bool:
@@ -146,14 +126,14 @@ def most_damping(simulate: Simulate) -> BreakPoint:
     return break_point(holds, 0.1, 20.0, resolution=0.005)
 
 
-def _cell(simulate: Simulate, relaxation: float, time_step: float) -> str:
+def _cell(simulate: case.Simulate, relaxation: float, time_step: float) -> str:
     result, violation = _violations(simulate, relaxation * time_step, time_step)
     return cell(result, violation / predicted_violation(relaxation * time_step, time_step), bound=1.5)
 
 
-def damping_map(simulate: Simulate) -> StabilityMap:
+def damping_map(simulate: case.Simulate) -> case.StabilityMap:
     """Damping and time step of plain SPOOK."""
-    return StabilityMap(
+    return case.StabilityMap(
         x=MAP_DAMPINGS,
         y=MAP_STEPS,
         cells=table(MAP_STEPS, MAP_DAMPINGS, lambda d, h: _cell(simulate, d, h)),
@@ -165,10 +145,10 @@ def damping_map(simulate: Simulate) -> StabilityMap:
     )
 
 
-def _draw(simulate: Simulate) -> Drawing:
+def _draw(simulate: case.Simulate) -> case.Drawing:
     times, angle = angles(simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=OBSERVE))
     shown = times <= 12.0
-    return Drawing(
+    return case.Drawing(
         curves=(line("angle", times[shown], np.degrees(angle[shown])),),
         x_label="time [s]",
         y_label="angle from the lowest position [degrees]",
@@ -182,24 +162,24 @@ def exact_angle(time: np.ndarray) -> np.ndarray:
     return np.asarray(2.0 * np.arcsin(math.sqrt(modulus) * cn / dn))
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest |angle − exact| over 10 s [rad]."""
-    observe = {"angle": Trace(quantity=JointCoordinate("upper"))}
+    observe = {"angle": engine.Trace(quantity=engine.JointCoordinate("upper"))}
     built = scene(time_step / method.substeps)
     result = simulate(built, time_step=time_step, duration=LADDER_DURATION, method=method, observe=observe)
     angle = START + result["angle"]
     return float(np.abs(angle - exact_angle(result.sample_times["angle"])).max())
 
 
-def violation_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def violation_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest violation of a hinge over 10 s [m]."""
-    observe = {"upper": MaximumAbsolute(quantity=Violation("upper"))}
+    observe = {"upper": engine.MaximumAbsolute(quantity=engine.Violation("upper"))}
     built = scene(time_step / method.substeps)
     result = simulate(built, time_step=time_step, duration=LADDER_DURATION, method=method, observe=observe)
     return float(result["upper"][:3].max())
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Swinging door",
     question="Does a door on two hinges swing with the right period?",
     why="A door at rest says nothing about hinges in motion, where redundant rows must agree with the rotation.",
@@ -218,12 +198,12 @@ TEST = ScalarTest(
     conclusion="Green: hinges let the door swing freely and hold the rest. Red: they brake, drift or leak energy.",
     source="ours; asked for by the door of thesis, section 3.2.2",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             parameters={"N": 2},
             metrics=(
-                Metric(
+                case.Metric(
                     name="period_error",
                     description="relative error of the mean period over 22 s",
                     unit="1",
@@ -235,7 +215,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-9,
                 ),
-                Metric(
+                case.Metric(
                     name="energy_deviation",
                     description="largest deviation of the energy over m g sin β d",
                     unit="1",
@@ -247,7 +227,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-9,
                 ),
-                Metric(
+                case.Metric(
                     name="hinge_violation",
                     description="largest violation of a hinge row [m or rad]",
                     unit="m",
@@ -264,60 +244,64 @@ TEST = ScalarTest(
             note="Plain SPOOK, direct solver.",
         ),
     ),
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP),
-    figures=(Figure(name="swing", title="Angle of the door", draw=_draw),),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP),
+    figures=(case.Figure(name="swing", title="Angle of the door", draw=_draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="angle",
             description="largest angle error over 10 s against elliptic functions",
             unit="rad",
             time_steps=tuple(1.0 / n for n in (15, 20, 24, 30, 60, 120, 240, 480, 960)),
             configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 960, 1 / 240)),
-                Configuration(
+                case.Configuration(
+                    name="plain", method=engine.PLAIN, expected_order=1.0, order_range=(1 / 960, 1 / 240)
+                ),
+                case.Configuration(
                     name="two substeps",
-                    method=Method(substeps=2),
+                    method=engine.Method(substeps=2),
                     expected_order=1.0,
                     order_range=(1 / 960, 1 / 240),
                 ),
-                Configuration(
+                case.Configuration(
                     name="half-step, curved twice",
                     method=HALF_STEP_CURVED,
                     expected_order=2.0,
                     order_range=(1 / 960, 1 / 60),
                 ),
-                Configuration(
+                case.Configuration(
                     name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1 / 480, 1 / 24)
                 ),
-                Configuration(
+                case.Configuration(
                     name="order 6", method=ORDER_6, expected_order=6.0, order_range=(1 / 120, 1 / 20)
                 ),
-                Configuration(
+                case.Configuration(
                     name="order 8", method=ORDER_8, expected_order=8.0, order_range=(1 / 24, 1 / 15)
                 ),
-                Configuration(
+                case.Configuration(
                     name="half step",
-                    method=Method(half_step_velocities=True),
+                    method=engine.Method(half_step_velocities=True),
                     expected_order=2.0,
                     order_range=(1 / 960, 1 / 240),
                 ),
-                Configuration(
-                    name="curved", method=Method(half_step_velocities=True, corrections=1), expected_order=2.0
+                case.Configuration(
+                    name="curved",
+                    method=engine.Method(half_step_velocities=True, corrections=1),
+                    expected_order=2.0,
                 ),
             ),
             error=ladder_error,
             target_error=0.02,
             target_seconds=0.1,
         ),
-        Ladder(
+        case.Ladder(
             name="high-order",
             description="largest angle error over 10 s against elliptic functions",
             unit="rad",
             time_steps=tuple(1.0 / n for n in (8, 12, 16, 24, 32)),
             configurations=tuple(
-                Configuration(
+                case.Configuration(
                     name=order,
-                    method=Method(composition=order),
+                    method=engine.Method(composition=order),
                     expected_order=float(order[-1]),
                     order_range=(1 / 32, 1 / 16),
                 )
@@ -327,28 +311,28 @@ TEST = ScalarTest(
             target_error=1e-4,
             target_seconds=0.01,
         ),
-        Ladder(
+        case.Ladder(
             name="violation",
             description="largest violation of a hinge over 10 s",
             unit="m",
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 480, 960)),
             configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=2.0),
-                Configuration(  # joint coordinates: nothing to violate
+                case.Configuration(name="plain", method=engine.PLAIN, expected_order=2.0),
+                case.Configuration(  # joint coordinates: nothing to violate
                     name="order4",
-                    method=Method(composition="order4"),
+                    method=engine.Method(composition="order4"),
                     expected_order=None,
                     time_steps=(1 / 8, 1 / 12, 1 / 16),
                 ),
             ),
             error=violation_error,
-            run=Unobserved(ladder_error),
+            run=case.Unobserved(ladder_error),
             target_error=1e-3,
             target_seconds=0.1,
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="most-damping",
             title="Largest damping with hinges within 2 mm at 1/60 s",
             configuration="plain",
@@ -359,7 +343,7 @@ TEST = ScalarTest(
             expected_source="g = ¼ d (ω h)² (1 + 2τ/h) at the lowest place, ω² = 2 m g sin β d/J; the step's own ω is "
             "second order in h off, (ω h)² = 0.4 %, and so are its samples",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="map-damping",
             title="Damping of the hinges and time step",
             configuration="plain",

@@ -8,31 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    WORLD,
-    Ball,
-    Capsule,
-    Load,
-    MaximumAbsolute,
-    Method,
-    Position,
-    Prismatic,
-    RigidBody,
-    Scene,
-    Trace,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_count, break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, sweep, told
@@ -47,7 +25,7 @@ DURATION = 1.0  # s
 
 
 @functools.cache
-def taut(mode: int, count: int = PIECES, pull: float = PULL, sway: float = SWAY) -> Scene:
+def taut(mode: int, count: int = PIECES, pull: float = PULL, sway: float = SWAY) -> engine.Scene:
     """Links of the same rope in a row, bent into a mode and at rest, drawn by `pull` at a slide of a link's mass."""
     length, mass = LENGTH / count, MASS / count
     bent = [sway * math.sin(mode * math.pi * k / count) for k in range(count + 1)]
@@ -56,27 +34,33 @@ def taut(mode: int, count: int = PIECES, pull: float = PULL, sway: float = SWAY)
         along = math.sqrt(length**2 - (bent[k + 1] - bent[k]) ** 2)
         turn = 0.5 * (0.5 * math.pi - math.atan2(bent[k + 1] - bent[k], along))
         rods.append(
-            RigidBody(
+            engine.RigidBody(
                 name=f"link {k}",
                 mass=mass,
-                shape=Capsule(0.02, length - 0.04),
+                shape=engine.Capsule(0.02, length - 0.04),
                 inertia=(mass * length**2 / 12.0, mass * length**2 / 12.0, 1e-5),
                 position=(x + 0.5 * along, 0.0, 0.5 * (bent[k] + bent[k + 1])),
                 orientation=(math.cos(turn), 0.0, math.sin(turn), 0.0),
             )
         )
-        before = WORLD if k == 0 else f"link {k - 1}"
+        before = engine.WORLD if k == 0 else f"link {k - 1}"
         joints.append(
-            Ball(name=f"joint {k}", between=(before, f"link {k}"), at=(x, 0.0, bent[k]), compliance=0.0)
+            engine.Ball(
+                name=f"joint {k}", between=(before, f"link {k}"), at=(x, 0.0, bent[k]), compliance=0.0
+            )
         )
         x += along
-    end = RigidBody(name="slide", mass=mass, inertia=(mass,) * 3, position=(x, 0.0, bent[count]))
-    last = Ball(name="end", between=(f"link {count - 1}", "slide"), at=(x, 0.0, bent[count]), compliance=0.0)
-    guide = Prismatic(name="guide", between=(WORLD, "slide"), axis=(1.0, 0.0, 0.0), compliance=0.0)
-    return Scene(
+    end = engine.RigidBody(name="slide", mass=mass, inertia=(mass,) * 3, position=(x, 0.0, bent[count]))
+    last = engine.Ball(
+        name="end", between=(f"link {count - 1}", "slide"), at=(x, 0.0, bent[count]), compliance=0.0
+    )
+    guide = engine.Prismatic(
+        name="guide", between=(engine.WORLD, "slide"), axis=(1.0, 0.0, 0.0), compliance=0.0
+    )
+    return engine.Scene(
         bodies=(*rods, end),
         constraints=(*joints, last, guide),
-        forces=(Load(name="pull", body="slide", force=(pull, 0.0, 0.0)),),
+        forces=(engine.Load(name="pull", body="slide", force=(pull, 0.0, 0.0)),),
         contacts=False,
     )
 
@@ -92,16 +76,18 @@ def discrete(frequency: float, time_step: float) -> float:
     return math.acos(1.0 - 0.5 * (time_step * frequency) ** 2) / time_step
 
 
-def swing(simulate: Simulate, mode: int, time_step: float, method: Method = PLAIN) -> float:
+def swing(
+    simulate: case.Simulate, mode: int, time_step: float, method: engine.Method = engine.PLAIN
+) -> float:
     """Frequency of a mode [rad/s] over a second."""
-    observe = {"x": Trace(quantity=Position())}
+    observe = {"x": engine.Trace(quantity=engine.Position())}
     result = simulate(taut(mode), time_step=time_step, duration=DURATION, method=method, observe=observe)
     shape = np.sin(mode * math.pi * (np.arange(PIECES) + 0.5) / PIECES)
     x: Any = result["x"][:, :PIECES, 2] @ shape
     return phase(x) / time_step
 
 
-def wave(simulate: Simulate) -> dict[str, float]:
+def wave(simulate: case.Simulate) -> dict[str, float]:
     """The first modes of the taut rope."""
     found = {mode: swing(simulate, mode, TIME_STEP) for mode in MODES}
     return {
@@ -117,7 +103,7 @@ def pulsing() -> float:
     return (1.0 + 1.0 / PIECES) * 0.5 * (slope * MODES[-1] * math.pi) ** 2
 
 
-def wave_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def wave_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Relative error of the third mode's frequency."""
     return swing(simulate, 3, time_step, method) / rate(3) - 1.0
 
@@ -127,16 +113,16 @@ def tightest() -> float:
     return (2.0 / (TIME_STEP * rate(9, 10, 1.0))) ** 2
 
 
-def strongest(simulate: Simulate) -> BreakPoint:
+def strongest(simulate: case.Simulate) -> case.BreakPoint:
     """The largest pull under which ten links stay straight."""
     return break_point(
         lambda pull: straight(simulate, 10, pull), 0.4 * tightest(), 2.0 * tightest(), resolution=0.005
     )
 
 
-def straight(simulate: Simulate, count: int, pull: float) -> bool:
+def straight(simulate: case.Simulate, count: int, pull: float) -> bool:
     """Whether so many links, bent into their shortest waves, stay within a tenth of a millimetre for 200 steps."""
-    observe = {"x": MaximumAbsolute(quantity=Position(), from_start=True)}
+    observe = {"x": engine.MaximumAbsolute(quantity=engine.Position(), from_start=True)}
     asked = taut(count - 1, count, pull, 1e-7)
     result = simulate(asked, time_step=TIME_STEP, steps=200, observe=observe)
     return result.completed and float(result["x"].max()) < 1e-4
@@ -150,17 +136,17 @@ def most() -> int:
     return count
 
 
-def finest(simulate: Simulate) -> BreakPoint:
+def finest(simulate: case.Simulate) -> case.BreakPoint:
     """The largest number of links that stay straight under 50 N."""
     return break_count(lambda count: straight(simulate, count, PULL), (10, 20, 40))
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Frequencies of the modes, of links and step, and of a smooth rope."""
     modes = tuple(range(1, 11))
     found = sweep(modes, lambda mode: swing(simulate, round(mode), TIME_STEP))
     speed = math.sqrt(PULL * LENGTH / MASS)
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulation", modes, found, "points"),
             line("links and step", modes, (discrete(rate(m), TIME_STEP) for m in modes), "reference"),
@@ -176,7 +162,7 @@ def draw(simulate: Simulate) -> Drawing:
 
 FASTER = ((math.pi / PIECES) ** 2 + (TIME_STEP * rate(1)) ** 2) / 24.0
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Taut rope",
     question="Does a taut rope of links carry waves at √(T/ρ), and how tight may it be?",
     why="Cranes, cables and tendons are ropes under tension. Their waves show whether rows pass on a pull across a link as well "
@@ -219,10 +205,10 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=taut(1, sway=0.5), time_step=TIME_STEP, duration=4.0),
-    figures=(Figure(name="modes", title="Frequencies of a taut rope", draw=draw),),
+    example=lambda: case.Example(scene=taut(1, sway=0.5), time_step=TIME_STEP, duration=4.0),
+    figures=(case.Figure(name="modes", title="Frequencies of a taut rope", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="wave",
             description="relative error of the third mode's frequency of the taut rope against that of links",
             unit="1",
@@ -234,7 +220,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="tightest",
             title="Largest pull under which a rope of ten links stays straight at 1/60 s",
             configuration="plain",
@@ -244,7 +230,7 @@ TEST = ScalarTest(
             expected=(0.99 * tightest(), 1.005 * tightest()),
             expected_source="h ω = 2 of the shortest waves of ten links, to the resolution of the search",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="finest",
             title="Most links of a rope under 50 N that stay straight at 1/60 s",
             configuration="plain",

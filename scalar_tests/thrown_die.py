@@ -9,30 +9,9 @@ from collections.abc import Iterable
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from spook_tracker.engine import (
-    PLAIN,
-    Box,
-    Energy,
-    MaximumAbsolute,
-    Method,
-    Orientation,
-    Result,
-    RigidBody,
-    Scene,
-    Trace,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.sweep import line, told
 
@@ -44,17 +23,17 @@ TIME_STEP = 1.0 / 60.0  # s
 DURATION = 0.6  # s, just before it comes down again
 
 
-def scene(size: tuple[float, float, float] = SIZE, spin: tuple[float, float, float] = SPIN) -> Scene:
+def scene(size: tuple[float, float, float] = SIZE, spin: tuple[float, float, float] = SPIN) -> engine.Scene:
     """The die as it leaves the hand."""
-    die = RigidBody(
+    die = engine.RigidBody(
         name="die",
         mass=MASS,
-        shape=Box(size),
+        shape=engine.Box(size),
         position=(0.0, 0.0, 0.0),
         velocity=VELOCITY,
         angular_velocity=spin,
     )
-    return Scene(bodies=(die,), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(die,), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def moments() -> np.ndarray:
@@ -88,30 +67,32 @@ def landing() -> np.ndarray:
     return np.asarray(exact((DURATION,))[0])
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+def ladder_run(simulate: case.Simulate, time_step: float, method: engine.Method) -> engine.Result:
     """The throw with nothing observed."""
     return simulate(scene(), time_step=time_step, duration=DURATION, method=method)
 
 
-def apart(result: Result, right: np.ndarray) -> float:
+def apart(result: engine.Result, right: np.ndarray) -> float:
     """The angle [rad] between where it points at the end and where it should."""
     turn = result.final_state["die"][3:7]
     return float(2.0 * np.linalg.norm(turn * np.sign(turn @ right) - right))
 
 
-def turn_error(simulate: Simulate, time_step: float = TIME_STEP, method: Method = PLAIN) -> float:
+def turn_error(
+    simulate: case.Simulate, time_step: float = TIME_STEP, method: engine.Method = engine.PLAIN
+) -> float:
     """By how much it has turned wrongly at the end [rad]."""
     return apart(ladder_run(simulate, time_step, method), landing())
 
 
-def fastest(simulate: Simulate) -> BreakPoint:
+def fastest(simulate: case.Simulate) -> case.BreakPoint:
     """How many times as fast the die may spin and keep its energy."""
     parabola = MASS * GRAVITY * 0.5 * TIME_STEP * GRAVITY * DURATION  # J, of the step's own fall
 
     def keeps(times: float) -> bool:
         spin = np.array(SPIN) * times
         x, y, z = spin.tolist()
-        observe = {"e": MaximumAbsolute(quantity=Energy(), from_start=True)}
+        observe = {"e": engine.MaximumAbsolute(quantity=engine.Energy(), from_start=True)}
         asked = scene(spin=(x, y, z))
         result = simulate(asked, time_step=TIME_STEP, duration=DURATION, observe=observe)
         return abs(float(result["e"]) - parabola) < 1e-9 * 0.5 * float(moments() @ spin**2)
@@ -132,7 +113,7 @@ def needle(thickness: float) -> np.ndarray:
     return np.array((w * c - x * s, x * c + w * s, y * c + z * s, z * c - y * s))
 
 
-def thinnest(simulate: Simulate) -> BreakPoint:
+def thinnest(simulate: case.Simulate) -> case.BreakPoint:
     """The thinnest needle [m] that turns rightly."""
     return break_point(functools.partial(turns, simulate), SIZE[1], 1e-8, resolution=0.05, walk=6)
 
@@ -147,16 +128,16 @@ THIN = (
 )
 
 
-def turns(simulate: Simulate, thickness: float) -> bool:
+def turns(simulate: case.Simulate, thickness: float) -> bool:
     """Whether a needle of that thickness [m] has turned rightly."""
     asked = scene(size=(SIZE[0], thickness, thickness))
     result = simulate(asked, time_step=TIME_STEP, duration=DURATION)
     return result.completed and apart(result, needle(thickness)) < WRONG
 
 
-def measure(simulate: Simulate) -> dict[str, float]:
+def measure(simulate: case.Simulate) -> dict[str, float]:
     """One throw."""
-    observe = {"e": MaximumAbsolute(quantity=Energy(), from_start=True)}
+    observe = {"e": engine.MaximumAbsolute(quantity=engine.Energy(), from_start=True)}
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=observe)
     # The step's parabola: v − h g in every step, and its energy with half a step's fall in it
     parabola = MASS * GRAVITY * 0.5 * TIME_STEP * GRAVITY * DURATION
@@ -172,16 +153,16 @@ def height(q: np.ndarray) -> np.ndarray:
     return np.asarray(2.0 * (q[:, 1] * q[:, 3] - q[:, 0] * q[:, 2]))
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Where the die's long axis points."""
-    observe = {"q": Trace(quantity=Orientation("die"))}
+    observe = {"q": engine.Trace(quantity=engine.Orientation("die"))}
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=observe)
     q, times = result["q"], result.sample_times["q"]
     up = height(q)
     fine = np.linspace(0.0, DURATION, 151)
     curve, at_steps = height(exact(fine)), height(exact(times))
     off = float(np.max(np.abs(up - at_steps)))
-    return Drawing(
+    return case.Drawing(
         curves=(line("simulation", times, up, "points"), line("Euler's equations", fine, curve, "reference")),
         x_label="time [s]",
         y_label="height of the long axis' end [half lengths]",
@@ -191,7 +172,7 @@ def draw(simulate: Simulate) -> Drawing:
 
 EXACT = "Euler's equations are solved to rounding in every step, whatever the body spins"
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Thrown die",
     question="Does a die that is thrown tumble as Euler's equations have it?",
     why="Dice, bolts and gravel are small, and what is small spins fast: more than a radian in a step of 1/60 s. Engines that "
@@ -225,17 +206,19 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP, duration=DURATION),
-    figures=(Figure(name="axis", title="Where the long axis points", draw=draw),),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP, duration=DURATION),
+    figures=(case.Figure(name="axis", title="Where the long axis points", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="turn",
             description="angle by which it has turned wrongly after 0.6 s",
             unit="rad",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480)),
             configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=None),  # no step errs
-                Configuration(name="order4", method=Method(composition="order4"), expected_order=None),
+                case.Configuration(name="plain", method=engine.PLAIN, expected_order=None),  # no step errs
+                case.Configuration(
+                    name="order4", method=engine.Method(composition="order4"), expected_order=None
+                ),
             ),
             error=turn_error,
             target_error=1e-2,
@@ -243,7 +226,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="fastest",
             title="How many times as fast the die may spin at h = 1/60 s",
             configuration="plain",
@@ -253,7 +236,7 @@ TEST = ScalarTest(
             expected=(1e4, 1e4),
             expected_source="a turn has no limit; the search ends at 1e4, 18 600 radians a step",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="thinnest",
             title="Thinnest needle that turns as it must",
             configuration="plain",

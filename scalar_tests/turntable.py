@@ -8,29 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import (
-    Box,
-    Final,
-    Material,
-    Method,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-    Sphere,
-    Trace,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
@@ -51,49 +31,49 @@ FEW = 10  # steps, of the study of the longest
 # last step but one.
 LONGEST = math.sqrt((FRICTION * GRAVITY / CIRCLE / math.hypot(*PUSH)) ** (2.0 / (FEW - 2)) - 1.0) / CIRCLE
 
-ROUGH = Material(friction=FRICTION)
+ROUGH = engine.Material(friction=FRICTION)
 
 
-def table() -> RigidBody:
+def table() -> engine.RigidBody:
     """A level plane that turns about the z axis."""
-    return RigidBody(
+    return engine.RigidBody(
         name="table",
         motion="kinematic",
-        shape=Plane(),
+        shape=engine.Plane(),
         position=(0.0, 0.0, 0.0),
         angular_velocity=(0.0, 0.0, RATE),
         material=ROUGH,
     )
 
 
-def rolling() -> Scene:
+def rolling() -> engine.Scene:
     """A ball that rolls on the table without slip from the start: v + r n × w = Ω × x."""
     (x, y), (vx, vy) = START, PUSH
     slip = (-RATE * y - vx, RATE * x - vy)  # r n × w = r (−w_y, w_x)
-    ball = RigidBody(
+    ball = engine.RigidBody(
         name="ball",
         mass=MASS,
-        shape=Sphere(RADIUS),
+        shape=engine.Sphere(RADIUS),
         position=(x, y, RADIUS),
         velocity=(vx, vy, 0.0),
         angular_velocity=(slip[1] / RADIUS, -slip[0] / RADIUS, 0.0),
         material=ROUGH,
     )
-    return Scene(bodies=(table(), ball), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(table(), ball), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def riding(radius: float) -> Scene:
+def riding(radius: float) -> engine.Scene:
     """A box that moves with the table, so far from its axis."""
-    box = RigidBody(
+    box = engine.RigidBody(
         name="box",
         mass=1.0,
-        shape=Box(BOX),
+        shape=engine.Box(BOX),
         position=(radius, 0.0, 0.5 * BOX[2]),
         velocity=(0.0, RATE * radius, 0.0),
         angular_velocity=(0.0, 0.0, RATE),
         material=ROUGH,
     )
-    return Scene(bodies=(table(), box), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(table(), box), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def recursion(time_step: float, steps: int) -> Any:
@@ -113,9 +93,9 @@ def circle(time: Any) -> Any:
     return centre + (complex(*START) - centre) * np.exp(1j * CIRCLE * np.asarray(time))
 
 
-def roll(simulate: Simulate) -> dict[str, float]:
+def roll(simulate: case.Simulate) -> dict[str, float]:
     """One whole circle."""
-    observe = {"x": Trace(quantity=Position("ball"))}
+    observe = {"x": engine.Trace(quantity=engine.Position("ball"))}
     result = simulate(rolling(), time_step=TIME_STEP, steps=STEPS, observe=observe)
     places = result["x"][:, 0] + 1j * result["x"][:, 1]
     speeds = np.diff(places)
@@ -127,16 +107,16 @@ def roll(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Distance from the circle after 2 s [m]."""
-    observe = {"x": Final(quantity=Position("ball"))}
+    observe = {"x": engine.Final(quantity=engine.Position("ball"))}
     result = simulate(rolling(), time_step=time_step, duration=2.0, method=method, observe=observe)
     return abs(complex(result["x"][0], result["x"][1]) - complex(circle(2.0)))
 
 
-def stays(simulate: Simulate, radius: float) -> bool:
+def stays(simulate: case.Simulate, radius: float) -> bool:
     """Whether a box moves with the table for one step: what friction can bend its way by is h µ g."""
-    observe = {"x": Final(quantity=Position("box"))}
+    observe = {"x": engine.Final(quantity=engine.Position("box"))}
     result = simulate(riding(radius), time_step=TIME_STEP, steps=2, observe=observe)
     if not result.completed:
         return False
@@ -145,36 +125,36 @@ def stays(simulate: Simulate, radius: float) -> bool:
     return abs(place - carried) < 1e-3 * RATE**2 * radius * TIME_STEP**2
 
 
-def farthest(simulate: Simulate) -> BreakPoint:
+def farthest(simulate: case.Simulate) -> case.BreakPoint:
     """The largest radius at which boxes stay."""
     return break_point(lambda radius: stays(simulate, radius), 0.3 * THROWN, 3.0 * THROWN, resolution=1e-3)
 
 
-def follows(simulate: Simulate, time_step: float) -> bool:
+def follows(simulate: case.Simulate, time_step: float) -> bool:
     """Whether the ball's places are those of the recursion in so long steps [s]."""
-    observe = {"x": Trace(quantity=Position("ball"))}
+    observe = {"x": engine.Trace(quantity=engine.Position("ball"))}
     result = simulate(rolling(), time_step=time_step, steps=FEW, observe=observe)
     places = result["x"][:, 0] + 1j * result["x"][:, 1]
     return result.completed and float(np.abs(places - recursion(time_step, FEW)).max()) < 1e-6
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step in which the ball rolls."""
     return break_point(
         functools.partial(follows, simulate), TIME_STEP, 4.0 * LONGEST, resolution=1e-3, walk=6
     )
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """The ball's way over one circle, from above."""
-    observe = {"x": Trace(quantity=Position("ball"))}
+    observe = {"x": engine.Trace(quantity=engine.Position("ball"))}
     result = simulate(rolling(), time_step=TIME_STEP, steps=STEPS, observe=observe)
     exact = circle(result.sample_times["x"])
     places = result["x"][:, 0] + 1j * result["x"][:, 1]
     apart = float(np.abs(places - exact).max())
     ways = np.unwrap(np.angle(np.diff(places)))
     circled = float(ways[-1] - ways[0]) / math.tau * STEPS / (STEPS - 1)
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("ball", result["x"][:, 0], result["x"][:, 1]),
             line("circle", exact.real, exact.imag, "reference"),
@@ -188,7 +168,7 @@ def draw(simulate: Simulate) -> Drawing:
 
 SLOW = (CIRCLE * TIME_STEP) ** 2 / 3.0
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Turntable",
     question="Does a ball on a turntable circle at 2/7 of its rate, and does the table throw off what it must?",
     why="The ball's circle is a classic that no engine gets by chance: rolling, spin and a moving surface must all be "
@@ -238,9 +218,9 @@ TEST = ScalarTest(
             TIME_STEP,
         ),
     ),
-    example=lambda: Example(scene=rolling(), time_step=TIME_STEP, duration=TURN),
+    example=lambda: case.Example(scene=rolling(), time_step=TIME_STEP, duration=TURN),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="thrown",
             title="Largest radius at which a box rides along",
             configuration="plain",
@@ -250,7 +230,7 @@ TEST = ScalarTest(
             expected=(0.998 * THROWN, 1.002 * THROWN),
             expected_source="µ g/Ω² = 0.545 m, to the resolution of the search and of what counts as carried",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest step in which the ball rolls",
             configuration="plain",
@@ -262,9 +242,9 @@ TEST = ScalarTest(
             "to the resolution of the search",
         ),
     ),
-    figures=(Figure(name="circle", title="The ball's way from above", draw=draw),),
+    figures=(case.Figure(name="circle", title="The ball's way from above", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="place",
             description="distance from the circle after 2 s",
             unit="m",

@@ -7,35 +7,10 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import (
-    AngularVelocity,
-    Box,
-    ContactForce,
-    Cylinder,
-    Final,
-    Hinge,
-    Material,
-    Method,
-    Motor,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
@@ -68,24 +43,26 @@ HALF = math.sqrt(0.5)
 
 def scene(
     slope: float = 0.0, speed: float = 0.0, locked: bool = False, rise: float = RISE, torque: float = 0.0
-) -> Scene:
+) -> engine.Scene:
     """The vehicle on a plane, x ahead; gravity is tilted by atan(slope) ahead. `locked`: the brakes hold its wheels.
     `torque` [N m]: of each rear wheel's drive, which wants to turn faster than it ever will."""
-    rough = Material(friction=FRICTION, compliance=0.5 * COMPLIANCE)
-    road = RigidBody(name="road", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
-    chassis = RigidBody(
+    rough = engine.Material(friction=FRICTION, compliance=0.5 * COMPLIANCE)
+    road = engine.RigidBody(
+        name="road", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=rough
+    )
+    chassis = engine.RigidBody(
         name="chassis",
         mass=CHASSIS,
         inertia=(400.0, 1500.0, 1700.0),
-        shape=Box((3.6, 1.2, 0.5)),  # touches nothing
+        shape=engine.Box((3.6, 1.2, 0.5)),  # touches nothing
         position=(0.0, 0.0, RADIUS + rise),
         velocity=(speed, 0.0, 0.0),
     )
     wheels = [
-        RigidBody(
+        engine.RigidBody(
             name=name,
             mass=WHEEL,
-            shape=Cylinder(RADIUS, WIDTH),
+            shape=engine.Cylinder(RADIUS, WIDTH),
             position=(x, 0.5 * side * TRACK, RADIUS),
             orientation=(HALF, HALF, 0.0, 0.0),  # the axle along y
             velocity=(speed, 0.0, 0.0),
@@ -94,20 +71,20 @@ def scene(
         )
         for name, (x, side) in WHEELS.items()
     ]
-    drive = Motor(speed=1000.0, max_force=torque) if torque > 0.0 else None
+    drive = engine.Motor(speed=1000.0, max_force=torque) if torque > 0.0 else None
     axles = [
-        Hinge(
+        engine.Hinge(
             name=f"{name} axle",
             between=("chassis", name),
             axis=(0.0, 1.0, 0.0),
             compliance=0.0,
-            motor=Motor(speed=0.0) if locked else drive if name.startswith("rear") else None,
+            motor=engine.Motor(speed=0.0) if locked else drive if name.startswith("rear") else None,
         )
         for name in WHEELS
     ]
     tilt = math.atan(slope)
     sides = [(a, b) for a in WHEELS for b in WHEELS if a < b]
-    return Scene(
+    return engine.Scene(
         bodies=(road, chassis, *wheels),
         constraints=tuple(axles),
         gravity=(GRAVITY * math.sin(tilt), 0.0, -GRAVITY * math.cos(tilt)),
@@ -125,11 +102,11 @@ def front_load(ahead: float, down: float = GRAVITY, rise: float = RISE) -> float
     return (weights - ahead * (CHASSIS * (RADIUS + rise) + 4.0 * WHEEL * RADIUS)) / base
 
 
-def roll(simulate: Simulate) -> dict[str, float]:
+def roll(simulate: case.Simulate) -> dict[str, float]:
     """Free rolling down the slope."""
     observe = {
-        "v": Trace(quantity=Velocity("chassis")),
-        "w": Trace(quantity=AngularVelocity("front left")),
+        "v": engine.Trace(quantity=engine.Velocity("chassis")),
+        "w": engine.Trace(quantity=engine.AngularVelocity("front left")),
     }
     result = simulate(scene(SLOPE), time_step=TIME_STEP, duration=DURATION, observe=observe)
     exact = ROLLING * result.sample_times["v"]
@@ -140,17 +117,20 @@ def roll(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def brake(simulate: Simulate) -> dict[str, float]:
+def brake(simulate: case.Simulate) -> dict[str, float]:
     """Sliding on four locked wheels."""
-    observe: dict[str, Observable] = {"v": Trace(quantity=Velocity("chassis"))}
-    observe |= {name: Final(quantity=ContactForce(name, "road")) for name in WHEELS}
+    observe: dict[str, Observable] = {"v": engine.Trace(quantity=engine.Velocity("chassis"))}
+    observe |= {name: engine.Final(quantity=engine.ContactForce(name, "road")) for name in WHEELS}
     result = simulate(scene(0.0, SPEED, locked=True), time_step=TIME_STEP, duration=DURATION, observe=observe)
     exact = SPEED - BRAKING * result.sample_times["v"]
     stop = simulate(
         scene(0.0, STOPPED, locked=True),
         time_step=TIME_STEP,
         duration=DURATION,
-        observe={"x": Final(quantity=Position("chassis")), "v": Final(quantity=Velocity())},
+        observe={
+            "x": engine.Final(quantity=engine.Position("chassis")),
+            "v": engine.Final(quantity=engine.Velocity()),
+        },
     )
     front = float(result["front left"][2] + result["front right"][2])
     rear = float(result["rear left"][2] + result["rear right"][2])
@@ -169,9 +149,9 @@ def stopping(time_step: float) -> float:
     return time_step * float(np.maximum(0.0, STOPPED - BRAKING * time_step * steps).sum())
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Stopping way against v²/(2 µ g) [m]."""
-    observe = {"x": Final(quantity=Position("chassis"))}
+    observe = {"x": engine.Final(quantity=engine.Position("chassis"))}
     asked = scene(0.0, STOPPED, locked=True)
     result = simulate(asked, time_step=time_step, duration=DURATION, method=method, observe=observe)
     return float(result["x"][0]) - STOPPED**2 / (2.0 * BRAKING)
@@ -183,49 +163,52 @@ TIPPING = (
 ) / CHASSIS - RADIUS  # m
 
 
-def rolls(simulate: Simulate, time_step: float) -> bool:
+def rolls(simulate: case.Simulate, time_step: float) -> bool:
     """Whether the vehicle rolls down the slope by a t, to a millionth, after ten steps so long [s]."""
-    observe = {"v": Final(quantity=Velocity("chassis")), "w": Final(quantity=AngularVelocity("front left"))}
+    observe = {
+        "v": engine.Final(quantity=engine.Velocity("chassis")),
+        "w": engine.Final(quantity=engine.AngularVelocity("front left")),
+    }
     result = simulate(scene(SLOPE), time_step=time_step, steps=10, observe=observe)
     speed = 10.0 * time_step * ROLLING
     off = (float(result["v"][0]) / speed, RADIUS * float(result["w"][1]) / speed)
     return result.completed and max(abs(one - 1.0) for one in off) < 1e-6
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step [s] in which the vehicle rolls as it should."""
     return break_point(functools.partial(rolls, simulate), TIME_STEP, LONGEST, walk=5)
 
 
-def stays_down(simulate: Simulate, rise: float) -> bool:
+def stays_down(simulate: case.Simulate, rise: float) -> bool:
     """Whether the rear wheels stay on the road for a quarter of a second of braking."""
-    observe = {"x": Final(quantity=Position("rear left"))}
+    observe = {"x": engine.Final(quantity=engine.Position("rear left"))}
     asked = scene(0.0, SPEED, locked=True, rise=rise)
     result = simulate(asked, time_step=TIME_STEP, duration=0.25, observe=observe)
     return result.completed and float(result["x"][2]) < RADIUS + 1e-6
 
 
-def highest(simulate: Simulate) -> BreakPoint:
+def highest(simulate: case.Simulate) -> case.BreakPoint:
     """The highest centre of mass that brakes without tipping over."""
     return break_point(
         functools.partial(stays_down, simulate), 0.5 * TIPPING, 2.0 * TIPPING, resolution=0.002
     )
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Speed against time, rolling down and braking."""
     curves, apart = [], 0.0
     for name, asked, start, gain in (
         ("down the slope", scene(SLOPE), 0.0, ROLLING),
         ("brakes locked", scene(0.0, SPEED, locked=True), SPEED, -BRAKING),
     ):
-        observe = {"v": Trace(quantity=Velocity("chassis"))}
+        observe = {"v": engine.Trace(quantity=engine.Velocity("chassis"))}
         result = simulate(asked, time_step=TIME_STEP, duration=DURATION, observe=observe)
         time, along = result.sample_times["v"], result["v"][:, 0]
         exact = start + gain * time
         apart = max(apart, float(np.abs(along - exact).max()))
         curves += [line(name, time, along, "points"), line(f"{name}, closed form", time, exact, "reference")]
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="time [s]",
         y_label="speed [m/s]",
@@ -240,7 +223,7 @@ ROLLED = SINK / RADIUS * ROLLING * DURATION  # m/s
 STATICS = "moments about the rear footprints, with heights that sink by ε F = 0.19 µm"
 SETTLING = "the wheels sink by ε F = 0.19 µm in the first steps: by less than that in one"
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Vehicle",
     question="Does a vehicle on four wheels roll down a slope, brake and shift its weight as mechanics says?",
     why="Wheels, axles, contact and friction act at once: a slip of the wheel, a lost moment or a soft axle shows at once "
@@ -337,9 +320,9 @@ TEST = ScalarTest(
             "braking",
         ),
     ),
-    example=lambda: Example(scene=scene(SLOPE), time_step=TIME_STEP, duration=3.0),
+    example=lambda: case.Example(scene=scene(SLOPE), time_step=TIME_STEP, duration=3.0),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="tipping",
             title="Highest centre of mass that brakes without tipping over",
             configuration="plain",
@@ -350,7 +333,7 @@ TEST = ScalarTest(
             expected_source="the front wheels carry all at a rise of 1.577 m over the axles; a millionth of a metre is "
             "lifted in a quarter of a second by half a per cent more",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest step in which the vehicle rolls as it should",
             configuration="plain",
@@ -362,9 +345,9 @@ TEST = ScalarTest(
             "search ends at 10 s",
         ),
     ),
-    figures=(Figure(name="speed", title="Speed against time", draw=draw),),
+    figures=(case.Figure(name="speed", title="Speed against time", draw=draw),),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="stopping",
             description="stopping way from 5 m/s against v²/(2 µ g)",
             unit="m",

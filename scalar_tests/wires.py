@@ -7,39 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import (
-    WORLD,
-    ConstraintForce,
-    Energy,
-    Final,
-    Hinge,
-    MaximumAbsolute,
-    Method,
-    Momentum,
-    Particle,
-    Position,
-    Prismatic,
-    Relation,
-    RigidBody,
-    Scene,
-    Trace,
-    Velocity,
-    Violation,
-    Wire,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.closed_form import error
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.sweep import line, told
@@ -61,21 +32,21 @@ RATIOS = 1e12  # as far as the ratio of two weights is searched
 HELD = 1e-9  # to what their pull must be right
 
 
-def atwood(heavy: float = HEAVY, light: float = LIGHT) -> Scene:
+def atwood(heavy: float = HEAVY, light: float = LIGHT) -> engine.Scene:
     """Two weights on a wire over two eyes without friction."""
     ends = {"heavy": (-RADIUS, 0.0, -1.0), "light": (RADIUS, 0.0, -1.0)}
-    return Scene(
+    return engine.Scene(
         bodies=(
-            Particle(name="heavy", mass=heavy, position=ends["heavy"]),
-            Particle(name="light", mass=light, position=ends["light"]),
+            engine.Particle(name="heavy", mass=heavy, position=ends["heavy"]),
+            engine.Particle(name="light", mass=light, position=ends["light"]),
         ),
         constraints=(
-            Wire(
+            engine.Wire(
                 name="wire",
                 through=(
                     ("heavy", ends["heavy"]),
-                    (WORLD, (-RADIUS, 0.0, 9.0)),
-                    (WORLD, (RADIUS, 0.0, 9.0)),
+                    (engine.WORLD, (-RADIUS, 0.0, 9.0)),
+                    (engine.WORLD, (RADIUS, 0.0, 9.0)),
                     ("light", ends["light"]),
                 ),
                 compliance=0.0,
@@ -85,74 +56,90 @@ def atwood(heavy: float = HEAVY, light: float = LIGHT) -> Scene:
     )
 
 
-def drum() -> Scene:
+def drum() -> engine.Scene:
     """The same over a drum on which the wire does not slip: two racks on one pinion."""
     bodies = [
-        RigidBody(name=name, mass=mass, inertia=(1.0, 1.0, 1.0), position=(x, 0.0, -1.0))
+        engine.RigidBody(name=name, mass=mass, inertia=(1.0, 1.0, 1.0), position=(x, 0.0, -1.0))
         for name, mass, x in (("heavy", HEAVY, -RADIUS), ("light", LIGHT, RADIUS))
     ]
-    bodies.append(RigidBody(name="drum", mass=4.0, inertia=(DRUM, DRUM, DRUM), position=(0.0, 0.0, 0.0)))
+    bodies.append(
+        engine.RigidBody(name="drum", mass=4.0, inertia=(DRUM, DRUM, DRUM), position=(0.0, 0.0, 0.0))
+    )
     rails = [
-        Prismatic(name=f"{name} rail", between=(WORLD, name), axis=(0.0, 0.0, 1.0), compliance=0.0)
+        engine.Prismatic(
+            name=f"{name} rail", between=(engine.WORLD, name), axis=(0.0, 0.0, 1.0), compliance=0.0
+        )
         for name in ("heavy", "light")
     ]
-    axle = Hinge(name="axle", between=(WORLD, "drum"), axis=(0.0, 1.0, 0.0), compliance=0.0)
+    axle = engine.Hinge(name="axle", between=(engine.WORLD, "drum"), axis=(0.0, 1.0, 0.0), compliance=0.0)
     # A turn about y lifts what hangs at −x: z = r φ there, −r φ at +x.
     wound = [
-        Relation(name=f"{name} wire", terms=((f"{name} rail", 1.0), ("axle", side * RADIUS)), compliance=0.0)
+        engine.Relation(
+            name=f"{name} wire", terms=((f"{name} rail", 1.0), ("axle", side * RADIUS)), compliance=0.0
+        )
         for name, side in (("heavy", -1.0), ("light", 1.0))
     ]
-    return Scene(bodies=tuple(bodies), constraints=(*rails, axle, *wound), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(
+        bodies=tuple(bodies), constraints=(*rails, axle, *wound), gravity=(0.0, 0.0, -GRAVITY)
+    )
 
 
-def tackle(load: float, strands: int = 4) -> Scene:
+def tackle(load: float, strands: int = 4) -> engine.Scene:
     """A block of `load` [kg] on so many strands, one weight of 1 kg at the end of the wire: with an even number its other
     end is in the world, with an odd one at the block."""
     through: list[tuple[str, tuple[float, float, float]]] = []
     if strands % 2 == 1:
         through += [("block", (0.0, 0.0, 0.0))]
     for k in range(strands // 2):
-        through += [(WORLD, (0.0, 0.0, 3.0 + k)), ("block", (0.0, 0.0, 0.0))]
-    through += [(WORLD, (0.0, 0.0, 9.0)), (WORLD, (4.0, 0.0, 9.0)), ("weight", (4.0, 0.0, 0.0))]
-    return Scene(
+        through += [(engine.WORLD, (0.0, 0.0, 3.0 + k)), ("block", (0.0, 0.0, 0.0))]
+    through += [(engine.WORLD, (0.0, 0.0, 9.0)), (engine.WORLD, (4.0, 0.0, 9.0)), ("weight", (4.0, 0.0, 0.0))]
+    return engine.Scene(
         bodies=(
-            Particle(name="block", mass=load, position=(0.0, 0.0, 0.0)),
-            Particle(name="weight", mass=1.0, position=(4.0, 0.0, 0.0)),
+            engine.Particle(name="block", mass=load, position=(0.0, 0.0, 0.0)),
+            engine.Particle(name="weight", mass=1.0, position=(4.0, 0.0, 0.0)),
         ),
-        constraints=(Wire(name="wire", through=tuple(through), compliance=0.0),),
+        constraints=(engine.Wire(name="wire", through=tuple(through), compliance=0.0),),
         gravity=(0.0, 0.0, -GRAVITY),
     )
 
 
-def crane(load: float) -> Scene:
+def crane(load: float) -> engine.Scene:
     """A block in two strands of a wire, balanced by a weight at its end, with a load [kg] on a sling; the block is nudged."""
     block = (ASIDE, 0.0, 0.0)
     top, side = (0.0, 0.0, STRAND), (STRAND, 0.0, STRAND)
-    strands = ((WORLD, top), ("block", block), (WORLD, top), (WORLD, side), ("weight", (STRAND, 0.0, 0.0)))
-    return Scene(
+    strands = (
+        (engine.WORLD, top),
+        ("block", block),
+        (engine.WORLD, top),
+        (engine.WORLD, side),
+        ("weight", (STRAND, 0.0, 0.0)),
+    )
+    return engine.Scene(
         bodies=(
-            Particle(name="block", mass=BLOCK, position=block),
-            Particle(name="load", mass=load, position=(0.0, 0.0, -SLING)),
-            Particle(name="weight", mass=0.5 * (BLOCK + load), position=(STRAND, 0.0, 0.0)),
+            engine.Particle(name="block", mass=BLOCK, position=block),
+            engine.Particle(name="load", mass=load, position=(0.0, 0.0, -SLING)),
+            engine.Particle(name="weight", mass=0.5 * (BLOCK + load), position=(STRAND, 0.0, 0.0)),
         ),
         constraints=(
-            Wire(name="wire", through=strands, compliance=0.0),
-            Wire(name="sling", through=(("block", block), ("load", (0.0, 0.0, -SLING))), compliance=0.0),
+            engine.Wire(name="wire", through=strands, compliance=0.0),
+            engine.Wire(
+                name="sling", through=(("block", block), ("load", (0.0, 0.0, -SLING))), compliance=0.0
+            ),
         ),
         gravity=(0.0, 0.0, -GRAVITY),
     )
 
 
-def tow(restitution: float = 0.0) -> Scene:
+def tow(restitution: float = 0.0) -> engine.Scene:
     """A stone at rest, and a puller that runs away from it on a rope with slack."""
     ends = {"stone": (0.0, 0.0, 0.0), "puller": (1.0, 0.0, 0.0)}
-    return Scene(
+    return engine.Scene(
         bodies=(
-            Particle(name="stone", mass=STONE, position=ends["stone"]),
-            Particle(name="puller", mass=PULLER, position=ends["puller"], velocity=(FAST, 0.0, 0.0)),
+            engine.Particle(name="stone", mass=STONE, position=ends["stone"]),
+            engine.Particle(name="puller", mass=PULLER, position=ends["puller"], velocity=(FAST, 0.0, 0.0)),
         ),
         constraints=(
-            Wire(
+            engine.Wire(
                 name="rope",
                 through=(("stone", ends["stone"]), ("puller", ends["puller"])),
                 length=1.0 + SLACK,
@@ -163,13 +150,13 @@ def tow(restitution: float = 0.0) -> Scene:
     )
 
 
-def fall(simulate: Simulate) -> dict[str, float]:
+def fall(simulate: case.Simulate) -> dict[str, float]:
     """Speeds after two seconds, the wire's pull, and the tackle."""
-    speed: dict[str, Observable] = {"v": Final(quantity=Velocity("heavy"))}
-    pull: dict[str, Observable] = {"pull": Final(quantity=ConstraintForce("wire"))}
+    speed: dict[str, Observable] = {"v": engine.Final(quantity=engine.Velocity("heavy"))}
+    pull: dict[str, Observable] = {"pull": engine.Final(quantity=engine.ConstraintForce("wire"))}
     wire = simulate(atwood(), time_step=TIME_STEP, duration=1.0, observe=speed | pull)
     wound = simulate(drum(), time_step=TIME_STEP, duration=DURATION, observe=speed)
-    still: dict[str, Observable] = {"v": MaximumAbsolute(quantity=Velocity())}
+    still: dict[str, Observable] = {"v": engine.MaximumAbsolute(quantity=engine.Velocity())}
     worst = {"tackle_motion": 0.0, "tackle_pull": 0.0, "tackle_error": 0.0}
     for n in STRANDS:
         held = simulate(tackle(float(n), n), time_step=TIME_STEP, duration=1.0, observe=still | pull)
@@ -177,7 +164,7 @@ def fall(simulate: Simulate) -> dict[str, float]:
             tackle(2.0 * n, n),
             time_step=TIME_STEP,
             duration=0.5,
-            observe={"v": Final(quantity=Velocity("block"))},
+            observe={"v": engine.Final(quantity=engine.Velocity("block"))},
         )
         sinks = (2.0 * n - n) * GRAVITY / (2.0 * n + n**2)
         for name, value in (
@@ -193,13 +180,13 @@ def fall(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def snap(simulate: Simulate) -> dict[str, float]:
+def snap(simulate: case.Simulate) -> dict[str, float]:
     """What the rope leaves of speed and energy, plastic and with restitution ½, and how it gets there."""
     observe = {
-        "v": Trace(quantity=Velocity()),
-        "p": Trace(quantity=Momentum()),
-        "E": Trace(quantity=Energy()),
-        "long": MaximumAbsolute(quantity=Violation("rope")),
+        "v": engine.Trace(quantity=engine.Velocity()),
+        "p": engine.Trace(quantity=engine.Momentum()),
+        "E": engine.Trace(quantity=engine.Energy()),
+        "long": engine.MaximumAbsolute(quantity=engine.Violation("rope")),
     }
     reduced = STONE * PULLER / (STONE + PULLER)
     worst = {"speed_error": 0.0, "momentum_error": 0.0, "loss_error": 0.0, "gain": 0.0}
@@ -224,22 +211,22 @@ def heaviest_load() -> float:
     return BLOCK * (square - strand) * (square - sling) / (square * (strand + sling) - strand * sling)
 
 
-def heaviest(simulate: Simulate) -> BreakPoint:
+def heaviest(simulate: case.Simulate) -> case.BreakPoint:
     """The heaviest load under a light block that hangs still."""
 
     def hangs(load: float) -> bool:
-        observe = {"x": MaximumAbsolute(quantity=Position("block"), from_start=True)}
+        observe = {"x": engine.MaximumAbsolute(quantity=engine.Position("block"), from_start=True)}
         result = simulate(crane(load), time_step=TIME_STEP, steps=SWAYS, observe=observe)
         return result.completed and float(result["x"][0]) < 100.0 * ASIDE
 
     return break_point(hangs, 0.1 * heaviest_load(), 3.0 * heaviest_load(), resolution=SEARCHED)
 
 
-def most_uneven(simulate: Simulate) -> BreakPoint:
+def most_uneven(simulate: case.Simulate) -> case.BreakPoint:
     """The largest ratio of two weights whose wire pulls as it must, half a second long."""
     observe: dict[str, Observable] = {
-        "v": Final(quantity=Velocity("heavy")),
-        "pull": Final(quantity=ConstraintForce("wire")),
+        "v": engine.Final(quantity=engine.Velocity("heavy")),
+        "pull": engine.Final(quantity=engine.ConstraintForce("wire")),
     }
 
     def pulls(ratio: float) -> bool:
@@ -254,18 +241,18 @@ def most_uneven(simulate: Simulate) -> BreakPoint:
     return break_point(pulls, 10.0, RATIOS, walk=12)
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Place of the drum's heavy weight after a second against ½ a t² [m]."""
-    from_start = {"z": Trace(quantity=Velocity("heavy"))}
+    from_start = {"z": engine.Trace(quantity=engine.Velocity("heavy"))}
     result = simulate(drum(), time_step=time_step, duration=1.0, method=method, observe=from_start)
     return -time_step * math.fsum(result["z"][1:, 2]) - 0.5 * TURNING
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Speeds of stone and puller."""
     curves, ends = [], []
     for restitution in (0.0, 0.5):
-        observe = {"v": Trace(quantity=Velocity())}
+        observe = {"v": engine.Trace(quantity=engine.Velocity())}
         result = simulate(tow(restitution), time_step=TIME_STEP, duration=0.5, observe=observe)
         for k, name in enumerate(("stone", "puller")):
             ends.append(float(result["v"][-1, k, 0]))
@@ -274,7 +261,7 @@ def draw(simulate: Simulate) -> Drawing:
             )
     together: Any = PULLER * FAST / (STONE + PULLER)
     curves.append(line("m v/(m + M)", (0.0, 0.5), (together, together), "reference"))
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="time [s]",
         y_label="speed [m/s]",
@@ -285,7 +272,7 @@ def draw(simulate: Simulate) -> Drawing:
 
 STEADY = "a steady force is exact in the velocities of the discrete step; rounding remains"
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Wires and ropes",
     question="Do wires over pulleys share their loads, and does a rope that snaps taut give the right blow?",
     why="Cranes, lifts and winches hang on wires that only pull. A wire that pushes, loses load at a pulley or throws "
@@ -313,7 +300,7 @@ TEST = ScalarTest(
     "is no blow.",
     source="ours; wires are asked for in the thesis, section 5.4",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
@@ -343,7 +330,7 @@ TEST = ScalarTest(
             measure=fall,
             note="Atwood's machine and a tackle",
         ),
-        Measurement(
+        case.Measurement(
             configuration="snap",
             time_step=TIME_STEP,
             metrics=(
@@ -383,10 +370,10 @@ TEST = ScalarTest(
             note="a slack rope, e = 0 and ½",
         ),
     ),
-    example=lambda: Example(scene=atwood(), time_step=TIME_STEP, duration=1.0),
-    figures=(Figure(name="snap", title="A rope snaps taut", draw=draw),),
+    example=lambda: case.Example(scene=atwood(), time_step=TIME_STEP, duration=1.0),
+    figures=(case.Figure(name="snap", title="A rope snaps taut", draw=draw),),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="heaviest-load",
             title="Heaviest load under a block of 1 kg that hangs still at 1/60 s",
             configuration="plain",
@@ -397,7 +384,7 @@ TEST = ScalarTest(
             expected=((1.0 - 1.1 * SEARCHED) * heaviest_load(), heaviest_load()),
             expected_source="h ω = 2 of the faster sway of block and load; the search ends 0.2 % short of it at most",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="mass-ratio",
             title="Largest ratio of two weights whose wire pulls as it must",
             configuration="plain",
@@ -410,7 +397,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="fall",
             description="sum of the heavy weight's velocities in 1 s over the drum against ½ a t²",
             unit="m",

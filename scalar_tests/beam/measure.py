@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from spook_tracker.engine import MaximumAbsolute, Method, Position, Trace
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.beam.scene import (
     COUNT,
     SAG_COMPLIANCE,
@@ -15,37 +16,36 @@ from spook_tracker.scalar_tests.beam.scene import (
     sag_of_compliant_beam,
     scene,
 )
-from spook_tracker.scalar_tests.case import Drawing, Simulate
 from spook_tracker.scalar_tests.sweep import line, told
 
 LADDER_COUNT = 20
 HIDDEN = 2.3e-15  # m/N in every lock row: sags by the printed limit
 
 
-def _measure_gate(simulate: Simulate) -> dict[str, float]:
+def _measure_gate(simulate: case.Simulate) -> dict[str, float]:
     return {"height_deviation": deviation(simulate)}
 
 
-def _measure_long(simulate: Simulate) -> dict[str, float]:
+def _measure_long(simulate: case.Simulate) -> dict[str, float]:
     return {"height_deviation": deviation(simulate, count=2000)}
 
 
-def _measure_sag(simulate: Simulate) -> dict[str, float]:
+def _measure_sag(simulate: case.Simulate) -> dict[str, float]:
     each = heights(simulate, compliance=SAG_COMPLIANCE)
     return {"sag": float(-each.min()), "sag_error": float(-each.min()) / sag_of_compliant_beam() - 1.0}
 
 
 def _measure_support(support: str) -> object:
-    def measure(simulate: Simulate) -> dict[str, float]:
+    def measure(simulate: case.Simulate) -> dict[str, float]:
         return {"height_deviation": deviation(simulate, support=support)}
 
     return measure
 
 
-def draw_against_time_step(simulate: Simulate) -> Drawing:
+def draw_against_time_step(simulate: case.Simulate) -> case.Drawing:
     steps = tuple(float(h) for h in np.geomspace(1e-4, 1e-1, 13))
     values = tuple(deviation(simulate, time_step=h) for h in steps)
-    return Drawing(
+    return case.Drawing(
         curves=(line("80 boxes", steps, values, "both"),),
         x_label="time step [s]",
         y_label="largest height deviation over length [%]",
@@ -55,18 +55,18 @@ def draw_against_time_step(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_against_time(simulate: Simulate) -> Drawing:
+def draw_against_time(simulate: case.Simulate) -> case.Drawing:
     step = 9.8e-5
     result = simulate(
         scene(time_step=step),
         time_step=step,
         steps=STEPS,
-        observe={"height": Trace(quantity=Position(), every=5, from_start=True)},
+        observe={"height": engine.Trace(quantity=engine.Position(), every=5, from_start=True)},
     )
     drops = result["height"][:, :COUNT, 2]
     lowest = 100.0 * drops.min(axis=1) / (COUNT * SIZE[0])
     times = tuple(float(t) for t in result.sample_times["height"])
-    return Drawing(
+    return case.Drawing(
         curves=(line("80 boxes, h = 9.8e-5 s", times, lowest),),
         x_label="time [s]",
         y_label="lowest height deviation over length [%]",
@@ -74,12 +74,12 @@ def draw_against_time(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_along_the_beam(simulate: Simulate) -> Drawing:
+def draw_along_the_beam(simulate: case.Simulate) -> case.Drawing:
     rigid = heights(simulate)
     soft = heights(simulate, compliance=HIDDEN)
     bent = 100.0 * float(np.abs(soft).max()) / (COUNT * SIZE[0])
     boxes = tuple(float(i + 1) for i in range(COUNT))
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("compliance 0", boxes, 1e6 * rigid, "both"),
             line("compliance 2.3e-15", boxes, 1e6 * soft),
@@ -91,11 +91,11 @@ def draw_along_the_beam(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_against_count(simulate: Simulate) -> Drawing:
+def draw_against_count(simulate: case.Simulate) -> case.Drawing:
     counts = (10, 20, 40, 60, 80, 100, 150, 200)
     values = tuple(deviation(simulate, count=count) for count in counts)
     hidden = tuple(-100.0 * sag_of_compliant_beam(n, HIDDEN) / (n * SIZE[0]) for n in counts)
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("compliance 0", counts, values, "both"),
             line("statics with compliance 2.3e-15", counts, hidden, "reference"),
@@ -108,9 +108,9 @@ def draw_against_count(simulate: Simulate) -> Drawing:
     )
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest height deviation of LADDER_COUNT boxes over 2 s, of their length [%]."""
     built = scene(LADDER_COUNT, time_step=time_step)
-    observe = {"place": MaximumAbsolute(quantity=Position(), from_start=True)}
+    observe = {"place": engine.MaximumAbsolute(quantity=engine.Position(), from_start=True)}
     result = simulate(built, time_step=time_step, duration=2.0, method=method, observe=observe)
     return 100.0 * float(result["place"][:LADDER_COUNT, 2].max()) / (LADDER_COUNT * SIZE[0])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.beam.measure import (
     _measure_gate,
     _measure_long,
@@ -10,16 +11,15 @@ from spook_tracker.scalar_tests.beam.measure import (
     ladder_error,
 )
 from spook_tracker.scalar_tests.beam.scene import COUNT, SAG, TIME_STEP
-from spook_tracker.scalar_tests.case import Ladder, LimitKind, Measurement, Metric
 from spook_tracker.scalar_tests.configurations import configured
 
 WOULD_CATCH = "thesis, section 4.2; it would catch a hidden compliance of 2.3e-15 in the locks"
 
 
 def _deviation_metric(
-    role: str, limit: float | None, source: str, set_point: float, kind: LimitKind = "physical"
-) -> Metric:
-    return Metric(
+    role: str, limit: float | None, source: str, set_point: float, kind: case.LimitKind = "physical"
+) -> case.Metric:
+    return case.Metric(
         name="height_deviation",
         description="largest height deviation of a box over the beam's length, last 50 of 1000 steps",
         unit="%",
@@ -35,7 +35,7 @@ def _deviation_metric(
 
 
 MEASUREMENTS = (
-    Measurement(
+    case.Measurement(
         configuration="plain",
         time_step=TIME_STEP,
         parameters={"N": COUNT},
@@ -43,7 +43,7 @@ MEASUREMENTS = (
         measure=_measure_gate,
         note="Plain SPOOK, direct solver; one contact under the centre of each end box.",
     ),
-    Measurement(
+    case.Measurement(
         configuration="plain",
         time_step=TIME_STEP,
         parameters={"N": 2000},
@@ -51,19 +51,19 @@ MEASUREMENTS = (
         measure=_measure_long,
         note="A beam of 250 m, 25 times the thesis' length.",
     ),
-    Measurement(
+    case.Measurement(
         configuration="compliant",
         time_step=TIME_STEP,
         parameters={"N": COUNT},
         metrics=(
-            Metric(
+            case.Metric(
                 name="sag",
                 description="deepest sag with compliance 1e-12 in every lock row",
                 unit="m",
                 role="reported",
                 reference=SAG,
             ),
-            Metric(
+            case.Metric(
                 name="sag_error",
                 description="sag over the closed form, minus one: the beam must bend exactly as much as asked",
                 unit="1",
@@ -78,7 +78,7 @@ MEASUREMENTS = (
         note="Compliance 1e-12: proves that the gate is not green because nothing can bend.",
     ),
     *(
-        Measurement(
+        case.Measurement(
             configuration=support,
             time_step=TIME_STEP,
             parameters={"N": COUNT},
@@ -94,7 +94,7 @@ MEASUREMENTS = (
 )
 
 LADDERS = (
-    Ladder(
+    case.Ladder(
         name="height",
         description="largest height deviation of 20 boxes over 2 s, of their length",
         unit="%",

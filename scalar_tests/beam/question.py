@@ -7,6 +7,7 @@ iteration stopped early) shows here first: the deflection grows with the fourth 
 
 from __future__ import annotations
 
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.beam.measure import (
     draw_against_count,
     draw_against_time,
@@ -16,9 +17,8 @@ from spook_tracker.scalar_tests.beam.measure import (
 from spook_tracker.scalar_tests.beam.metrics import LADDERS, MEASUREMENTS
 from spook_tracker.scalar_tests.beam.scene import TIME_STEP, scene
 from spook_tracker.scalar_tests.beam.stability import STUDIES
-from spook_tracker.scalar_tests.case import Example, Figure, ScalarTest
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Beam on two piles",
     question="Do lock joints hold a beam of 80 boxes on two piles?",
     why=(
@@ -55,27 +55,27 @@ TEST = ScalarTest(
         "likely misprint.",
     ),
     measurements=MEASUREMENTS,
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP),
     figures=(
-        Figure(
+        case.Figure(
             name="deviation-against-time-step",
             title="Largest height deviation against the time step",
             draw=draw_against_time_step,
             thesis="Fig 3.2",
         ),
-        Figure(
+        case.Figure(
             name="deviation-against-time",
             title="Height deviation against time at h = 9.8e-5 s",
             draw=draw_against_time,
             thesis="Fig 3.3",
         ),
-        Figure(
+        case.Figure(
             name="deviation-along-the-beam",
             title="Height deviation along the beam",
             draw=draw_along_the_beam,
             thesis="Fig 3.4",
         ),
-        Figure(
+        case.Figure(
             name="deviation-against-length",
             title="Largest height deviation against the number of boxes",
             draw=draw_against_count,

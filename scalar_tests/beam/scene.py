@@ -6,19 +6,8 @@ import itertools
 
 import numpy as np
 
-from spook_tracker.engine import (
-    Box,
-    Capsule,
-    Lock,
-    Material,
-    Maximum,
-    Minimum,
-    Position,
-    RigidBody,
-    Scene,
-    Sphere,
-)
-from spook_tracker.scalar_tests.case import Simulate
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 
 SIZE = (0.125, 0.1, 0.1)  # m, one box
 MASS = 2.5  # kg, one box
@@ -32,18 +21,22 @@ SAG_COMPLIANCE = 1e-12  # m/N and rad/(N m)
 SAG = 2.134e-7  # m, for 80 boxes with SAG_COMPLIANCE in every lock row; see `sag_of_compliant_beam`
 
 
-def _pile(name: str, x: float, support: str) -> RigidBody:
+def _pile(name: str, x: float, support: str) -> engine.RigidBody:
     """A fixed pile whose top touches the beam's underside at z = 0: in a point, along an edge, or flat."""
     if support == "corners":
         size = (SIZE[0], SIZE[1], 2.0 * PILE_RADIUS)
-        return RigidBody(name=name, motion="static", shape=Box(size), position=(x, 0.0, -PILE_RADIUS))
+        return engine.RigidBody(
+            name=name, motion="static", shape=engine.Box(size), position=(x, 0.0, -PILE_RADIUS)
+        )
     if support == "edge":
         along_y = (np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0)  # the capsule's own axis is z
-        shape = Capsule(PILE_RADIUS, 0.5 * SIZE[1])
-        return RigidBody(
+        shape = engine.Capsule(PILE_RADIUS, 0.5 * SIZE[1])
+        return engine.RigidBody(
             name=name, motion="static", shape=shape, position=(x, 0.0, -PILE_RADIUS), orientation=along_y
         )
-    return RigidBody(name=name, motion="static", shape=Sphere(PILE_RADIUS), position=(x, 0.0, -PILE_RADIUS))
+    return engine.RigidBody(
+        name=name, motion="static", shape=engine.Sphere(PILE_RADIUS), position=(x, 0.0, -PILE_RADIUS)
+    )
 
 
 def scene(
@@ -54,18 +47,18 @@ def scene(
     damping: float | None = None,
     support: str = "centre",
     push: float = 0.0,
-) -> Scene:
+) -> engine.Scene:
     """`count` boxes in a row along x, locked to each other, on piles under the centres of the end boxes.
 
     The locks' damping [s] is two time steps unless given. `push` is the middle box's speed upwards [m/s]; a
     pushed beam's boxes do not touch each other, so that only its locks and piles act.
     """
-    smooth = Material(friction=0.0)
+    smooth = engine.Material(friction=0.0)
     boxes = [
-        RigidBody(
+        engine.RigidBody(
             name=f"box {i + 1}",
             mass=MASS,
-            shape=Box(SIZE),
+            shape=engine.Box(SIZE),
             position=((i + 0.5) * SIZE[0], 0.0, 0.5 * SIZE[2]),
             velocity=(0.0, 0.0, push if i == count // 2 else 0.0),
             material=smooth,
@@ -73,7 +66,7 @@ def scene(
         for i in range(count)
     ]
     locks = [
-        Lock(
+        engine.Lock(
             name=f"lock {i + 1}",
             between=(boxes[i].name, boxes[i + 1].name),
             at=((i + 1) * SIZE[0], 0.0, 0.5 * SIZE[2]),
@@ -87,7 +80,7 @@ def scene(
         _pile("right pile", boxes[-1].position[0], support),
     ]
     names = [box.name for box in boxes] if push else []
-    return Scene(
+    return engine.Scene(
         bodies=(*boxes, *piles),
         constraints=tuple(locks),
         gravity=(0.0, 0.0, -GRAVITY),
@@ -96,7 +89,7 @@ def scene(
 
 
 def heights(
-    simulate: Simulate,
+    simulate: case.Simulate,
     count: int = COUNT,
     time_step: float = TIME_STEP,
     *,
@@ -107,8 +100,8 @@ def heights(
     first = STEPS - WINDOW + 1
     built = scene(count, time_step=time_step, compliance=compliance, support=support)
     observe = {
-        "highest": Maximum(quantity=Position(), first=first, from_start=True),
-        "lowest": Minimum(quantity=Position(), first=first, from_start=True),
+        "highest": engine.Maximum(quantity=engine.Position(), first=first, from_start=True),
+        "lowest": engine.Minimum(quantity=engine.Position(), first=first, from_start=True),
     }
     result = simulate(built, time_step=time_step, steps=STEPS, observe=observe)
     highest, lowest = result["highest"][:count, 2], result["lowest"][:count, 2]
@@ -116,7 +109,7 @@ def heights(
 
 
 def deviation(
-    simulate: Simulate, count: int = COUNT, time_step: float = TIME_STEP, *, support: str = "centre"
+    simulate: case.Simulate, count: int = COUNT, time_step: float = TIME_STEP, *, support: str = "centre"
 ) -> float:
     """Deepest height deviation over the beam's length [%], signed: negative hangs."""
     each = heights(simulate, count, time_step, support=support)

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import Position, Result, Trace
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.theory import one_row_matrix
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.beam.scene import COUNT, MASS, SIZE, TIME_STEP, sag_of_compliant_beam, scene
 from spook_tracker.scalar_tests.bracket import break_count, break_point, cell, table
-from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
 from spook_tracker.scalar_tests.oscillator.scene import growth
 
 COUNTS = (10, 20, 40, 80, 160, 320, 640, 1000)
@@ -22,7 +22,7 @@ LIMIT = 1e-12  # % of the length, our set point
 AT_REST = 1e-9  # of the length
 RELATIVE_DAMPINGS = (0.0, 1e-3, 1e-2, 0.1, 0.5, 1.0, 2.0, 5.0, 10.0)  # τ/h
 COMPLIANCES = (0.0, 1e-12, 1e-10, 1e-8, 1e-6, 1e-5)  # m/N and rad/(N m)
-OBSERVE: dict[str, Observable] = {"place": Trace(quantity=Position(), from_start=True)}
+OBSERVE: dict[str, Observable] = {"place": engine.Trace(quantity=engine.Position(), from_start=True)}
 RIGID = f"{STEPS} steps from rest without any box off by more than 1e-12 % of the beam's length, locks of compliance 0"
 PUSHED = f"the middle box starts upwards at {PUSH:g} m/s; "
 RESTS = PUSHED + f"in the last third of {STEPS} steps no box is off by more than 1e-9 of the length"
@@ -33,14 +33,14 @@ HOLDS = PUSHED + (
 
 
 def _run(
-    simulate: Simulate,
+    simulate: case.Simulate,
     count: int,
     time_step: float,
     *,
     relative_damping: float = 2.0,
     compliance: float = 0.0,
     push: float = PUSH,
-) -> tuple[Result, Any]:
+) -> tuple[engine.Result, Any]:
     """The run and the largest |height deviation| over the length at every sample."""
     built = scene(
         count, time_step=time_step, compliance=compliance, damping=relative_damping * time_step, push=push
@@ -49,12 +49,12 @@ def _run(
     return result, np.abs(result.partial["place"][:, :count, 2]).max(axis=1) / (count * SIZE[0])
 
 
-def _rests(simulate: Simulate, time_step: float, relative_damping: float = 2.0) -> bool:
+def _rests(simulate: case.Simulate, time_step: float, relative_damping: float = 2.0) -> bool:
     result, height = _run(simulate, COUNT, time_step, relative_damping=relative_damping)
     return result.completed and bool(height[-STEPS // 3 :].max() <= AT_REST)
 
 
-def longest_beam(simulate: Simulate) -> BreakPoint:
+def longest_beam(simulate: case.Simulate) -> case.BreakPoint:
     """Most boxes that lie still to rounding."""
 
     def holds(count: int) -> bool:
@@ -64,17 +64,17 @@ def longest_beam(simulate: Simulate) -> BreakPoint:
     return break_count(holds, COUNTS)
 
 
-def largest_step(simulate: Simulate) -> BreakPoint:
+def largest_step(simulate: case.Simulate) -> case.BreakPoint:
     """Largest time step [s] with which 80 pushed boxes come to rest."""
     return break_point(lambda h: _rests(simulate, h), 1e-3, 4.0, resolution=0.1, walk=7)
 
 
-def smallest_damping(simulate: Simulate) -> BreakPoint:
+def smallest_damping(simulate: case.Simulate) -> case.BreakPoint:
     """Smallest τ/h with which 80 pushed boxes come to rest."""
     return break_point(lambda theta: _rests(simulate, TIME_STEP, theta), 2.0, 1e-3, resolution=0.05, walk=6)
 
 
-def damping_map(simulate: Simulate) -> StabilityMap:
+def damping_map(simulate: case.Simulate) -> case.StabilityMap:
     """(τ/h, compliance) for 20 boxes at h = 1/60 s beside the eigenvalue of one box on one lock row."""
 
     def kind(theta: float, compliance: float) -> str:
@@ -85,7 +85,7 @@ def damping_map(simulate: Simulate) -> StabilityMap:
     def eigenvalue(theta: float, compliance: float) -> float:
         return growth(one_row_matrix(MASS, compliance, theta * TIME_STEP, TIME_STEP))
 
-    return StabilityMap(
+    return case.StabilityMap(
         x=RELATIVE_DAMPINGS,
         y=COMPLIANCES,
         cells=table(COMPLIANCES, RELATIVE_DAMPINGS, kind),
@@ -98,7 +98,7 @@ def damping_map(simulate: Simulate) -> StabilityMap:
 
 
 STUDIES = (
-    StabilityStudy(
+    case.StabilityStudy(
         name="longest-beam",
         title="Longest beam that lies still to rounding",
         configuration="plain",
@@ -108,7 +108,7 @@ STUDIES = (
         expected=(1000.0, 1000.0),
         expected_source="LDLᵀ of the saddle form stays at one unit in the last place to 2000 boxes; ends at 1000",
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="largest-time-step",
         title="Largest time step with which 80 pushed boxes come to rest",
         configuration="plain",
@@ -117,7 +117,7 @@ STUDIES = (
         unit="s",
         expected_source="none: at τ = 2 h the map of a lock row has the double eigenvalue 1/3 for every time step, so the locks set no limit; what ends it are the one-sided contacts on the piles, which the linear map does not hold",
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="smallest-damping",
         title="Smallest τ/h with which 80 pushed boxes come to rest",
         configuration="plain",
@@ -128,7 +128,7 @@ STUDIES = (
         expected=(0.0204, 0.0225),
         expected_source="the pushed box follows the powers of the map of one rigid row, |λ| = 1/√(1 + 4θ): at 1e-9 of the length after 200 steps for θ = 0.0208, found to 5 %",
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="damping-compliance-map",
         title="Damping and compliance, 20 boxes",
         configuration="plain",

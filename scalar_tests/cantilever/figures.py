@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.cantilever.measure import settled_nodes
 from spook_tracker.scalar_tests.cantilever.scene import COUNT, COUNTS, LENGTH, LOAD, SMALL, deflection
-from spook_tracker.scalar_tests.case import Curve, Drawing, Simulate
 from spook_tracker.scalar_tests.sweep import apart, line, told
 
 
-def draw_shape(simulate: Simulate) -> Drawing:
+def draw_shape(simulate: case.Simulate) -> case.Drawing:
     x = (np.arange(COUNT) + 0.5) * LENGTH / COUNT
     nodes = settled_nodes(simulate, COUNT, LOAD)
     places = tuple(map(float, x))
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulation", places, -nodes, "points"),
             line("P x² (3l − x)/(6EI)", places, -deflection(x), "reference"),
@@ -25,10 +25,10 @@ def draw_shape(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_difference(simulate: Simulate) -> Drawing:
+def draw_difference(simulate: case.Simulate) -> case.Drawing:
     x = (np.arange(COUNT) + 0.5) * LENGTH / COUNT
     nodes = settled_nodes(simulate, COUNT, LOAD)
-    return Drawing(
+    return case.Drawing(
         curves=(line("simulation − formula", x, deflection(x) - nodes, "both"),),
         x_label="position on the beam [m]",
         y_label="difference in height [m]",
@@ -36,14 +36,16 @@ def draw_difference(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_against_count(simulate: Simulate) -> Drawing:
+def draw_against_count(simulate: case.Simulate) -> case.Drawing:
     errors = []
     for count in COUNTS:
         x = (np.arange(count) + 0.5) * LENGTH / count
         right = deflection(x, SMALL * LOAD)
         errors.append(float(np.abs(settled_nodes(simulate, count, SMALL * LOAD) / right - 1.0).max()))
-    return Drawing(
-        curves=(Curve(name="largest relative node error", x=tuple(map(float, COUNTS)), y=tuple(errors)),),
+    return case.Drawing(
+        curves=(
+            case.Curve(name="largest relative node error", x=tuple(map(float, COUNTS)), y=tuple(errors)),
+        ),
         x_label="elements",
         y_label="largest relative error of a node",
         x_scale="log",

@@ -6,7 +6,8 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import Final, Method, Orientation, Position, Trace, Velocity
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.cantilever.scene import (
     COUNT,
     COUNTS,
@@ -23,26 +24,25 @@ from spook_tracker.scalar_tests.cantilever.scene import (
     scene,
 )
 from spook_tracker.scalar_tests.cantilever.statics import chain_tip, elastica_tip
-from spook_tracker.scalar_tests.case import Simulate
 
 
-def settled_nodes(simulate: Simulate, count: int, load: float, seconds: float = 30.0) -> np.ndarray:
+def settled_nodes(simulate: case.Simulate, count: int, load: float, seconds: float = 30.0) -> np.ndarray:
     """(count,) downward deflection [m] of the box centres at rest, without self-weight."""
-    observe = {"nodes": Final(quantity=Position())}
+    observe = {"nodes": engine.Final(quantity=engine.Position())}
     result = simulate(scene(count, load), time_step=TIME_STEP, duration=seconds, observe=observe)
     return np.asarray(-result["nodes"][:, 2])
 
 
-def tip_deflection(simulate: Simulate, count: int, *, self_weight: bool = False) -> float:
+def tip_deflection(simulate: case.Simulate, count: int, *, self_weight: bool = False) -> float:
     """Downward tip deflection [m] once every box has been slower than 1e-4 m/s for a second; NaN if none is."""
     result = simulate(
         scene(count, self_weight=self_weight),
         time_step=TIME_STEP,
         duration=40.0,
         observe={
-            "speed": Trace(quantity=Velocity(), first=2340),
-            "last": Final(quantity=Position(f"box {count}")),
-            "turn": Final(quantity=Orientation(f"box {count}")),
+            "speed": engine.Trace(quantity=engine.Velocity(), first=2340),
+            "last": engine.Final(quantity=engine.Position(f"box {count}")),
+            "turn": engine.Final(quantity=engine.Orientation(f"box {count}")),
         },
     )
     if np.linalg.norm(result["speed"], axis=-1).max() > 1e-4:
@@ -52,7 +52,7 @@ def tip_deflection(simulate: Simulate, count: int, *, self_weight: bool = False)
     return -float(result["last"][2] + half * 2.0 * (x * z - w * y))
 
 
-def _measure_nodes(simulate: Simulate) -> dict[str, float]:
+def _measure_nodes(simulate: case.Simulate) -> dict[str, float]:
     worst = 0.0
     for count in COUNTS:
         x = (np.arange(count) + 0.5) * LENGTH / count
@@ -62,7 +62,7 @@ def _measure_nodes(simulate: Simulate) -> dict[str, float]:
     return {"node_error": worst}
 
 
-def _measure_tip(simulate: Simulate) -> dict[str, float]:
+def _measure_tip(simulate: case.Simulate) -> dict[str, float]:
     tip = tip_deflection(simulate, 80)
     return {
         "tip_deflection": tip,
@@ -72,15 +72,18 @@ def _measure_tip(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def _measure_weight(simulate: Simulate) -> dict[str, float]:
+def _measure_weight(simulate: case.Simulate) -> dict[str, float]:
     linear = TIP + DENSITY * GRAVITY * LENGTH**4 / (8.0 * STIFFNESS)
     return {"self_weight_ratio": tip_deflection(simulate, COUNT, self_weight=True) / linear}
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Tip of LADDER_COUNT pieces after 20 s over their statics, minus one."""
     last = f"box {LADDER_COUNT}"
-    observe = {"last": Final(quantity=Position(last)), "turn": Final(quantity=Orientation(last))}
+    observe = {
+        "last": engine.Final(quantity=engine.Position(last)),
+        "turn": engine.Final(quantity=engine.Orientation(last)),
+    }
     built = scene(LADDER_COUNT)
     result = simulate(built, time_step=time_step, duration=20.0, method=method, observe=observe)
     w, x, y, z = result["turn"]

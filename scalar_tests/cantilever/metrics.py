@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.cantilever.measure import (
     _measure_nodes,
     _measure_tip,
@@ -9,15 +10,14 @@ from spook_tracker.scalar_tests.cantilever.measure import (
     ladder_error,
 )
 from spook_tracker.scalar_tests.cantilever.scene import COUNT, LARGE_DEFLECTION, TIME_STEP, TIP
-from spook_tracker.scalar_tests.case import Ladder, Measurement, Metric
 from spook_tracker.scalar_tests.configurations import configured
 
 MEASUREMENTS = (
-    Measurement(
+    case.Measurement(
         configuration="static",
         time_step=TIME_STEP,
         metrics=(
-            Metric(
+            case.Metric(
                 name="node_error",
                 description="largest relative error of a node against Euler-Bernoulli, 10 to 320 elements",
                 unit="1",
@@ -31,12 +31,12 @@ MEASUREMENTS = (
         measure=_measure_nodes,
         note="A thousandth of the load, so that the linear formula holds to 1e-9.",
     ),
-    Measurement(
+    case.Measurement(
         configuration="dynamic",
         time_step=TIME_STEP,
         parameters={"N": 80},
         metrics=(
-            Metric(
+            case.Metric(
                 name="tip_deflection",
                 description="tip deflection under the printed load, settled",
                 unit="m",
@@ -44,7 +44,7 @@ MEASUREMENTS = (
                 reference=TIP,
                 tolerance=1e-9,
             ),
-            Metric(
+            case.Metric(
                 name="tip_against_linear",
                 description="tip deflection over P l³/(3EI), minus one",
                 unit="1",
@@ -55,7 +55,7 @@ MEASUREMENTS = (
                 reference=LARGE_DEFLECTION,
                 tolerance=1e-8,
             ),
-            Metric(
+            case.Metric(
                 name="tip_against_statics",
                 description="tip deflection over the statics of the same rigid pieces, minus one",
                 unit="1",
@@ -65,7 +65,7 @@ MEASUREMENTS = (
                 reference=0.0,
                 tolerance=1e-9,
             ),
-            Metric(
+            case.Metric(
                 name="tip_against_elastica",
                 description="tip deflection over the elastica, minus one",
                 unit="1",
@@ -79,12 +79,12 @@ MEASUREMENTS = (
         measure=_measure_tip,
         note="The printed load, from rest, until every box has been slower than 1e-4 m/s for a second.",
     ),
-    Measurement(
+    case.Measurement(
         configuration="self-weight",
         time_step=TIME_STEP,
         parameters={"N": COUNT},
         metrics=(
-            Metric(
+            case.Metric(
                 name="self_weight_ratio",
                 description="tip deflection with the beam's own weight over the linear sum",
                 unit="1",
@@ -102,7 +102,7 @@ MEASUREMENTS = (
 )
 
 LADDERS = (
-    Ladder(
+    case.Ladder(
         name="statics",
         description="settled tip of 20 pieces against their statics",
         unit="1",

@@ -6,13 +6,13 @@ dx³/(12 EI) in shear, half a piece at the wall. Then the nodes lie exactly on t
 
 from __future__ import annotations
 
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.cantilever.figures import draw_against_count, draw_difference, draw_shape
 from spook_tracker.scalar_tests.cantilever.metrics import LADDERS, MEASUREMENTS
 from spook_tracker.scalar_tests.cantilever.scene import TIME_STEP, scene
 from spook_tracker.scalar_tests.cantilever.stability import STUDIES
-from spook_tracker.scalar_tests.case import Example, Figure, ScalarTest
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Cantilever",
     question="Is a real steel beam, clamped at one end and loaded at the other, simulated rightly?",
     why="An engineer wants material constants to go in and the right deflection to come out, with nothing tuned.",
@@ -46,16 +46,16 @@ TEST = ScalarTest(
         "Equation 3.20 leaves out the beam's own weight, which alone would bend it by 1.0454 m.",
     ),
     measurements=MEASUREMENTS,
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP),
     figures=(
-        Figure(name="shape", title="The bent beam", draw=draw_shape, thesis="Fig 3.37, upper"),
-        Figure(
+        case.Figure(name="shape", title="The bent beam", draw=draw_shape, thesis="Fig 3.37, upper"),
+        case.Figure(
             name="difference",
             title="Simulation minus formula",
             draw=draw_difference,
             thesis="Fig 3.37, lower",
         ),
-        Figure(name="error-against-count", title="Node error against elements", draw=draw_against_count),
+        case.Figure(name="error-against-count", title="Node error against elements", draw=draw_against_count),
     ),
     ladders=LADDERS,
     stability=STUDIES,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from spook_tracker.engine import WORLD, Box, Load, Lock, RigidBody, Scene
+from spook_tracker import engine
 
 LENGTH = 12.0  # m
 COUNT = 60
@@ -26,36 +26,36 @@ LARGE_DEFLECTION = -4.0 / 35.0 * (LOAD * LENGTH**2 / STIFFNESS) ** 2  # of the t
 
 def scene(
     count: int = COUNT, load: float = LOAD, *, self_weight: bool = False, damping: float = DAMPING
-) -> Scene:
+) -> engine.Scene:
     """`count` boxes locked in a row to the wall at x = 0, with a load [N] at the tip."""
     piece = LENGTH / count
     boxes = tuple(
-        RigidBody(
+        engine.RigidBody(
             name=f"box {i + 1}",
             mass=DENSITY * piece,
-            shape=Box((piece, WIDTH, HEIGHT)),
+            shape=engine.Box((piece, WIDTH, HEIGHT)),
             position=((i + 0.5) * piece, 0.0, 0.0),
         )
         for i in range(count)
     )
 
-    def lock(name: str, first: str, second: str, at: float, length: float) -> Lock:
+    def lock(name: str, first: str, second: str, at: float, length: float) -> engine.Lock:
         shear, turn = length**3 / (12.0 * STIFFNESS), length / STIFFNESS
         compliance = (0.0, shear, shear, turn, turn, turn)
-        return Lock(
+        return engine.Lock(
             name=name, between=(first, second), at=(at, 0.0, 0.0), compliance=compliance, damping=damping
         )
 
     locks = (
-        lock("wall", WORLD, "box 1", 0.25 * piece, 0.5 * piece),
+        lock("wall", engine.WORLD, "box 1", 0.25 * piece, 0.5 * piece),
         *(lock(f"lock {i}", f"box {i}", f"box {i + 1}", i * piece, piece) for i in range(1, count)),
     )
     # The load acts at the tip, half a piece beyond the last centre: a force there and its moment.
-    tip = Load(
+    tip = engine.Load(
         name="load", body=f"box {count}", force=(0.0, 0.0, -load), torque=(0.0, 0.5 * piece * load, 0.0)
     )
     gravity = (0.0, 0.0, -GRAVITY if self_weight else 0.0)
-    return Scene(bodies=boxes, constraints=locks, forces=(tip,), gravity=gravity, contacts=False)
+    return engine.Scene(bodies=boxes, constraints=locks, forces=(tip,), gravity=gravity, contacts=False)
 
 
 def deflection(x: np.ndarray, load: float = LOAD) -> np.ndarray:

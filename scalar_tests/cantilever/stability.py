@@ -12,8 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from spook_tracker.engine import Final, Load, Orientation, Position, Trace
+from spook_tracker import engine
 from spook_tracker.engine.theory import one_row_matrix
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.cantilever.scene import (
     DAMPING,
@@ -25,7 +26,6 @@ from spook_tracker.scalar_tests.cantilever.scene import (
     scene,
 )
 from spook_tracker.scalar_tests.cantilever.statics import chain_tip
-from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityStudy
 
 COUNT = 10
 PIECE = LENGTH / COUNT
@@ -56,17 +56,17 @@ def pressed() -> float:
 PRESSED = pressed()  # N, 7373
 
 
-def bears(simulate: Simulate, force: float) -> bool:
+def bears(simulate: case.Simulate, force: float) -> bool:
     """Whether the beam pressed along by `force` [N] comes to rest less than TIMES as far aside."""
     last = f"box {COUNT}"
-    load = Load(name="load", body=last, force=(-force, 0.0, -SIDE))
+    load = engine.Load(name="load", body=last, force=(-force, 0.0, -SIDE))
     built = replace(scene(COUNT), forces=(load,))
-    observe = {"last": Final(quantity=Position(last))}
+    observe = {"last": engine.Final(quantity=engine.Position(last))}
     result = simulate(built, time_step=TIME_STEP, duration=DURATION, observe=observe)
     return result.completed and -float(result["last"][2]) < TIMES * UNPRESSED
 
 
-def strongest(simulate: Simulate) -> BreakPoint:
+def strongest(simulate: case.Simulate) -> case.BreakPoint:
     """The largest force [N] along that the beam bears."""
     return break_point(functools.partial(bears, simulate), 100.0, 1e5, resolution=2e-3, walk=6)
 
@@ -85,12 +85,12 @@ def longest() -> float:
     return step
 
 
-def settles(simulate: Simulate, time_step: float) -> bool:
+def settles(simulate: case.Simulate, time_step: float) -> bool:
     """Whether the beam under its load lies where its pieces' statics have it, to LEFT, in the last five of STEPS steps."""
     last = f"box {COUNT}"
     observe = {
-        "last": Trace(quantity=Position(last), first=STEPS - 4),
-        "turn": Trace(quantity=Orientation(last), first=STEPS - 4),
+        "last": engine.Trace(quantity=engine.Position(last), first=STEPS - 4),
+        "turn": engine.Trace(quantity=engine.Orientation(last), first=STEPS - 4),
     }
     result = simulate(scene(COUNT), time_step=time_step, steps=STEPS, observe=observe)
     w, x, y, z = result["turn"].T
@@ -98,14 +98,14 @@ def settles(simulate: Simulate, time_step: float) -> bool:
     return result.completed and float(np.abs(tip / chain_tip(COUNT) - 1.0).max()) < LEFT
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step [s] in which the beam settles."""
     return break_point(functools.partial(settles, simulate), 1.0, 20.0, resolution=5e-3, walk=13)
 
 
 LONGEST = longest()  # s
 STUDIES = (
-    StabilityStudy(
+    case.StabilityStudy(
         name="strongest-press",
         title="Largest force along a beam of ten pieces that does not buckle it",
         configuration="static",
@@ -116,7 +116,7 @@ STUDIES = (
         expected_source="Euler: 3 (tan u − u)/u³ = 5 with u = L √(P/(EI)), at 0.80 of π² EI/(4 L²). Ten pieces with a turn between "
         "them and a slip buckle earlier by (π/40)²/3 and π²/4/1200, 0.4 %; 0.2 % is the search's, as much to spare",
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="longest-step",
         title="Longest step in which a beam of ten pieces settles",
         configuration="static",

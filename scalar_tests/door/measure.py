@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from spook_tracker.engine import ConstraintForce, Method, Trace
-from spook_tracker.scalar_tests.case import Curve, Drawing, Simulate
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.door.scene import TIME_STEP, forces, least_norm_forces, scene, weight_error
 from spook_tracker.scalar_tests.sweep import line, told
 
@@ -25,13 +25,13 @@ def _largest(values: np.ndarray) -> float:
     return float(values[np.argmax(np.abs(values))])
 
 
-def _measure_damped(simulate: Simulate) -> dict[str, float]:
+def _measure_damped(simulate: case.Simulate) -> dict[str, float]:
     held = forces(simulate, steps=1200, damping=2.0 * TIME_STEP)
     error = weight_error(held)
     return {"weight_error": _largest(error), "weight_error_settled": _largest(error[99:])}
 
 
-def _measure_printed(simulate: Simulate) -> dict[str, float]:
+def _measure_printed(simulate: case.Simulate) -> dict[str, float]:
     error = weight_error(forces(simulate, steps=3900))
     return {
         "weight_error": _largest(error[:1200]),
@@ -40,7 +40,7 @@ def _measure_printed(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def _measure_split(simulate: Simulate) -> dict[str, float]:
+def _measure_split(simulate: case.Simulate) -> dict[str, float]:
     worst = 0.0
     for count in COUNTS_TO_200:
         held = forces(simulate, steps=200, count=count, damping=2.0 * TIME_STEP)[-1]
@@ -49,27 +49,27 @@ def _measure_split(simulate: Simulate) -> dict[str, float]:
     return {"split_error": worst}
 
 
-def _measure_singular(simulate: Simulate) -> dict[str, float]:
+def _measure_singular(simulate: case.Simulate) -> dict[str, float]:
     held = forces(simulate, steps=1200, count=5, damping=2.0 * TIME_STEP, compliance=0.0)
     return {"weight_error_settled": _largest(weight_error(held))}
 
 
-def _measure_balance(simulate: Simulate) -> dict[str, float]:
+def _measure_balance(simulate: case.Simulate) -> dict[str, float]:
     held = forces(simulate, steps=1200, damping=2.0 * TIME_STEP)
     return {"sideways_sum": _largest(held[99:, :, 0].sum(axis=1))}
 
 
-def draw_against_count(simulate: Simulate) -> Drawing:
+def draw_against_count(simulate: case.Simulate) -> case.Drawing:
     printed, damped = [], []
     for count in COUNTS:
         printed.append(float(np.abs(weight_error(forces(simulate, steps=1200, count=count))).max()))
         held = forces(simulate, steps=200, count=count, damping=2.0 * TIME_STEP)
         damped.append(max(float(np.abs(weight_error(held)[99:]).max()), 1e-16))
     counts = tuple(map(float, COUNTS))
-    return Drawing(
+    return case.Drawing(
         curves=(
-            Curve(name="printed damping 1e-13 s", x=counts, y=tuple(printed)),
-            Curve(name="damping 2 h, settled", x=counts, y=tuple(damped)),
+            case.Curve(name="printed damping 1e-13 s", x=counts, y=tuple(printed)),
+            case.Curve(name="damping 2 h, settled", x=counts, y=tuple(damped)),
             line("limit", (1.0, 80.0), (0.02, 0.02), "limit"),
             line("what 32 bits resolve", (1.0, 80.0), (SINGLE, SINGLE), "reference"),
         ),
@@ -81,12 +81,12 @@ def draw_against_count(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_sideways(simulate: Simulate) -> Drawing:
+def draw_sideways(simulate: case.Simulate) -> case.Drawing:
     values = []
     for mass in MASSES:
         held = forces(simulate, steps=200, mass=mass, damping=2.0 * TIME_STEP)[-1]
         values.append(1e6 * abs(abs(held[0, 0]) - abs(held[1, 0])))
-    return Drawing(
+    return case.Drawing(
         curves=(line("two hinges", MASSES, values, "both"),),
         x_label="mass of the door [kg]",
         y_label="difference of the horizontal forces [µN]",
@@ -94,7 +94,7 @@ def draw_sideways(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_against_mass(simulate: Simulate) -> Drawing:
+def draw_against_mass(simulate: case.Simulate) -> case.Drawing:
     printed, damped = [], []
     for mass in MASSES:
         printed.append(float(np.abs(weight_error(forces(simulate, steps=1200, mass=mass), mass)).max()))
@@ -102,10 +102,10 @@ def draw_against_mass(simulate: Simulate) -> Drawing:
         damped.append(max(float(np.abs(weight_error(held, mass)[99:]).max()), 1e-16))
     left = sum(error > 0.02 for error in printed)
     kept = f"{left} of {len(MASSES)} doors leave the printed limit" if left else "all keep the printed limit"
-    return Drawing(
+    return case.Drawing(
         curves=(
-            Curve(name="printed damping 1e-13 s", x=MASSES, y=tuple(printed)),
-            Curve(name="damping 2 h, settled", x=MASSES, y=tuple(damped)),
+            case.Curve(name="printed damping 1e-13 s", x=MASSES, y=tuple(printed)),
+            case.Curve(name="damping 2 h, settled", x=MASSES, y=tuple(damped)),
             line("limit", (MASSES[0], MASSES[-1]), (0.02, 0.02), "limit"),
             line("what 32 bits resolve", (MASSES[0], MASSES[-1]), (SINGLE, SINGLE), "reference"),
         ),
@@ -116,11 +116,11 @@ def draw_against_mass(simulate: Simulate) -> Drawing:
     )
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest |ΔFz| in the second second, damping 2 h [%]."""
     half = round(1.0 / time_step)
     observe = {
-        f"hinge {i + 1}": Trace(quantity=ConstraintForce(f"hinge {i + 1}"), first=half)
+        f"hinge {i + 1}": engine.Trace(quantity=engine.ConstraintForce(f"hinge {i + 1}"), first=half)
         for i in range(LADDER_COUNT)
     }
     built = scene(LADDER_COUNT, damping=2.0 * time_step)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from spook_tracker.scalar_tests.case import Ladder, Measurement, Metric
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.door.measure import (
     _measure_balance,
@@ -15,12 +15,12 @@ from spook_tracker.scalar_tests.door.measure import (
 from spook_tracker.scalar_tests.door.scene import TIME_STEP
 
 MEASUREMENTS = (
-    Measurement(
+    case.Measurement(
         configuration="damped",
         time_step=TIME_STEP,
         parameters={"N": 2},
         metrics=(
-            Metric(
+            case.Metric(
                 name="weight_error",
                 description="largest deviation of the vertical force from the weight, steps 1 to 1200",
                 unit="%",
@@ -33,7 +33,7 @@ MEASUREMENTS = (
                 reference=0.0,
                 tolerance=1e-11,
             ),
-            Metric(
+            case.Metric(
                 name="weight_error_settled",
                 description="the same over steps 100 to 1200",
                 unit="%",
@@ -47,12 +47,12 @@ MEASUREMENTS = (
         measure=_measure_damped,
         note="Two hinges, damping 2 h, as every joint of the engine has by default.",
     ),
-    Measurement(
+    case.Measurement(
         configuration="printed",
         time_step=TIME_STEP,
         parameters={"N": 2},
         metrics=(
-            Metric(
+            case.Metric(
                 name="weight_error",
                 description="largest deviation of the vertical force from the weight in 20 s",
                 unit="%",
@@ -63,14 +63,14 @@ MEASUREMENTS = (
                 reference=0.0,
                 tolerance=1e-6,
             ),
-            Metric(
+            case.Metric(
                 name="weight_error_at_20_s",
                 description="deviation of the vertical force at 20 s: it rings",
                 unit="%",
                 role="reported",
                 tolerance=1e-6,
             ),
-            Metric(
+            case.Metric(
                 name="weight_error_to_65_s",
                 description="largest deviation of the vertical force in 65 s",
                 unit="%",
@@ -85,12 +85,12 @@ MEASUREMENTS = (
         measure=_measure_printed,
         note="Two hinges with the damping printed in the thesis, 1e-13 s: undamped in effect.",
     ),
-    Measurement(
+    case.Measurement(
         configuration="damped",
         time_step=TIME_STEP,
         parameters={},
         metrics=(
-            Metric(
+            case.Metric(
                 name="split_error",
                 description="largest deviation of a hinge force from the least-norm split, 1 to 200 hinges",
                 unit="1",
@@ -104,12 +104,12 @@ MEASUREMENTS = (
         measure=_measure_split,
         note="Doors on 1, 2, 3, 5, 10, 20, 50, 100 and 200 hinges.",
     ),
-    Measurement(
+    case.Measurement(
         configuration="damped",
         time_step=TIME_STEP,
         parameters={"N": 2},
         metrics=(
-            Metric(
+            case.Metric(
                 name="sideways_sum",
                 description="sum of the horizontal forces of the two hinges, settled",
                 unit="N",
@@ -123,12 +123,12 @@ MEASUREMENTS = (
         measure=_measure_balance,
         note="Two hinges, damping 2 h.",
     ),
-    Measurement(
+    case.Measurement(
         configuration="rigid",
         time_step=TIME_STEP,
         parameters={"N": 5},
         metrics=(
-            Metric(
+            case.Metric(
                 name="weight_error_settled",
                 description="largest deviation of the vertical force from the weight in 20 s, compliance 0",
                 unit="%",
@@ -145,7 +145,7 @@ MEASUREMENTS = (
 )
 
 LADDERS = (
-    Ladder(
+    case.Ladder(
         name="weight",
         description="largest deviation of the vertical force from the weight in the second second, five hinges",
         unit="%",

@@ -6,13 +6,13 @@ regularisation picks the split of least norm, and the sum must be the weight wha
 
 from __future__ import annotations
 
-from spook_tracker.scalar_tests.case import Example, Figure, ScalarTest
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.door.measure import draw_against_count, draw_against_mass, draw_sideways
 from spook_tracker.scalar_tests.door.metrics import LADDERS, MEASUREMENTS
 from spook_tracker.scalar_tests.door.scene import TIME_STEP, scene
 from spook_tracker.scalar_tests.door.stability import STUDIES
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Door on hinges",
     question="Does an over-determined system, a door on N hinges, carry its weight rightly?",
     why=(
@@ -51,21 +51,21 @@ TEST = ScalarTest(
         "1.2e-5 %: those are forces that had settled, read as such.",
     ),
     measurements=MEASUREMENTS,
-    example=lambda: Example(scene=scene(damping=2.0 * TIME_STEP), time_step=TIME_STEP),
+    example=lambda: case.Example(scene=scene(damping=2.0 * TIME_STEP), time_step=TIME_STEP),
     figures=(
-        Figure(
+        case.Figure(
             name="weight-error-against-hinges",
             title="Deviation of the vertical force against the number of hinges",
             draw=draw_against_count,
             thesis="Fig 3.7",
         ),
-        Figure(
+        case.Figure(
             name="sideways-force-against-mass",
             title="Deviation of the horizontal forces against the mass",
             draw=draw_sideways,
             thesis="Fig 3.8",
         ),
-        Figure(
+        case.Figure(
             name="weight-error-against-mass",
             title="Deviation of the vertical force against the mass",
             draw=draw_against_mass,

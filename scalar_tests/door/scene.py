@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from spook_tracker.engine import WORLD, Box, ConstraintForce, Hinge, RigidBody, Scene, Trace
-from spook_tracker.scalar_tests.case import Simulate
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 
 SIZE = (1.0, 0.06, 2.0)  # m
 MASS = 45.0  # kg
@@ -23,13 +23,13 @@ def hinge_points(count: int) -> np.ndarray:
 
 def scene(
     count: int = 2, mass: float = MASS, damping: float = PRINTED_DAMPING, compliance: float = COMPLIANCE
-) -> Scene:
+) -> engine.Scene:
     """The door at rest, hung on `count` hinges with vertical axes."""
-    door = RigidBody(name="door", mass=mass, shape=Box(SIZE), position=(0.0, 0.0, 0.0))
+    door = engine.RigidBody(name="door", mass=mass, shape=engine.Box(SIZE), position=(0.0, 0.0, 0.0))
     hinges = tuple(
-        Hinge(
+        engine.Hinge(
             name=f"hinge {i + 1}",
-            between=(WORLD, "door"),
+            between=(engine.WORLD, "door"),
             at=(point[0], point[1], point[2]),
             axis=(0.0, 0.0, 1.0),
             compliance=compliance,
@@ -37,15 +37,16 @@ def scene(
         )
         for i, point in enumerate(hinge_points(count).tolist())
     )
-    return Scene(bodies=(door,), constraints=hinges, gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(door,), constraints=hinges, gravity=(0.0, 0.0, -GRAVITY))
 
 
 def forces(
-    simulate: Simulate, steps: int, count: int = 2, time_step: float = TIME_STEP, **options: float
+    simulate: case.Simulate, steps: int, count: int = 2, time_step: float = TIME_STEP, **options: float
 ) -> np.ndarray:
     """(steps, count, 6) force [N] and torque [N m] of each hinge on the door, for steps 1 … steps."""
     observe = {
-        f"hinge {i + 1}": Trace(quantity=ConstraintForce(f"hinge {i + 1}"), first=1) for i in range(count)
+        f"hinge {i + 1}": engine.Trace(quantity=engine.ConstraintForce(f"hinge {i + 1}"), first=1)
+        for i in range(count)
     }
     result = simulate(scene(count, **options), time_step=time_step, steps=steps, observe=observe)
     return np.stack([result[name] for name in observe], axis=1)

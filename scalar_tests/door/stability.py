@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from spook_tracker.engine import Final, Position
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_count, break_point, table
-from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
 from spook_tracker.scalar_tests.door.scene import (
     GRAVITY,
     MASS,
@@ -28,20 +28,20 @@ def predicted_sag(count: int, compliance: float) -> float:
     return compliance * float(np.sum(least_norm_forces(count) ** 2)) / (MASS * GRAVITY)
 
 
-def sag(simulate: Simulate, count: int, compliance: float) -> float:
+def sag(simulate: case.Simulate, count: int, compliance: float) -> float:
     """How far it has sunk after 2 s [m]; NaN if it did not get there."""
     built = scene(count, damping=2.0 * TIME_STEP, compliance=compliance)
-    place = {"place": Final(quantity=Position("door"))}
+    place = {"place": engine.Final(quantity=engine.Position("door"))}
     result = simulate(built, time_step=TIME_STEP, steps=120, observe=place)
     return -float(result["place"][2]) if result.completed else float("nan")
 
 
-def softest_hinges(simulate: Simulate) -> BreakPoint:
+def softest_hinges(simulate: case.Simulate) -> case.BreakPoint:
     """Largest compliance [m/N, rad/(N m)] of five hinges with which the door sinks by no more than SAG."""
     return break_point(lambda soft: sag(simulate, SOME, soft) <= SAG, 1e-13, 1e-8, resolution=0.002)
 
 
-def redundancy_map(simulate: Simulate) -> StabilityMap:
+def redundancy_map(simulate: case.Simulate) -> case.StabilityMap:
     """(hinges, compliance): whether the redundant rows hold the door where least norm says."""
 
     def kind(count: float, compliance: float) -> str:
@@ -50,7 +50,7 @@ def redundancy_map(simulate: Simulate) -> StabilityMap:
             return "diverged"
         return "settled" if abs(found - right) <= 1e-6 * right + 1e-15 else "bounded"
 
-    return StabilityMap(
+    return case.StabilityMap(
         x=COUNTS,
         y=COMPLIANCES,
         cells=table(COMPLIANCES, COUNTS, kind),
@@ -61,7 +61,7 @@ def redundancy_map(simulate: Simulate) -> StabilityMap:
     )
 
 
-def most_hinges(simulate: Simulate) -> BreakPoint:
+def most_hinges(simulate: case.Simulate) -> case.BreakPoint:
     """Most hinges that carry the printed door."""
 
     def holds(count: int) -> bool:
@@ -73,7 +73,7 @@ def most_hinges(simulate: Simulate) -> BreakPoint:
     return break_count(holds, (1, 2, 5, 10, 20, 50, 100, 200, 400))
 
 
-def heaviest_door(simulate: Simulate) -> BreakPoint:
+def heaviest_door(simulate: case.Simulate) -> case.BreakPoint:
     """Heaviest door [kg] on five rigid hinges."""
 
     def holds(mass: float) -> bool:
@@ -84,7 +84,7 @@ def heaviest_door(simulate: Simulate) -> BreakPoint:
 
 
 STUDIES = (
-    StabilityStudy(
+    case.StabilityStudy(
         name="most-hinges",
         title="Most hinges that carry the door",
         configuration="plain",
@@ -95,7 +95,7 @@ STUDIES = (
         expected=(200.0, 400.0),
         expected_source="any number, in theory; the search ends at 400",
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="heaviest-door",
         title="Heaviest door on five hinges of compliance 0",
         configuration="plain",
@@ -105,7 +105,7 @@ STUDIES = (
         expected=(1e12, 1e12),
         expected_source="mass scales out of a system without compliance; the search ends at 1e12 kg",
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="softest-hinges",
         title="Softest five hinges that hold the door within 1e-9 m",
         configuration="plain",
@@ -115,7 +115,7 @@ STUDIES = (
         expected=(0.997 * SAG / predicted_sag(SOME, 1.0), 1.003 * SAG / predicted_sag(SOME, 1.0)),
         expected_source="Castigliano on the split of least norm: compliance × Σ force² / (m g), found to 0.2 %",
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="redundancy-map",
         title="Redundant hinges and their compliance",
         configuration="plain",

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from spook_tracker.engine import PLAIN, Method
-from spook_tracker.scalar_tests.case import Configuration, Ladder, Measurement, Metric
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.hanging_chain.measure import (
     STRING_HALF_STEP,
     ladder_error,
@@ -35,9 +35,9 @@ class Owed:
     source: str
 
 
-def _metrics(role: Any, *, length: Owed, path: Owed, gain: Owed, lost: Owed) -> tuple[Metric, ...]:
+def _metrics(role: Any, *, length: Owed, path: Owed, gain: Owed, lost: Owed) -> tuple[case.Metric, ...]:
     return (
-        Metric(
+        case.Metric(
             name="length_deviation",
             description="largest |violation| of a link in 20 s, of its length",
             unit="1",
@@ -49,7 +49,7 @@ def _metrics(role: Any, *, length: Owed, path: Owed, gain: Owed, lost: Owed) -> 
             reference=0.0,
             relative_tolerance=1e-6,
         ),
-        Metric(
+        case.Metric(
             name="path_error",
             description="largest distance of the load from small motion, of the start's excursion",
             unit="1",
@@ -61,7 +61,7 @@ def _metrics(role: Any, *, length: Owed, path: Owed, gain: Owed, lost: Owed) -> 
             reference=0.0,
             relative_tolerance=1e-6,
         ),
-        Metric(
+        case.Metric(
             name="energy_gain",
             description="largest E − E₀, of the energy above hanging",
             unit="1",
@@ -74,7 +74,7 @@ def _metrics(role: Any, *, length: Owed, path: Owed, gain: Owed, lost: Owed) -> 
             reference=0.0,
             relative_tolerance=1e-6,
         ),
-        Metric(
+        case.Metric(
             name="energy_lost",
             description="mean loss of the last 5 s, of the energy above hanging",
             unit="1",
@@ -91,7 +91,7 @@ def _metrics(role: Any, *, length: Owed, path: Owed, gain: Owed, lost: Owed) -> 
 
 
 MEASUREMENTS = (
-    Measurement(
+    case.Measurement(
         configuration="string",
         time_step=TIME_STEP,
         metrics=_metrics(
@@ -111,7 +111,7 @@ MEASUREMENTS = (
         parameters={"mass ratio": HEAVY},
         note="transverse stiffness of taut links treated implicitly",
     ),
-    Measurement(
+    case.Measurement(
         configuration="plain",
         time_step=TIME_STEP,
         metrics=_metrics(
@@ -133,11 +133,11 @@ MEASUREMENTS = (
         parameters={"mass ratio": BELOW_BREAK},
         note="the SPOOK step as it stands, below its break point",
     ),
-    Measurement(
+    case.Measurement(
         configuration="string",
         time_step=TIME_STEP,
         metrics=(
-            Metric(
+            case.Metric(
                 name="energy_cost",
                 description="energy lost beyond plain SPOOK where plain SPOOK would do, of the lift",
                 unit="1",
@@ -155,21 +155,25 @@ MEASUREMENTS = (
 )
 
 LADDERS = (
-    Ladder(
+    case.Ladder(
         name="load",
         description="largest distance of a load of 1000 : 1 from small motion over 5 s, of its excursion",
         unit="1",
         time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480, 960)),
         configurations=(
-            Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 960, 1 / 120)),
-            Configuration(
+            case.Configuration(
+                name="plain", method=engine.PLAIN, expected_order=1.0, order_range=(1 / 960, 1 / 120)
+            ),
+            case.Configuration(
                 name="half-step",
-                method=Method(half_step_velocities=True),
+                method=engine.Method(half_step_velocities=True),
                 expected_order=2.0,
                 order_range=(1 / 960, 1 / 120),
             ),
-            Configuration(name="string", method=STRING, expected_order=1.0, order_range=(1 / 960, 1 / 240)),
-            Configuration(name="string, half-step", method=STRING_HALF_STEP, expected_order=None),
+            case.Configuration(
+                name="string", method=STRING, expected_order=1.0, order_range=(1 / 960, 1 / 240)
+            ),
+            case.Configuration(name="string, half-step", method=STRING_HALF_STEP, expected_order=None),
         ),
         error=ladder_error,
         target_error=0.01,

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from spook_tracker.scalar_tests.case import Example, Figure, ScalarTest
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.hanging_chain.measure import draw
 from spook_tracker.scalar_tests.hanging_chain.metrics import LADDERS, MEASUREMENTS
 from spook_tracker.scalar_tests.hanging_chain.scene import HEAVY, OBSERVE, STRING, TIME_STEP, scene
 from spook_tracker.scalar_tests.hanging_chain.stability import STUDIES
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Hanging chain",
     question="Does a heavy load on a light chain swing as it should, however heavy it is?",
     why="Cranes, winches and anchors hang tons on light links. Freezing the direction of a taut link steps its "
@@ -33,8 +33,8 @@ TEST = ScalarTest(
     "Red: tension from the last step, its sign or its damping is wrong.",
     source="ours; after the thesis, section 2.2, Mass ratio",
     measurements=MEASUREMENTS,
-    example=lambda: Example(scene=scene(HEAVY), time_step=TIME_STEP, method=STRING, observe=OBSERVE),
-    figures=(Figure(name="path", title="The load at a million to one", draw=draw),),
+    example=lambda: case.Example(scene=scene(HEAVY), time_step=TIME_STEP, method=STRING, observe=OBSERVE),
+    figures=(case.Figure(name="path", title="The load at a million to one", draw=draw),),
     stability=STUDIES,
     ladders=LADDERS,
 )

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import Energy, MaximumAbsolute, Method, Position, Scene, Trace, Violation
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.chain import GRAVITY, LENGTH, MASS, hanging_chain, sideways_modes
 
@@ -14,16 +14,18 @@ COUNT = 10
 TIME_STEP = 1.0 / 60.0  # s
 STEPS = 1200  # 20 s
 TILT = 0.01  # rad
-STRING = Method(string_stiffness=True)
+STRING = engine.Method(string_stiffness=True)
 HEAVY, LIGHT, BELOW_BREAK = 1e6, 10.0, 300.0  # load over a sphere's mass
 OBSERVE: dict[str, Observable] = {
-    "violation": MaximumAbsolute(quantity=Violation()),
-    "places": Trace(quantity=Position()),
-    "energy": Trace(quantity=Energy(), from_start=True),
+    "violation": engine.MaximumAbsolute(quantity=engine.Violation()),
+    "places": engine.Trace(quantity=engine.Position()),
+    "energy": engine.Trace(quantity=engine.Energy(), from_start=True),
 }
 
 
-def scene(ratio: float, time_step: float = TIME_STEP, *, tilt: float = TILT, zigzag: float = 0.0) -> Scene:
+def scene(
+    ratio: float, time_step: float = TIME_STEP, *, tilt: float = TILT, zigzag: float = 0.0
+) -> engine.Scene:
     """Ten spheres of 1 kg on rigid links, the last `ratio` times as heavy, leaning by `tilt` [rad]."""
     return hanging_chain(COUNT, time_step, load=ratio * MASS, compliance=0.0, tilt=tilt, zigzag=zigzag)
 

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Energy, Method, Result, Trace, Violation
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, cell, is_stable, table
-from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
 from spook_tracker.scalar_tests.chain import GRAVITY, LENGTH, MASS, sideways_modes
 from spook_tracker.scalar_tests.hanging_chain.scene import (
     COUNT,
@@ -32,18 +32,18 @@ MAP_STEPS = tuple(float(h) for h in np.geomspace(1.0 / 480.0, 0.1, 12))  # s
 
 
 def _kind(
-    simulate: Simulate,
+    simulate: case.Simulate,
     ratio: float,
     time_step: float,
-    method: Method,
+    method: engine.Method,
     *,
     tilt: float = TILT,
     zigzag: float = ZIGZAG,
     seconds: float = STEPS * TIME_STEP,
 ) -> str:
     observe: dict[str, Observable] = {
-        "violation": Trace(quantity=Violation()),
-        "energy": Trace(quantity=Energy(), from_start=True),
+        "violation": engine.Trace(quantity=engine.Violation()),
+        "energy": engine.Trace(quantity=engine.Energy(), from_start=True),
     }
     result = simulate(
         scene(ratio, time_step, tilt=tilt, zigzag=zigzag),
@@ -55,7 +55,7 @@ def _kind(
     return cell(result, _excess(result, ratio, tilt), bound=1.0)
 
 
-def _excess(result: Result, ratio: float, tilt: float) -> Any:
+def _excess(result: engine.Result, ratio: float, tilt: float) -> Any:
     """Violation beyond what linearised rows cost, and energy gain beyond half a step's, each over its bound."""
     bound = BOUND if tilt <= TILT else WIDE_BOUND
     speed = COUNT * LENGTH * tilt * np.sqrt(GRAVITY / (COUNT * LENGTH))
@@ -67,8 +67,8 @@ def _excess(result: Result, ratio: float, tilt: float) -> Any:
     return np.maximum(0.1, np.maximum(stretch, gain))
 
 
-def _largest_ratio(method: Method, tilt: float, hard: float, resolution: float = 0.005) -> Any:
-    def study(simulate: Simulate) -> BreakPoint:
+def _largest_ratio(method: engine.Method, tilt: float, hard: float, resolution: float = 0.005) -> Any:
+    def study(simulate: case.Simulate) -> case.BreakPoint:
         return break_point(
             lambda ratio: is_stable(_kind(simulate, ratio, TIME_STEP, method, tilt=tilt)),
             1.0,
@@ -80,14 +80,18 @@ def _largest_ratio(method: Method, tilt: float, hard: float, resolution: float =
     return study
 
 
-def lightest_load(simulate: Simulate) -> BreakPoint:
+def lightest_load(simulate: case.Simulate) -> case.BreakPoint:
     """Smallest mass ratio of the last sphere, plain SPOOK."""
     return break_point(
-        lambda ratio: is_stable(_kind(simulate, ratio, TIME_STEP, PLAIN)), 1.0, 1e-14, walk=15, resolution=0.1
+        lambda ratio: is_stable(_kind(simulate, ratio, TIME_STEP, engine.PLAIN)),
+        1.0,
+        1e-14,
+        walk=15,
+        resolution=0.1,
     )
 
 
-def _largest_offset(simulate: Simulate) -> BreakPoint:
+def _largest_offset(simulate: case.Simulate) -> case.BreakPoint:
     """String stiffness at a million to one, started with its spheres pushed left and right in turn."""
     return break_point(
         lambda zigzag: is_stable(_kind(simulate, HEAVY, TIME_STEP, STRING, zigzag=zigzag)),
@@ -111,9 +115,9 @@ def predicted_break(pull: float = 1.0) -> float:
     return low
 
 
-def _map(method: Method) -> Any:
-    def study(simulate: Simulate) -> StabilityMap:
-        return StabilityMap(
+def _map(method: engine.Method) -> Any:
+    def study(simulate: case.Simulate) -> case.StabilityMap:
+        return case.StabilityMap(
             x=MAP_RATIOS,
             y=MAP_STEPS,
             cells=table(
@@ -144,17 +148,17 @@ HOLDS = (
     "the last third; spheres start 1e-12 m left and right in turn"
 )
 STUDIES = (
-    StabilityStudy(
+    case.StabilityStudy(
         name="mass-ratio-plain",
         title="Largest mass ratio of a hanging chain, plain SPOOK",
         configuration="plain",
         definition=HOLDS,
-        study=_largest_ratio(PLAIN, TILT, 1e6),
+        study=_largest_ratio(engine.PLAIN, TILT, 1e6),
         unit="1",
         expected=(0.98 * PREDICTED, 1.02 * PREDICTED),
         expected_source="h ω = 2 for the fastest sideways mode of ten links",
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="mass-ratio-string",
         title="Largest mass ratio of a hanging chain, string stiffness",
         configuration="string",
@@ -164,18 +168,18 @@ STUDIES = (
         expected=(1e9, 1e12),
         expected_source="nothing in the method bounds it; double precision does",
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="mass-ratio-swinging-plain",
         title="Largest mass ratio of a chain swinging from 1 rad, plain SPOOK",
         configuration="plain",
         definition=HOLDS,
-        study=_largest_ratio(PLAIN, WIDE_TILT, 1e6),
+        study=_largest_ratio(engine.PLAIN, WIDE_TILT, 1e6),
         unit="1",
         expected=(0.97 * SWINGING, 1.03 * SWINGING),
         expected_source="h ω = 2 with the tension at the bottom of the swing, (3 − 2 cos 1) = 1.92 times the weight; "
         "it is passed for moments only, which puts the break a little higher",
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="mass-ratio-swinging-string",
         title="Largest mass ratio of a chain swinging from 1 rad, string stiffness",
         configuration="string",
@@ -185,7 +189,7 @@ STUDIES = (
         expected=(1e9, 1e12),
         expected_source="nothing in the method bounds it; double precision does",
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="lightest-load",
         title="Smallest mass ratio of the last sphere, plain SPOOK",
         configuration="plain",
@@ -196,7 +200,7 @@ STUDIES = (
         expected=(1e-14, 1e-14),
         expected_source="the last link's own mode is √(g/l) however light the load; the search ends at 1e-14",
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="start-offset-string",
         title="Largest sideways start offset at a million to one, string stiffness",
         configuration="string",
@@ -206,14 +210,14 @@ STUDIES = (
         expected=(1e-3, 1e-3),
         expected_source="every sideways mode is stable, so an offset stays as small as it starts; the search ends at 1 mm",
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="map-plain",
         title="Mass ratio and time step, plain SPOOK",
         configuration="plain",
         definition=HOLDS,
-        study=_map(PLAIN),
+        study=_map(engine.PLAIN),
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="map-string",
         title="Mass ratio and time step, string stiffness",
         configuration="string",

@@ -5,20 +5,9 @@ from __future__ import annotations
 import functools
 import math
 
-from spook_tracker.engine import ContactForce, Final, Method
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.inclined_plane.scene import FRICTION, TIME_STEP, force_ratio, scene, slide
 from spook_tracker.scalar_tests.sweep import line, told
@@ -31,16 +20,16 @@ HEAVIEST = 1e12  # kg, where the search ends
 SLOPES = tuple(0.05 * i for i in range(1, 15))
 
 
-def _error(simulate: Simulate, slope: float, mass: float) -> float:
+def _error(simulate: case.Simulate, slope: float, mass: float) -> float:
     return force_ratio(slide(simulate, slope, mass=mass)) - min(slope, FRICTION)
 
 
-def _measure(simulate: Simulate) -> dict[str, float]:
+def _measure(simulate: case.Simulate) -> dict[str, float]:
     errors = [_error(simulate, slope, mass) for mass in (1.0, 1e4) for slope in (0.1, 0.3, 0.45, 0.55, 0.7)]
     return {"ratio_error": max(errors, key=abs)}
 
 
-def _draw(simulate: Simulate) -> Drawing:
+def _draw(simulate: case.Simulate) -> case.Drawing:
     curves = [
         line(
             f"{mass:g} kg",
@@ -52,7 +41,7 @@ def _draw(simulate: Simulate) -> Drawing:
     ]
     off = max(abs(y - min(s, FRICTION)) for curve in curves for s, y in zip(SLOPES, curve.y, strict=True))
     curves.append(line("min(tan θ, µ)", SLOPES, (min(s, FRICTION) for s in SLOPES), "reference"))
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="tan θ",
         y_label="F_t/F_n",
@@ -60,35 +49,35 @@ def _draw(simulate: Simulate) -> Drawing:
     )
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """|F_t/F_n − tan θ| of a box that stands at tan θ = 0.3, after 1 s."""
-    observe = {"force": Final(quantity=ContactForce("box"))}
+    observe = {"force": engine.Final(quantity=engine.ContactForce("box"))}
     result = simulate(scene(LADDER_SLOPE), time_step=time_step, duration=1.0, method=method, observe=observe)
     x, y, z = result["force"]
     return abs(math.hypot(x, y) / abs(float(z)) - LADDER_SLOPE)
 
 
-def tells_both(simulate: Simulate, mass: float) -> bool:
+def tells_both(simulate: case.Simulate, mass: float) -> bool:
     """Whether a box so heavy [kg] has the right ratio where it stands and where it slides."""
     return max(abs(_error(simulate, slope, mass)) for slope in (0.3, 0.7)) < RIGHT
 
 
-def held(simulate: Simulate, slope: float) -> bool:
+def held(simulate: case.Simulate, slope: float) -> bool:
     """Whether a box too rough to slide has F_t/F_n = tan θ after ten steps."""
     return abs(force_ratio(slide(simulate, slope, steps=10, friction=ROUGH)) - slope) < RIGHT
 
 
-def heaviest(simulate: Simulate) -> BreakPoint:
+def heaviest(simulate: case.Simulate) -> case.BreakPoint:
     """The heaviest box [kg] whose ratio is right."""
     return break_point(functools.partial(tells_both, simulate), 1.0, HEAVIEST, walk=5)
 
 
-def steepest(simulate: Simulate) -> BreakPoint:
+def steepest(simulate: case.Simulate) -> case.BreakPoint:
     """The steepest slope (its tangent) that the ratio follows when nothing slides."""
     return break_point(functools.partial(held, simulate), 0.1, 1.9, resolution=5e-4, walk=6)
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Force ratio on a slope",
     question="Does the friction force follow the slope up to the friction coefficient, whatever the mass?",
     why="Below the friction angle the plane must give exactly the force that is needed, above it exactly µ F_n.",
@@ -104,11 +93,11 @@ TEST = ScalarTest(
     conclusion="Green: the contact gives the force the law asks for. Red: it creeps, sticks or depends on the mass.",
     source="thesis, section 3.2.4",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="cone",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="ratio_error",
                     description="largest deviation of F_t/F_n from min(tan θ, µ), five slopes, 1 kg and 1e4 kg",
                     unit="1",
@@ -123,14 +112,14 @@ TEST = ScalarTest(
             note="Cone friction, direct solver.",
         ),
     ),
-    example=lambda: Example(scene=scene(0.3), time_step=TIME_STEP),
+    example=lambda: case.Example(scene=scene(0.3), time_step=TIME_STEP),
     figures=(
-        Figure(
+        case.Figure(
             name="force-ratio-against-slope", title="Force ratio against slope", draw=_draw, thesis="Fig 3.17"
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="ratio",
             description="error of F_t/F_n at tan θ = 0.3 after 1 s",
             unit="1",
@@ -142,7 +131,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="steepest",
             title="Steepest slope that the ratio of a box too rough to slide follows",
             configuration="cone",
@@ -153,7 +142,7 @@ TEST = ScalarTest(
             expected_source="the weight of a cube points beyond its lower edge at tan θ > 1, and it tips; to the resolution of "
             "the search",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="heaviest",
             title="Heaviest box whose ratio is right",
             configuration="cone",

@@ -8,22 +8,9 @@ from __future__ import annotations
 
 import math
 
-from spook_tracker.engine import ContactForce, Final, Method, Result
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Curve,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.inclined_plane.scene import (
     BOX,
     CONE,
@@ -47,7 +34,7 @@ SLIDING = 0.6  # tan θ, above the friction coefficient
 STEEP, PRESSED = 0.8, 0.2  # tan θ; the share of the weight that goes as the last step begins
 
 
-def ratios(simulate: Simulate, slope: float, method: Method) -> tuple[float, ...]:
+def ratios(simulate: case.Simulate, slope: float, method: engine.Method) -> tuple[float, ...]:
     """F_t/F_n in each of the 36 directions."""
     return tuple(force_ratio(slide(simulate, slope, alpha, method=method)) for alpha in DIRECTIONS)
 
@@ -56,7 +43,7 @@ def _worst(values: tuple[float, ...]) -> float:
     return max(values, key=lambda value: abs(value - FRICTION))
 
 
-def _measure_cone(simulate: Simulate) -> dict[str, float]:
+def _measure_cone(simulate: case.Simulate) -> dict[str, float]:
     standing = _worst(ratios(simulate, FRICTION, CONE))
     runs = [(slide(simulate, SLIDING, alpha, method=CONE), alpha) for alpha in DIRECTIONS]
     sliding = _worst(tuple(force_ratio(run) for run, _ in runs))
@@ -68,15 +55,15 @@ def _measure_cone(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def _measure_anisotropy(method: Method) -> object:
-    def measure(simulate: Simulate) -> dict[str, float]:
+def _measure_anisotropy(method: engine.Method) -> object:
+    def measure(simulate: case.Simulate) -> dict[str, float]:
         values = ratios(simulate, SLIDING, method)
         return {"anisotropy": max(values) - min(values)}
 
     return measure
 
 
-def steepest(simulate: Simulate) -> BreakPoint:
+def steepest(simulate: case.Simulate) -> case.BreakPoint:
     """Steepest slope (its tangent) on which the box stands for a second, whatever the direction."""
 
     def stands(slope: float) -> bool:
@@ -86,13 +73,13 @@ def steepest(simulate: Simulate) -> BreakPoint:
     return break_point(stands, 0.1, 2.0, resolution=0.0005, walk=8)
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step [s] in which the box stands just below its angle and slides just above it, as Coulomb's law has it."""
 
     def right(time_step: float) -> bool:
         off = []
         for slope in (0.99 * FRICTION, SLIDING):
-            observe = {"force": Final(quantity=ContactForce("box"))}
+            observe = {"force": engine.Final(quantity=engine.ContactForce("box"))}
             result = simulate(scene(slope), time_step=time_step, steps=10, method=CONE, observe=observe)
             x, y, z = map(float, result["force"])
             off.append(abs(math.hypot(x, y) / abs(z) - min(slope, FRICTION)))
@@ -102,15 +89,15 @@ def longest_step(simulate: Simulate) -> BreakPoint:
 
 
 def _draw_polar(slope: float) -> object:
-    def draw(simulate: Simulate) -> Drawing:
+    def draw(simulate: case.Simulate) -> case.Drawing:
         angles = (*tuple(math.degrees(alpha) for alpha in DIRECTIONS), 360.0)
         curves, said = [], []
         for name, method in MODELS.items():
             values = ratios(simulate, slope, method)
             said.append(f"{name}: {told(min(values), 3)} to {told(max(values), 3)}")
             curves.append(line(name, angles, (*values, values[0]), "both"))
-        curves.append(Curve(name="Coulomb", x=angles, y=(FRICTION,) * len(angles), style="reference"))
-        return Drawing(
+        curves.append(case.Curve(name="Coulomb", x=angles, y=(FRICTION,) * len(angles), style="reference"))
+        return case.Drawing(
             curves=tuple(curves),
             x_label="direction of the slope [degrees]",
             y_label="F_t/F_n",
@@ -122,7 +109,7 @@ def _draw_polar(slope: float) -> object:
     return draw
 
 
-def draw_unloaded(simulate: Simulate) -> Drawing:
+def draw_unloaded(simulate: case.Simulate) -> case.Drawing:
     """F_t/F_n against direction in the step in which the normal force falls: the box model still has the one before."""
     angles = (*tuple(math.degrees(alpha) for alpha in DIRECTIONS), 360.0)
     curves, said = [], []
@@ -130,7 +117,7 @@ def draw_unloaded(simulate: Simulate) -> Drawing:
         values = [force_ratio(unloaded(simulate, STEEP, alpha, PRESSED, method)) for alpha in DIRECTIONS]
         said.append(f"{name}: {told(min(values), 3)} to {told(max(values), 3)}")
         curves.append(line(name, angles, (*values, values[0]), "both"))
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="direction of the slope [degrees]",
         y_label="F_t/F_n",
@@ -139,11 +126,11 @@ def draw_unloaded(simulate: Simulate) -> Drawing:
     )
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest |F_t/F_n − µ| over six directions after sliding for a second."""
     worst = 0.0
     for direction in LADDER_DIRECTIONS:
-        observe = {"force": Final(quantity=ContactForce("box"))}
+        observe = {"force": engine.Final(quantity=engine.ContactForce("box"))}
         result = simulate(
             scene(SLIDING, direction), time_step=time_step, duration=1.0, method=method, observe=observe
         )
@@ -152,12 +139,12 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return worst
 
 
-def ladder_run(simulate: Simulate, time_step: float, method: Method) -> Result:
+def ladder_run(simulate: case.Simulate, time_step: float, method: engine.Method) -> engine.Result:
     """One of these slides with nothing observed."""
     return simulate(scene(SLIDING, LADDER_DIRECTIONS[1]), time_step=time_step, duration=1.0, method=method)
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Friction in every direction",
     question="Is Coulomb's law obeyed, in every direction?",
     why=(
@@ -194,11 +181,11 @@ TEST = ScalarTest(
         "takes its bound from the step before.",
     ),
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="cone",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="force_ratio",
                     description="F_t/F_n at tan θ = 0.5, the worst of 36 directions",
                     unit="1",
@@ -212,7 +199,7 @@ TEST = ScalarTest(
                     reference=FRICTION,
                     tolerance=1e-12,
                 ),
-                Metric(
+                case.Metric(
                     name="standing_error",
                     description="deviation of F_t/F_n from 0.5 at tan θ = 0.5, the worst of 36 directions",
                     unit="1",
@@ -222,7 +209,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-12,
                 ),
-                Metric(
+                case.Metric(
                     name="sliding_error",
                     description="deviation of F_t/F_n from 0.5 when sliding at tan θ = 0.6, worst of 36 directions",
                     unit="1",
@@ -232,7 +219,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-12,
                 ),
-                Metric(
+                case.Metric(
                     name="direction_error",
                     description="angle between friction and slope when sliding, the worst of 36 directions",
                     unit="degrees",
@@ -246,11 +233,11 @@ TEST = ScalarTest(
             measure=_measure_cone,
             note="Cone friction, direct solver.",
         ),
-        Measurement(
+        case.Measurement(
             configuration="box",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="anisotropy",
                     description="largest minus smallest F_t/F_n when sliding at tan θ = 0.6",
                     unit="1",
@@ -266,11 +253,11 @@ TEST = ScalarTest(
             measure=_measure_anisotropy(BOX),  # type: ignore[arg-type]
             note="Box friction: proves that the test can see anisotropy.",
         ),
-        Measurement(
+        case.Measurement(
             configuration="scaled box",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="anisotropy",
                     description="largest minus smallest F_t/F_n when sliding at tan θ = 0.6",
                     unit="1",
@@ -284,21 +271,21 @@ TEST = ScalarTest(
             note="Scaled box: the box with the current normal force.",
         ),
     ),
-    example=lambda: Example(scene=scene(SLIDING), time_step=TIME_STEP),
+    example=lambda: case.Example(scene=scene(SLIDING), time_step=TIME_STEP),
     figures=(
-        Figure(
+        case.Figure(
             name="force-ratio-against-direction-standing",
             title="Force ratio against direction at tan θ = µ",
             draw=_draw_polar(FRICTION),  # type: ignore[arg-type]
             thesis="Fig 3.18",
         ),
-        Figure(
+        case.Figure(
             name="force-ratio-against-direction-unloaded",
             title="Force ratio against direction at tan θ = 0.8, as a fifth of the weight goes",
             draw=draw_unloaded,
             thesis="Fig 3.18, as drawn",
         ),
-        Figure(
+        case.Figure(
             name="force-ratio-against-direction-sliding",
             title="Force ratio against direction, sliding at tan θ = 0.6",
             draw=_draw_polar(SLIDING),  # type: ignore[arg-type]
@@ -306,16 +293,18 @@ TEST = ScalarTest(
     ),
     seven=True,
     ladders=(
-        Ladder(
+        case.Ladder(
             name="sliding",
             description="largest error of F_t/F_n over six directions, sliding at tan θ = 0.6 for 1 s",
             unit="1",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
             configurations=(
-                Configuration(name="cone", method=CONE, expected_order=None),
-                Configuration(name="cone, iterative", method=Method(solver="iterative"), expected_order=None),
-                Configuration(name="box", method=BOX, expected_order=None),
-                Configuration(name="scaled box", method=SCALED_BOX, expected_order=None),
+                case.Configuration(name="cone", method=CONE, expected_order=None),
+                case.Configuration(
+                    name="cone, iterative", method=engine.Method(solver="iterative"), expected_order=None
+                ),
+                case.Configuration(name="box", method=BOX, expected_order=None),
+                case.Configuration(name="scaled box", method=SCALED_BOX, expected_order=None),
             ),
             error=ladder_error,
             run=ladder_run,
@@ -324,7 +313,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="steepest",
             title="Steepest slope on which the box stands",
             configuration="cone",
@@ -334,7 +323,7 @@ TEST = ScalarTest(
             expected=(0.9995 * FRICTION, FRICTION),
             expected_source="tan θ = µ, to the resolution of the search",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest step in which friction is Coulomb's",
             configuration="cone",

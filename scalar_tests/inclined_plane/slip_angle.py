@@ -5,20 +5,9 @@ from __future__ import annotations
 import functools
 import math
 
-from spook_tracker.engine import AngularVelocity, Final, Method, Velocity
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.inclined_plane.scene import (
     FRICTION,
@@ -37,19 +26,19 @@ LONGEST = 1e3  # s, where the search for the longest step ends
 COEFFICIENTS = (0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9)
 
 
-def _measure_slope(simulate: Simulate) -> dict[str, float]:
+def _measure_slope(simulate: case.Simulate) -> dict[str, float]:
     return {"slip_slope_error": slip_slope(simulate, FRICTION) - FRICTION}
 
 
-def _measure_bracket(simulate: Simulate) -> dict[str, float]:
+def _measure_bracket(simulate: case.Simulate) -> dict[str, float]:
     stands = not slips(simulate, FRICTION - 1e-4, FRICTION)
     slides = slips(simulate, FRICTION + 1e-4, FRICTION)
     return {"bracket_held": float(stands) + float(slides)}
 
 
-def _draw_angle(simulate: Simulate) -> Drawing:
+def _draw_angle(simulate: case.Simulate) -> case.Drawing:
     found = tuple(math.atan(slip_slope(simulate, mu, resolution=1e-3)) for mu in COEFFICIENTS)
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulation", COEFFICIENTS, found, "points"),
             line("θ = atan µ", COEFFICIENTS, (math.atan(mu) for mu in COEFFICIENTS), "reference"),
@@ -60,18 +49,21 @@ def _draw_angle(simulate: Simulate) -> Drawing:
     )
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Speed after 1 s just beyond the friction angle minus g (sin θ − µ cos θ) t [m/s]."""
-    observe = {"velocity": Final(quantity=Velocity("box"))}
+    observe = {"velocity": engine.Final(quantity=engine.Velocity("box"))}
     result = simulate(scene(LADDER_SLOPE), time_step=time_step, duration=1.0, method=method, observe=observe)
     tilt = math.atan(LADDER_SLOPE)
     x, y, _ = result["velocity"]
     return math.hypot(x, y) - GRAVITY * (math.sin(tilt) - FRICTION * math.cos(tilt))
 
 
-def slides_flat(simulate: Simulate, friction: float) -> bool:
+def slides_flat(simulate: case.Simulate, friction: float) -> bool:
     """Whether the box slides down a slope a tenth steeper than it stands on, without turning, for a quarter of a second."""
-    observe = {"v": Final(quantity=Velocity("box")), "w": Final(quantity=AngularVelocity("box"))}
+    observe = {
+        "v": engine.Final(quantity=engine.Velocity("box")),
+        "w": engine.Final(quantity=engine.AngularVelocity("box")),
+    }
     slope = STEEPER * friction
     result = simulate(scene(slope, friction=friction), time_step=TIME_STEP, steps=15, observe=observe)
     tilt = math.atan(slope)
@@ -80,9 +72,9 @@ def slides_flat(simulate: Simulate, friction: float) -> bool:
     return result.completed and off < 1e-9
 
 
-def tells_apart(simulate: Simulate, time_step: float) -> bool:
+def tells_apart(simulate: case.Simulate, time_step: float) -> bool:
     """Whether the box stands at tan θ = µ − 1e-4 and slides at µ + 1e-4, in steps so long; four seconds, two steps at least."""
-    observe = {"v": Final(quantity=Velocity("box"))}
+    observe = {"v": engine.Final(quantity=engine.Velocity("box"))}
     steps = max(2, round(4.0 / time_step))
     speeds = (
         math.hypot(
@@ -93,17 +85,17 @@ def tells_apart(simulate: Simulate, time_step: float) -> bool:
     return [speed > SLIP_SPEED for speed in speeds] == [False, True]
 
 
-def roughest(simulate: Simulate) -> BreakPoint:
+def roughest(simulate: case.Simulate) -> case.BreakPoint:
     """The largest friction coefficient with which the box slides and does not tip."""
     return break_point(functools.partial(slides_flat, simulate), 0.15, 10.0, resolution=1e-3, walk=7)
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step [s] in which the box knows its angle."""
     return break_point(functools.partial(tells_apart, simulate), 1.0 / 60.0, LONGEST, walk=6)
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Slip angle",
     question="At which slope does a box on an inclined plane start to slide?",
     why="A box must stand for ever below its friction angle, and must not be held above it.",
@@ -124,11 +116,11 @@ TEST = ScalarTest(
     conclusion="Green: no creep below the friction angle, no hold above it. Red: one of the two.",
     source="thesis, section 3.2.4",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="cone",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="slip_slope_error",
                     description="tan of the slope at which the box slides, minus µ = 0.5",
                     unit="1",
@@ -143,11 +135,11 @@ TEST = ScalarTest(
             measure=_measure_slope,
             note="Cone friction, direct solver.",
         ),
-        Measurement(
+        case.Measurement(
             configuration="cone",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="bracket_held",
                     description="stands at tan θ = 0.4999 and slides at 0.5001: 2 if both",
                     unit="1",
@@ -162,9 +154,9 @@ TEST = ScalarTest(
             note="Cone friction, direct solver.",
         ),
     ),
-    example=lambda: Example(scene=scene(FRICTION), time_step=TIME_STEP),
+    example=lambda: case.Example(scene=scene(FRICTION), time_step=TIME_STEP),
     figures=(
-        Figure(
+        case.Figure(
             name="slip-angle-against-friction",
             title="Angle at which the box slides against the friction coefficient",
             draw=_draw_angle,
@@ -172,7 +164,7 @@ TEST = ScalarTest(
         ),
     ),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="slide",
             description="speed after 1 s at tan θ = 0.51 against g (sin θ − µ cos θ) t, µ = 0.5",
             unit="m/s",
@@ -184,7 +176,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="roughest",
             title="Roughest box that slides before it tips",
             configuration="cone",
@@ -195,7 +187,7 @@ TEST = ScalarTest(
             expected_source="friction µ N half an edge below the centre turns a cube over when N at its front edge, half an edge "
             "ahead, cannot balance it: µ > 1, on any slope; to the resolution of the search",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest step in which the box knows its angle",
             configuration="cone",

@@ -8,18 +8,9 @@ from itertools import product
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Final, Method, Position, Trace, Velocity
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Example,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.inclined_plane.scene import FRICTION, GRAVITY, scene
 
@@ -41,50 +32,50 @@ def downhill(friction: float, direction: float, time: float) -> np.ndarray:
     return np.array([-speed * math.cos(direction), -speed * math.sin(direction), 0.0])
 
 
-def creep(simulate: Simulate, time_step: float, friction: float, direction: float, mass: float) -> float:
+def creep(simulate: case.Simulate, time_step: float, friction: float, direction: float, mass: float) -> float:
     """How far the box has moved in the second after it has settled on the gentle slope [m]."""
     first, count = round(SETTLED / time_step), round(STOOD / time_step)
-    observe = {"place": Trace(quantity=Position("box"), first=first, every=count - first)}
+    observe = {"place": engine.Trace(quantity=engine.Position("box"), first=first, every=count - first)}
     built = scene(GENTLE * friction, direction, friction, mass)
     place = simulate(built, time_step=time_step, steps=count, observe=observe)["place"]
     return float(np.linalg.norm(place[-1] - place[0]))
 
 
 def speed_error(
-    simulate: Simulate,
+    simulate: case.Simulate,
     time_step: float,
     friction: float,
     direction: float,
     mass: float,
-    method: Method = PLAIN,
+    method: engine.Method = engine.PLAIN,
 ) -> float:
     """How far the velocity on the steep slope is from the closed form's after a second, over its size."""
-    observe = {"velocity": Final(quantity=Velocity("box"))}
+    observe = {"velocity": engine.Final(quantity=engine.Velocity("box"))}
     built = scene(STEEP * friction, direction, friction, mass)
     found = simulate(built, time_step=time_step, duration=SLID, method=method, observe=observe)["velocity"]
     right = downhill(friction, direction, SLID)
     return float(np.linalg.norm(found - right) / np.linalg.norm(right))
 
 
-def _stands(simulate: Simulate, time_step: float) -> dict[str, float]:
+def _stands(simulate: case.Simulate, time_step: float) -> dict[str, float]:
     grid = product(FRICTIONS, DIRECTIONS, MASSES)
     return {"creep": max(creep(simulate, time_step, *cell) for cell in grid)}
 
 
-def _slides(simulate: Simulate, time_step: float) -> dict[str, float]:
+def _slides(simulate: case.Simulate, time_step: float) -> dict[str, float]:
     grid = product(FRICTIONS, DIRECTIONS, MASSES)
     return {"slide_error": max(speed_error(simulate, time_step, *cell) for cell in grid)}
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """The error of the velocity [m/s] of a box that slides askew."""
     size = float(np.linalg.norm(downhill(FRICTION, ASKEW, SLID)))
     return size * speed_error(simulate, time_step, FRICTION, ASKEW, 1.0, method)
 
 
-def tells_apart(simulate: Simulate, time_step: float = 1.0 / 60.0, mass: float = 1.0) -> bool:
+def tells_apart(simulate: case.Simulate, time_step: float = 1.0 / 60.0, mass: float = 1.0) -> bool:
     """Whether the box stands on the gentle slope and slides as it should down the steep one, askew, for ten such steps."""
-    observe = {"velocity": Final(quantity=Velocity("box"))}
+    observe = {"velocity": engine.Final(quantity=engine.Velocity("box"))}
     found = [
         simulate(
             scene(times * FRICTION, ASKEW, FRICTION, mass), time_step=time_step, steps=10, observe=observe
@@ -96,19 +87,19 @@ def tells_apart(simulate: Simulate, time_step: float = 1.0 / 60.0, mass: float =
     return off < 1e-9 * float(np.linalg.norm(right))
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step [s] in which the box knows its slope and its way."""
     return break_point(functools.partial(tells_apart, simulate), 1.0 / 60.0, LONGEST, walk=6)
 
 
-def heaviest(simulate: Simulate) -> BreakPoint:
+def heaviest(simulate: case.Simulate) -> case.BreakPoint:
     """The heaviest box [kg] that knows them."""
     return break_point(lambda mass: tells_apart(simulate, mass=mass), 1.0, HEAVIEST, walk=5)
 
 
-def _at(per_second: int) -> tuple[Measurement, ...]:
+def _at(per_second: int) -> tuple[case.Measurement, ...]:
     time_step = 1.0 / per_second
-    stands = Metric(
+    stands = case.Metric(
         name="creep",
         description="how far a box moves in a second where its friction holds it, the farthest of 18: tan θ = 0.9 µ",
         unit="m",
@@ -119,7 +110,7 @@ def _at(per_second: int) -> tuple[Measurement, ...]:
         reference=0.0,
         tolerance=1e-12,
     )
-    slides = Metric(
+    slides = case.Metric(
         name="slide_error",
         description="velocity after 1 s down a slope of tan θ = 1.2 µ against g (sin θ − µ cos θ) t, of its size, worst of 18",
         unit="1",
@@ -131,7 +122,7 @@ def _at(per_second: int) -> tuple[Measurement, ...]:
         tolerance=1e-12,
     )
     return tuple(
-        Measurement(
+        case.Measurement(
             configuration="cone",
             time_step=time_step,
             metrics=(metric,),
@@ -142,7 +133,7 @@ def _at(per_second: int) -> tuple[Measurement, ...]:
     )
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Grid of slopes",
     question="Does a box stand or slide by Coulomb's law, whatever its friction, slope, direction, mass and step?",
     why="A friction that is regularised, split along two axes or bounded by a guess holds at one point of this grid and "
@@ -164,9 +155,9 @@ TEST = ScalarTest(
     conclusion="Green: friction is Coulomb's everywhere on the grid. Red: it creeps, drags, or knows a direction, a mass or a step.",
     source="ours; asked for by users of several engines (newton-physics/newton#2549, erincatto/solver2d#17)",
     measurements=tuple(one for n in STEPS_A_SECOND for one in _at(n)),
-    example=lambda: Example(scene=scene(STEEP * FRICTION, ASKEW), time_step=1.0 / 60.0),
+    example=lambda: case.Example(scene=scene(STEEP * FRICTION, ASKEW), time_step=1.0 / 60.0),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="askew",
             description="velocity after 1 s at tan θ = 0.6 and 22.5° to an edge against g (sin θ − µ cos θ) t, µ = 0.5",
             unit="m/s",
@@ -178,7 +169,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest step in which a box stands, and slides straight down",
             configuration="cone",
@@ -188,7 +179,7 @@ TEST = ScalarTest(
             expected=(LONGEST, LONGEST),
             expected_source="gravity and the impulses that answer it have the factor h alike; the search ends at 100 s",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="heaviest",
             title="Heaviest box that stands, and slides straight down",
             configuration="cone",

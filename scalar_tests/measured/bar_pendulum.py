@@ -8,16 +8,16 @@ from dataclasses import replace
 import numpy as np
 from scipy.special import ellipk
 
-from spook_tracker.engine import WORLD, Box, Hinge, JointCoordinate, Method, RigidBody, Scene, Trace
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import BreakPoint, Drawing, Example, Figure, Simulate
 from spook_tracker.scalar_tests.measured import readings
 from spook_tracker.scalar_tests.measured.readings import Reading, deviation
 from spook_tracker.scalar_tests.sweep import line
 
 GRAVITY = 9.81  # m/s²
 WIDTH, DEPTH, MASS = 0.016, 0.008, 1.0  # m, m, kg: a brick of two by one studs; neither matters
-ORDER_4 = Method(composition="order4")
+ORDER_4 = engine.Method(composition="order4")
 TIME_STEP = 1.0 / 240.0  # s
 DURATION = 20.0  # s
 SOURCE = "Coramik & İnanç, Physics Education 58 (2023) 055014"
@@ -38,18 +38,20 @@ RATE = math.sqrt(
 SEARCHED = 2e-3
 
 
-def scene(length: float, start: float) -> Scene:
+def scene(length: float, start: float) -> engine.Scene:
     """A bar [m] hung by its end, let go `start` [degrees] from the vertical."""
     turn = math.radians(start)
-    bar = RigidBody(
+    bar = engine.RigidBody(
         name="bar",
         mass=MASS,
-        shape=Box((DEPTH, WIDTH, length)),
+        shape=engine.Box((DEPTH, WIDTH, length)),
         position=(-0.5 * length * math.sin(turn), 0.0, -0.5 * length * math.cos(turn)),
         orientation=(math.cos(0.5 * turn), 0.0, math.sin(0.5 * turn), 0.0),
     )
-    pin = Hinge(name="pin", between=(WORLD, "bar"), at=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0), compliance=0.0)
-    return Scene(bodies=(bar,), constraints=(pin,), gravity=(0.0, 0.0, -GRAVITY), contacts=False)
+    pin = engine.Hinge(
+        name="pin", between=(engine.WORLD, "bar"), at=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0), compliance=0.0
+    )
+    return engine.Scene(bodies=(bar,), constraints=(pin,), gravity=(0.0, 0.0, -GRAVITY), contacts=False)
 
 
 def right(length: float, start: float) -> float:
@@ -60,10 +62,14 @@ def right(length: float, start: float) -> float:
 
 
 def period(
-    simulate: Simulate, length: float, start: float, time_step: float = TIME_STEP, method: Method = ORDER_4
+    simulate: case.Simulate,
+    length: float,
+    start: float,
+    time_step: float = TIME_STEP,
+    method: engine.Method = ORDER_4,
 ) -> float:
     """Mean period [s] from where the angle goes through zero."""
-    observe = {"angle": Trace(quantity=JointCoordinate("pin"))}
+    observe = {"angle": engine.Trace(quantity=engine.JointCoordinate("pin"))}
     result = simulate(
         scene(length, start), time_step=time_step, duration=DURATION, method=method, observe=observe
     )
@@ -73,7 +79,7 @@ def period(
     return 2.0 * float(zero[-1] - zero[0]) / (len(zero) - 1) if len(zero) > 1 else math.nan
 
 
-def measure(simulate: Simulate) -> dict[str, float]:
+def measure(simulate: case.Simulate) -> dict[str, float]:
     """Periods of the five bars."""
     bars = tuple(zip(LENGTHS, STARTS, strict=True))
     found = [period(simulate, *bar) for bar in bars]
@@ -83,32 +89,32 @@ def measure(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Relative error of the shortest bar's period."""
     return period(simulate, LENGTHS[0], STARTS[0], time_step, method) / right(LENGTHS[0], STARTS[0]) - 1.0
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step [s] with which a bar that hardly swings goes on hardly swinging."""
 
     def holds(time_step: float) -> bool:
-        observe = {"angle": Trace(quantity=JointCoordinate("pin"))}
+        observe = {"angle": engine.Trace(quantity=engine.JointCoordinate("pin"))}
         result = simulate(scene(LENGTHS[0], SMALL), time_step=time_step, steps=STEPS, observe=observe)
         return result.completed and float(np.abs(result["angle"]).max()) < 0.5 * STEPS * math.radians(SMALL)
 
     return break_point(holds, 0.2, 0.6, resolution=SEARCHED, walk=4)
 
 
-def hardest_push(simulate: Simulate) -> BreakPoint:
+def hardest_push(simulate: case.Simulate) -> case.BreakPoint:
     """The fastest turn [rad/s] from which a hanging bar does not go over the top."""
 
     def returns(turn: float) -> bool:
-        observe = {"angle": Trace(quantity=JointCoordinate("pin"))}
+        observe = {"angle": engine.Trace(quantity=engine.JointCoordinate("pin"))}
         hanging = scene(LENGTHS[0], 0.0)
         pushed = tuple(
             replace(bar, velocity=(-0.5 * LENGTHS[0] * turn, 0.0, 0.0), angular_velocity=(0.0, turn, 0.0))
             for bar in hanging.bodies
-            if isinstance(bar, RigidBody)
+            if isinstance(bar, engine.RigidBody)
         )
         built = replace(hanging, bodies=pushed)
         result = simulate(built, time_step=TIME_STEP, duration=5.0, method=ORDER_4, observe=observe)
@@ -117,9 +123,9 @@ def hardest_push(simulate: Simulate) -> BreakPoint:
     return break_point(returns, RATE, 4.2 * RATE, resolution=SEARCHED, walk=4)
 
 
-def _draw(simulate: Simulate) -> Drawing:
+def _draw(simulate: case.Simulate) -> case.Drawing:
     longer = tuple(float(length) for length in np.linspace(0.46, 0.69, 8))
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulated, from 12°", longer, (period(simulate, length, 12.0) for length in longer)),
             line("by video", LENGTHS, BY_VIDEO, "points"),
@@ -154,8 +160,8 @@ TEST = readings.measured_test(
         "Left out: air, the pin's friction, studs and the telephone's own weight, and that the pin is not quite at the end.",
     ),
     conclusion="Green: a hinged body swings as a real one does. Red: gravity, inertia or the clock is wrong.",
-    example=lambda: Example(scene=scene(LENGTHS[0], STARTS[0]), time_step=TIME_STEP, method=ORDER_4),
-    figures=(Figure(name="period", title="Period against length", draw=_draw),),
+    example=lambda: case.Example(scene=scene(LENGTHS[0], STARTS[0]), time_step=TIME_STEP, method=ORDER_4),
+    figures=(case.Figure(name="period", title="Period against length", draw=_draw),),
     ladders=readings.ladder(
         ladder_error,
         (1.0 / n for n in (60, 120, 240, 480, 960)),

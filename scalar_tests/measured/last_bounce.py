@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Energy, Method, Plane, Position, RigidBody, Scene, Sphere, Trace
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import BreakPoint, Drawing, Example, Figure, Simulate, StabilityStudy
 from spook_tracker.scalar_tests.measured import readings
 from spook_tracker.scalar_tests.measured.readings import Reading, deviation
 from spook_tracker.scalar_tests.sweep import line
@@ -34,19 +34,21 @@ READINGS = (
 )
 
 
-def scene(restitution: float = RESTITUTION) -> Scene:
+def scene(restitution: float = RESTITUTION) -> engine.Scene:
     """A ball as it leaves a table for its first bounce."""
     rubber = Material(restitution=restitution)
-    table = RigidBody(name="table", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rubber)
-    ball = RigidBody(
+    table = engine.RigidBody(
+        name="table", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=rubber
+    )
+    ball = engine.RigidBody(
         name="ball",
         mass=MASS,
-        shape=Sphere(RADIUS),
+        shape=engine.Sphere(RADIUS),
         position=(0.0, 0.0, RADIUS),
         velocity=(0.0, 0.0, 0.5 * GRAVITY * FIRST),
         material=rubber,
     )
-    return Scene(bodies=(table, ball), gravity=(0.0, 0.0, -GRAVITY))
+    return engine.Scene(bodies=(table, ball), gravity=(0.0, 0.0, -GRAVITY))
 
 
 def heard() -> float:
@@ -56,35 +58,35 @@ def heard() -> float:
     return before + 0.5 * flight + math.sqrt(0.25 * flight**2 - 2.0 * HEARD / GRAVITY)
 
 
-def end(simulate: Simulate, time_step: float = TIME_STEP, method: Method = PLAIN) -> float:
+def end(simulate: case.Simulate, time_step: float = TIME_STEP, method: engine.Method = engine.PLAIN) -> float:
     """When [s] the ball is last seen above HEARD."""
-    observe = {"place": Trace(quantity=Position("ball"))}
+    observe = {"place": engine.Trace(quantity=engine.Position("ball"))}
     result = simulate(scene(), time_step=time_step, duration=DURATION, method=method, observe=observe)
     above = np.nonzero(result["place"][:, 2] - RADIUS > HEARD)[0]
     return float(result.sample_times["place"][above[-1]]) if len(above) else math.nan
 
 
-def measure(simulate: Simulate) -> dict[str, float]:
+def measure(simulate: case.Simulate) -> dict[str, float]:
     """The end against what was heard, and against the sum of the bounces."""
     found = end(simulate)
     return {"deviation": deviation((found,), READINGS), "theory_error": abs(found / heard() - 1.0)}
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Relative error of the time at which the ball is last above HEARD."""
     return end(simulate, time_step, method) / heard() - 1.0
 
 
-def liveliest(simulate: Simulate) -> BreakPoint:
+def liveliest(simulate: case.Simulate) -> case.BreakPoint:
     """The largest restitution with which no bounce is higher than the first."""
 
     def holds(restitution: float) -> bool:
-        observe = {"energy": Trace(quantity=Energy())}
+        observe = {"energy": engine.Trace(quantity=engine.Energy())}
         result = simulate(
             scene(restitution),
             time_step=TIME_STEP,
             duration=DURATION,
-            method=Method(half_step_velocities=True),
+            method=engine.Method(half_step_velocities=True),
             observe=observe,
         )
         most = 0.125 * MASS * (GRAVITY * FIRST) ** 2
@@ -96,11 +98,11 @@ def liveliest(simulate: Simulate) -> BreakPoint:
 LIFT = 0.01  # m, of a bounce that is one
 
 
-def dullest(simulate: Simulate) -> BreakPoint:
+def dullest(simulate: case.Simulate) -> case.BreakPoint:
     """The least restitution with which the ball comes up again, by LIFT."""
 
     def bounces(restitution: float) -> bool:
-        observe = {"place": Trace(quantity=Position("ball"))}
+        observe = {"place": engine.Trace(quantity=engine.Position("ball"))}
         result = simulate(scene(restitution), time_step=TIME_STEP, duration=1.25 * FIRST, observe=observe)
         after = result.sample_times["place"] > FIRST + 2.0 * TIME_STEP
         return bool((result["place"][after, 2] - RADIUS).max() > LIFT)
@@ -116,11 +118,11 @@ def dull(worst: float = 0.0) -> float:
     )
 
 
-def _draw(simulate: Simulate) -> Drawing:
-    observe = {"place": Trace(quantity=Position("ball"), every=5)}
+def _draw(simulate: case.Simulate) -> case.Drawing:
+    observe = {"place": engine.Trace(quantity=engine.Position("ball"), every=5)}
     result = simulate(scene(), time_step=TIME_STEP, duration=7.0, observe=observe)
     gap = result["place"][:, 2] - RADIUS
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulated", result.sample_times["place"], gap),
             line("heard last", (READINGS[0].value,) * 2, (0.0, float(gap.max())), "reference"),
@@ -159,14 +161,16 @@ TEST = readings.measured_test(
         "Left out: air, the ball's spin, and that rubber keeps more of a gentle impact: why the real ball is heard longer.",
     ),
     conclusion="Green: many impacts add up as they do in the world. Red: energy is lost or made as bounces get small.",
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP),
-    figures=(Figure(name="bounces", title="Bounces, and when the real ball was heard last", draw=_draw),),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP),
+    figures=(
+        case.Figure(name="bounces", title="Bounces, and when the real ball was heard last", draw=_draw),
+    ),
     ladders=readings.ladder(
         ladder_error,
         (1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5),
         1.0,
         better="four substeps",
-        method=Method(substeps=4),
+        method=engine.Method(substeps=4),
         better_order=1.0,
         name="end",
         description="relative error of the time at which the ball is last above 0.1 mm",
@@ -174,7 +178,7 @@ TEST = readings.measured_test(
         target_error=1e-3,
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="liveliest",
             title="Largest restitution with which no bounce is higher than the first",
             configuration="half-step",
@@ -184,7 +188,7 @@ TEST = readings.measured_test(
             expected=(1.0, 1.0),
             expected_source="an impact keeps e² ≤ 1 of its energy; the search ends at 1",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="dullest",
             title="Least restitution with which the ball comes up again by a centimetre",
             configuration="plain",

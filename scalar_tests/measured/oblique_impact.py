@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from spook_tracker.engine import AngularVelocity, Final, Plane, RigidBody, Scene, Sphere, Velocity
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import BreakPoint, Drawing, Example, Figure, Metric, Simulate
 from spook_tracker.scalar_tests.measured import readings
 from spook_tracker.scalar_tests.measured.readings import Reading, deviation
 from spook_tracker.scalar_tests.sweep import line
@@ -34,25 +34,30 @@ READINGS = tuple(
 )
 
 
-def scene(angle: float) -> Scene:
+def scene(angle: float) -> engine.Scene:
     """The ball as it touches the plate, `angle` [degrees] from the normal."""
     hard = Material(friction=FRICTION, restitution=RESTITUTION, tangential_restitution=TURNED)
     turn = math.radians(angle)
-    plate = RigidBody(name="plate", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=hard)
-    ball = RigidBody(
+    plate = engine.RigidBody(
+        name="plate", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=hard
+    )
+    ball = engine.RigidBody(
         name="ball",
         mass=4.0 / 3.0 * math.pi * RADIUS**3 * DENSITY,
-        shape=Sphere(RADIUS),
+        shape=engine.Sphere(RADIUS),
         position=(0.0, 0.0, RADIUS),
         velocity=(SPEED * math.sin(turn), 0.0, -SPEED * math.cos(turn)),
         material=hard,
     )
-    return Scene(bodies=(plate, ball), gravity=(0.0, 0.0, 0.0))
+    return engine.Scene(bodies=(plate, ball), gravity=(0.0, 0.0, 0.0))
 
 
-def rebound(simulate: Simulate, angle: float) -> tuple[float, float]:
+def rebound(simulate: case.Simulate, angle: float) -> tuple[float, float]:
     """Angle [degrees] from the normal and spin [rad/s] after the impact."""
-    observe = {"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))}
+    observe = {
+        "v": engine.Final(quantity=engine.Velocity("ball")),
+        "w": engine.Final(quantity=engine.AngularVelocity("ball")),
+    }
     result = simulate(scene(angle), time_step=TIME_STEP, steps=1, observe=observe)
     return math.degrees(math.atan2(float(result["v"][0]), float(result["v"][2]))), float(result["w"][1])
 
@@ -65,7 +70,7 @@ def sliding(angle: float) -> tuple[float, float]:
     return math.degrees(math.atan(slope)), 2.5 * push * SPEED * math.cos(turn) / RADIUS
 
 
-def measure(simulate: Simulate) -> dict[str, float]:
+def measure(simulate: case.Simulate) -> dict[str, float]:
     """Rebounds at the four measured angles beyond 30°."""
     found = [rebound(simulate, angle) for angle in ANGLES]
     right = [sliding(angle) for angle in ANGLES]
@@ -80,7 +85,7 @@ def measure(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def steepest_grip(simulate: Simulate) -> BreakPoint:
+def steepest_grip(simulate: case.Simulate) -> case.BreakPoint:
     """Steepest impact [degrees] at which the ball grips: its slip turns round by TURNED."""
 
     def grips(angle: float) -> bool:
@@ -90,7 +95,7 @@ def steepest_grip(simulate: Simulate) -> BreakPoint:
     return break_point(grips, 10.0, 60.0, resolution=SEARCHED, walk=4)
 
 
-def fastest(simulate: Simulate) -> BreakPoint:
+def fastest(simulate: case.Simulate) -> case.BreakPoint:
     """How many times as fast the ball may come and still leave at the right angle."""
 
     def right(times: float) -> bool:
@@ -100,7 +105,7 @@ def fastest(simulate: Simulate) -> BreakPoint:
             replace(body, velocity=(times * body.velocity[0], 0.0, times * body.velocity[2]))
             for body in built.bodies
         )
-        observe = {"v": Final(quantity=Velocity("ball"))}
+        observe = {"v": engine.Final(quantity=engine.Velocity("ball"))}
         result = simulate(replace(built, bodies=quick), time_step=TIME_STEP, steps=1, observe=observe)
         found = math.degrees(math.atan2(float(result["v"][0]), float(result["v"][2])))
         return result.completed and abs(found / sliding(angle)[0] - 1.0) < 1e-12
@@ -108,9 +113,9 @@ def fastest(simulate: Simulate) -> BreakPoint:
     return break_point(right, 1.0, FASTEST, resolution=SEARCHED, walk=7)
 
 
-def _draw(simulate: Simulate) -> Drawing:
+def _draw(simulate: case.Simulate) -> case.Drawing:
     angles = tuple(float(a) for a in range(2, 66, 3))
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulated", angles, (rebound(simulate, a)[0] for a in angles)),
             line("measured", ANGLES, (one.value for one in READINGS), "points"),
@@ -136,7 +141,7 @@ TEST = readings.measured_test(
     ),
     measure,
     readings.against_theory(1e-12, "one impact by Coulomb's law; rounding"),
-    Metric(
+    case.Metric(
         name="at_20_degrees",
         description="rebound at 20.56° minus the measured 12.36°, where real balls grip elastically",
         unit="degrees",
@@ -157,8 +162,8 @@ TEST = readings.measured_test(
         "more), wear, and spin of which readings scatter by 7 %.",
     ),
     conclusion="Green: rigid bodies with Coulomb's law rebound as real ones do. Red: friction in an impact is wrong.",
-    example=lambda: Example(scene=scene(ANGLES[0]), time_step=TIME_STEP, duration=0.01),
-    figures=(Figure(name="rebound", title="Angle of rebound, simulated and measured", draw=_draw),),
+    example=lambda: case.Example(scene=scene(ANGLES[0]), time_step=TIME_STEP, duration=0.01),
+    figures=(case.Figure(name="rebound", title="Angle of rebound, simulated and measured", draw=_draw),),
     lacks={"ladder": "exact at every step"},
     stability=(
         *readings.breaks_at(

@@ -9,18 +9,8 @@ from typing import Any
 
 from scipy.special import chdtri
 
-from spook_tracker.engine import PLAIN, Method
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Ladder,
-    Measurement,
-    Metric,
-    Role,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.sweep import told as number
 
 BY_CHANCE = 1e-3  # so often a right model lies further off than the limit
@@ -58,9 +48,9 @@ def distance(off: float) -> str:
     return f"The simulation is {number(off, 3)} standard deviations from what was measured, root mean square."
 
 
-def agreement(readings: Sequence[Reading], source: str) -> Metric:
+def agreement(readings: Sequence[Reading], source: str) -> case.Metric:
     """How far the simulation is from what was measured, in standard deviations; any engine is held to it."""
-    return Metric(
+    return case.Metric(
         name="deviation",
         description=f"simulated minus measured over its standard deviation, root mean square of {len(readings)}",
         unit="1",
@@ -73,9 +63,9 @@ def agreement(readings: Sequence[Reading], source: str) -> Metric:
     )
 
 
-def against_theory(limit: float, why: str, role: Role = "companion") -> Metric:
+def against_theory(limit: float, why: str, role: case.Role = "companion") -> case.Metric:
     """How well the method solves the model, whatever the world does."""
-    return Metric(
+    return case.Metric(
         name="theory_error",
         description="largest relative distance from the model's closed form",
         unit="1",
@@ -88,25 +78,27 @@ def against_theory(limit: float, why: str, role: Role = "companion") -> Metric:
 
 
 def ladder(
-    error: Callable[[Simulate, float, Method], float],
+    error: Callable[[case.Simulate, float, engine.Method], float],
     time_steps: Iterable[float],
     order: float,
     *,
     better: str,
-    method: Method,
+    method: engine.Method,
     better_order: float | None = None,
     order_range: tuple[float, float] | None = None,
     **rest: Any,
-) -> tuple[Ladder, ...]:
+) -> tuple[case.Ladder, ...]:
     """Plain SPOOK and its order, beside one better method.
 
     `better_order` None: its error ends in rounding, or in how it is read. `rest` is as in any other ladder.
     """
 
-    plain = Configuration(name="plain", method=PLAIN, expected_order=order, order_range=order_range)
-    other = Configuration(name=better, method=method, expected_order=better_order)
+    plain = case.Configuration(
+        name="plain", method=engine.PLAIN, expected_order=order, order_range=order_range
+    )
+    other = case.Configuration(name=better, method=method, expected_order=better_order)
     return (
-        Ladder(
+        case.Ladder(
             time_steps=tuple(time_steps),
             configurations=(plain, other),
             error=error,
@@ -119,14 +111,14 @@ def ladder(
 def breaks_at(
     right: float,
     searched: float,
-    study: Callable[[Simulate], BreakPoint],
+    study: Callable[[case.Simulate], case.BreakPoint],
     source: str,
     configuration: str = "plain",
     **rest: Any,
-) -> tuple[StabilityStudy, ...]:
+) -> tuple[case.StabilityStudy, ...]:
     """A break point at `right`, by theory; a search to a relative `searched` ends that far short of it."""
     return (
-        StabilityStudy(
+        case.StabilityStudy(
             configuration=configuration,
             study=study,
             expected=((1.0 - 1.1 * searched) * right, right),
@@ -142,24 +134,24 @@ def measured_test(
     readings: Sequence[Reading],
     unit: str,
     parameters: tuple[tuple[str, str], ...],
-    measure: Callable[[Simulate], dict[str, float]],
-    *metrics: Metric,
+    measure: Callable[[case.Simulate], dict[str, float]],
+    *metrics: case.Metric,
     configuration: str,
     time_step: float,
     note: str,
     **rest: Any,
-) -> ScalarTest:
+) -> case.ScalarTest:
     """A test that is held to `readings` of a source; `metrics` and `rest` are as in any other test.
 
     `published` goes on where the sentence "Measured: source" ends: how it was measured, and what stands for σ.
     """
-    return ScalarTest(
+    return case.ScalarTest(
         parameters=(*parameters, *table_rows(readings, unit)),
         reference=f"Measured: {source}{published}",
         source=f"measured: {source}",
         measured=True,
         measurements=(
-            Measurement(
+            case.Measurement(
                 configuration=configuration,
                 time_step=time_step,
                 metrics=(agreement(readings, source), *metrics),

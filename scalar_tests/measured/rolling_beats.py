@@ -4,29 +4,10 @@ from __future__ import annotations
 
 import math
 
-from spook_tracker.engine import (
-    AngularVelocity,
-    Final,
-    Method,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-    Sphere,
-    Trace,
-    Velocity,
-)
+from spook_tracker import engine
 from spook_tracker.engine.bodies import Material
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Metric,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.measured import readings
 from spook_tracker.scalar_tests.measured.readings import Reading, deviation
 from spook_tracker.scalar_tests.sweep import line
@@ -36,7 +17,7 @@ SLOPE = math.radians(1.7)
 BEAT = 0.55  # s
 POINT = 0.94e-3  # m, Galileo's unit
 FRICTION, RADIUS, MASS = 0.3, 0.02, 0.3  # 1, m, kg: none of them matters while the ball rolls
-HALF_STEP = Method(half_step_velocities=True)
+HALF_STEP = engine.Method(half_step_velocities=True)
 TIME_STEP = BEAT / 20.0  # s
 BEATS = 8
 FRETS = (33, 130, 298, 526, 824, 1192, 1620, 2123)  # points from where the ball is let go
@@ -56,25 +37,29 @@ SAME = 1e-13  # of the largest impulse: so well balanced, the velocities of the 
 LADDER_DURATION = BEAT * BEATS  # s
 
 
-def scene(slope: float = SLOPE) -> Scene:
+def scene(slope: float = SLOPE) -> engine.Scene:
     """A ball at rest on a plane under gravity tilted by `slope` [rad] towards +x."""
     rough = Material(friction=FRICTION)
-    ramp = RigidBody(name="ramp", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
-    ball = RigidBody(
-        name="ball", mass=MASS, shape=Sphere(RADIUS), position=(0.0, 0.0, RADIUS), material=rough
+    ramp = engine.RigidBody(
+        name="ramp", motion="static", shape=engine.Plane(), position=(0.0, 0.0, 0.0), material=rough
     )
-    return Scene(bodies=(ramp, ball), gravity=(GRAVITY * math.sin(slope), 0.0, -GRAVITY * math.cos(slope)))
+    ball = engine.RigidBody(
+        name="ball", mass=MASS, shape=engine.Sphere(RADIUS), position=(0.0, 0.0, RADIUS), material=rough
+    )
+    return engine.Scene(
+        bodies=(ramp, ball), gravity=(GRAVITY * math.sin(slope), 0.0, -GRAVITY * math.cos(slope))
+    )
 
 
-def rolled(simulate: Simulate) -> tuple[float, ...]:
+def rolled(simulate: case.Simulate) -> tuple[float, ...]:
     """Distance [m] at each beat."""
-    observe = {"place": Trace(quantity=Position("ball"), every=round(BEAT / TIME_STEP))}
+    observe = {"place": engine.Trace(quantity=engine.Position("ball"), every=round(BEAT / TIME_STEP))}
     steps = round(BEATS * BEAT / TIME_STEP)
     result = simulate(scene(), time_step=TIME_STEP, steps=steps, method=HALF_STEP, observe=observe)
     return tuple(map(float, result["place"][1:, 0]))
 
 
-def measure(simulate: Simulate) -> dict[str, float]:
+def measure(simulate: case.Simulate) -> dict[str, float]:
     """Distances over the last one, against Galileo's and against ½ a t²."""
     found = rolled(simulate)
     right = [0.5 * PULL * (n * BEAT) ** 2 for n in range(1, BEATS + 1)]
@@ -85,18 +70,21 @@ def measure(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Distance after eight beats minus ½ a t² [m]."""
-    observe = {"place": Final(quantity=Position("ball"), from_start=True)}
+    observe = {"place": engine.Final(quantity=engine.Position("ball"), from_start=True)}
     result = simulate(scene(), time_step=time_step, duration=LADDER_DURATION, method=method, observe=observe)
     return float(result["place"][0]) - 0.5 * PULL * LADDER_DURATION**2
 
 
-def steepest_rolled(simulate: Simulate) -> BreakPoint:
+def steepest_rolled(simulate: case.Simulate) -> case.BreakPoint:
     """Steepest slope (its tangent) down which the ball rolls without slip."""
 
     def rolls(tangent: float) -> bool:
-        observe = {"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))}
+        observe = {
+            "v": engine.Final(quantity=engine.Velocity("ball")),
+            "w": engine.Final(quantity=engine.AngularVelocity("ball")),
+        }
         result = simulate(scene(math.atan(tangent)), time_step=TIME_STEP, steps=40, observe=observe)
         speed = float(result["v"][0])
         return abs(speed - RADIUS * float(result["w"][1])) <= 1e-9 * speed
@@ -107,11 +95,11 @@ def steepest_rolled(simulate: Simulate) -> BreakPoint:
 GENTLEST = 7.0 / 5.0 * SAME  # rad: less changes an impulse of m g h by 5/7 of the slope
 
 
-def gentlest(simulate: Simulate) -> BreakPoint:
+def gentlest(simulate: case.Simulate) -> case.BreakPoint:
     """The gentlest slope [rad] down which the ball rolls as it must."""
 
     def rolls(slope: float) -> bool:
-        observe = {"place": Final(quantity=Position("ball"))}
+        observe = {"place": engine.Final(quantity=engine.Position("ball"))}
         result = simulate(scene(slope), time_step=TIME_STEP, steps=40, method=HALF_STEP, observe=observe)
         way = 0.5 * 5.0 / 7.0 * GRAVITY * math.sin(slope) * (40.0 * TIME_STEP) ** 2
         return result.completed and abs(float(result["place"][0]) / way - 1.0) < 1e-9
@@ -119,10 +107,10 @@ def gentlest(simulate: Simulate) -> BreakPoint:
     return break_point(rolls, SLOPE, 1e-16, resolution=1e-3, walk=8)
 
 
-def _draw(simulate: Simulate) -> Drawing:
+def _draw(simulate: case.Simulate) -> case.Drawing:
     beats = tuple(float(n) for n in range(1, BEATS + 1))
     found = rolled(simulate)
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulated", beats, (one / POINT for one in found)),
             line("Galileo's frets", beats, FRETS, "points"),
@@ -145,7 +133,7 @@ TEST = readings.measured_test(
     ),
     measure,
     readings.against_theory(1e-12, "a steady pull is exact with velocities at mid-step; rounding", "gate"),
-    Metric(
+    case.Metric(
         name="last_fret",
         description="distance at the eighth beat over the last fret, less 1, with Drake's slope and beat, each known to 2 or 3 %",
         unit="1",
@@ -165,8 +153,8 @@ TEST = readings.measured_test(
         "Left out: the groove, rolling friction, and the knock of the frets.",
     ),
     conclusion="Green: a rolling ball is as far after each beat as the first one measured. Red: motion is not t², or not rolling.",
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP, method=HALF_STEP),
-    figures=(Figure(name="frets", title="Distance at each beat", draw=_draw),),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP, method=HALF_STEP),
+    figures=(case.Figure(name="frets", title="Distance at each beat", draw=_draw),),
     ladders=readings.ladder(
         ladder_error,
         (BEAT / n for n in (10, 20, 40, 80, 160)),
@@ -189,7 +177,7 @@ TEST = readings.measured_test(
             definition="speed and spin agree to 1e-9 after 40 steps",
             unit="1",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="gentlest",
             title="Gentlest slope down which the ball rolls",
             configuration="half-step",

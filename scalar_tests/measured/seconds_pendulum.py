@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Distance, Method, Particle, Position, Scene, Trace
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import BreakPoint, Drawing, Example, Figure, Simulate
 from spook_tracker.scalar_tests.measured import readings
 from spook_tracker.scalar_tests.measured.readings import Reading, deviation
 from spook_tracker.scalar_tests.sweep import line
@@ -22,7 +22,7 @@ GRAVITY = (
 )  # m/s²: 981 196.29 mGal at Teddington on the Potsdam system, which is 14.0 mGal too high
 NEARBY = 1e-4  # m/s²: what Teddington and London may differ by, 15 km, 0.1° and some metres apart
 SWING = 1e-3  # rad: Kater's figure is for no swing at all; this one takes 6e-8 longer
-ORDER_4 = Method(composition="order4")
+ORDER_4 = engine.Method(composition="order4")
 TIME_STEP = 1.0 / 120.0  # s
 DURATION = 40.0  # s
 SOURCE = (
@@ -38,16 +38,18 @@ STEPS = 400  # of a search; at h ω = 2 a swing has grown two times that
 SEARCHED = 2e-3
 
 
-def scene(swing: float = SWING) -> Scene:
+def scene(swing: float = SWING) -> engine.Scene:
     """A bob on a rod without weight, let go `swing` [rad] from the vertical."""
-    bob = Particle(name="bob", mass=1.0, position=(LENGTH * math.sin(swing), 0.0, -LENGTH * math.cos(swing)))
-    rod = Distance(name="rod", between=((0.0, 0.0, 0.0), "bob"), compliance=0.0)
-    return Scene(bodies=(bob,), constraints=(rod,), gravity=(0.0, 0.0, -GRAVITY))
+    bob = engine.Particle(
+        name="bob", mass=1.0, position=(LENGTH * math.sin(swing), 0.0, -LENGTH * math.cos(swing))
+    )
+    rod = engine.Distance(name="rod", between=((0.0, 0.0, 0.0), "bob"), compliance=0.0)
+    return engine.Scene(bodies=(bob,), constraints=(rod,), gravity=(0.0, 0.0, -GRAVITY))
 
 
-def beat(simulate: Simulate, time_step: float = TIME_STEP, method: Method = ORDER_4) -> float:
+def beat(simulate: case.Simulate, time_step: float = TIME_STEP, method: engine.Method = ORDER_4) -> float:
     """Mean time [s] from one passage of the lowest place to the next."""
-    observe = {"place": Trace(quantity=Position("bob"))}
+    observe = {"place": engine.Trace(quantity=engine.Position("bob"))}
     result = simulate(scene(), time_step=time_step, duration=DURATION, method=method, observe=observe)
     times, x = result.sample_times["place"], result["place"][:, 0]
     place = np.nonzero((x[:-1] > 0.0) != (x[1:] > 0.0))[0]
@@ -55,33 +57,33 @@ def beat(simulate: Simulate, time_step: float = TIME_STEP, method: Method = ORDE
     return float(zero[-1] - zero[0]) / (len(zero) - 1) if len(zero) > 1 else math.nan
 
 
-def measure(simulate: Simulate) -> dict[str, float]:
+def measure(simulate: case.Simulate) -> dict[str, float]:
     """The beat against a second, and against the closed form."""
     found = beat(simulate)
     return {"deviation": deviation((found,), READINGS), "theory_error": abs(found / BEAT - 1.0)}
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Relative error of the beat."""
     return beat(simulate, time_step, method) / BEAT - 1.0
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step [s] with which a pendulum that hardly swings goes on hardly swinging."""
 
     def holds(time_step: float) -> bool:
-        observe = {"place": Trace(quantity=Position("bob"))}
+        observe = {"place": engine.Trace(quantity=engine.Position("bob"))}
         result = simulate(scene(1e-5), time_step=time_step, steps=STEPS, observe=observe)
         return result.completed and float(np.abs(result["place"][:, 0]).max()) < 1e-3 * LENGTH
 
     return break_point(holds, 0.3, 1.2, resolution=SEARCHED, walk=4)
 
 
-def hardest_push(simulate: Simulate) -> BreakPoint:
+def hardest_push(simulate: case.Simulate) -> case.BreakPoint:
     """The greatest speed [m/s] from which the hanging bob does not go over the top."""
 
     def returns(speed: float) -> bool:
-        observe = {"place": Trace(quantity=Position("bob"))}
+        observe = {"place": engine.Trace(quantity=engine.Position("bob"))}
         hanging = scene(0.0)
         built = replace(hanging, bodies=(replace(hanging.bodies[0], velocity=(speed, 0.0, 0.0)),))
         result = simulate(built, time_step=TIME_STEP, duration=8.0, method=ORDER_4, observe=observe)
@@ -91,10 +93,10 @@ def hardest_push(simulate: Simulate) -> BreakPoint:
     return break_point(returns, 2.0, 14.0, resolution=SEARCHED, walk=4)
 
 
-def _draw(simulate: Simulate) -> Drawing:
+def _draw(simulate: case.Simulate) -> case.Drawing:
     steps = tuple(1.0 / n for n in (30, 60, 120, 240))
-    off = tuple(abs(beat(simulate, h, PLAIN) - 1.0) for h in steps)
-    return Drawing(
+    off = tuple(abs(beat(simulate, h, engine.PLAIN) - 1.0) for h in steps)
+    return case.Drawing(
         curves=(
             line("plain SPOOK, against a second", steps, off, "both"),
             line("standard deviation", steps, (READINGS[0].sigma,) * len(steps), "reference"),
@@ -135,8 +137,8 @@ TEST = readings.measured_test(
         "Left out: air and its drag, the knife edges, the height above the sea: the length is corrected for them by Kater.",
     ),
     conclusion="Green: the engine's second, metre and gravity are those of the world. Red: the pendulum runs fast or slow.",
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP, method=ORDER_4),
-    figures=(Figure(name="beat", title="How far a beat is from a second", draw=_draw),),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP, method=ORDER_4),
+    figures=(case.Figure(name="beat", title="How far a beat is from a second", draw=_draw),),
     ladders=readings.ladder(
         ladder_error,
         (1.0 / n for n in (30, 60, 120, 240, 480)),

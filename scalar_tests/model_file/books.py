@@ -7,15 +7,17 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.scalar_tests.case import Estimate, Metric, Simulate
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.model_file.facts import BEYOND, PUSH, Asked, simulated, spread
 
 LASTS = 1.0  # s
 SAMPLES = 20
 
 
-def _one(name: str, description: str, unit: str) -> Metric:
-    return Metric(name=name, description=description, unit=unit, role="reported", better="smaller_magnitude")
+def _one(name: str, description: str, unit: str) -> case.Metric:
+    return case.Metric(
+        name=name, description=description, unit=unit, role="reported", better="smaller_magnitude"
+    )
 
 
 METRICS = (
@@ -28,7 +30,7 @@ METRICS = (
 )
 
 
-def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
+def measure(asked: Asked, simulate: case.Simulate) -> Mapping[str, float]:
     """A swing without damping, friction, contacts, limits, drag and actuation; and a run as the file has it."""
     end = min(LASTS, asked.duration)
     times = tuple(end * k / SAMPLES for k in range(SAMPLES + 1))
@@ -46,10 +48,10 @@ def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
     fine = simulated(simulate, asked, end, 2, samples=times)
     violation, moved, finer = (float(np.max(found["violation"])) for found in (run, other, fine))
     return {
-        "energy_drift": Estimate(
+        "energy_drift": case.Estimate(
             own, rounding=BEYOND * max(spread(own, pushed), PUSH), step_error=abs(halved - own), scale=1.0
         ),
-        "violation": Estimate(
+        "violation": case.Estimate(
             violation,
             rounding=BEYOND * max(abs(moved - violation), PUSH),
             step_error=abs(finer - violation),

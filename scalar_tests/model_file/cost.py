@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from spook_tracker.scalar_tests.case import Metric, Simulate
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.model_file.facts import Asked, simulated
 
 TIMED = 1.0  # s of simulated time
 REPEATED = 2.0  # s of each of three runs
 
 
-def _cost(name: str, description: str, unit: str, growth: float, better: Any = "smaller") -> Metric:
+def _cost(name: str, description: str, unit: str, growth: float, better: Any = "smaller") -> case.Metric:
     """`growth` is what other work on the machine may add: no news."""
-    return Metric(
+    return case.Metric(
         name=name,
         description=description,
         unit=unit,
@@ -33,7 +33,7 @@ COST = (
     _cost("memory", "of the compiled model and its arena", "MB", 0.5),
 )
 REPEATABILITY = (
-    Metric(
+    case.Metric(
         name="differing_runs",
         description="of two runs, here and in another process: those whose last bits differ from the first run's",
         unit="1",
@@ -47,7 +47,7 @@ REPEATABILITY = (
 )
 
 
-def cost(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
+def cost(asked: Asked, simulate: case.Simulate) -> Mapping[str, float]:
     """Load it three times and step it, looking at the clock after each step."""
     run = simulated(simulate, asked, min(TIMED, asked.duration), timed=True)
     return {
@@ -59,7 +59,7 @@ def cost(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
     }
 
 
-def repeatability(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
+def repeatability(asked: Asked, simulate: case.Simulate) -> Mapping[str, float]:
     """The same run three times: twice here, once in a process of its own."""
     lasts = min(REPEATED, asked.duration)
     first = simulated(simulate, asked, lasts)

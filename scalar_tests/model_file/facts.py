@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 from spook_tracker.engine.model_file import ModelFile, ModelRun
 from spook_tracker.engine.result import Result
-from spook_tracker.scalar_tests.case import OutOfTime, Simulate
+from spook_tracker.scalar_tests import case
 
 Array = npt.NDArray[np.float64]
 CHECKPOINTS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)  # s: they grow, as what differs does
@@ -39,7 +39,9 @@ class Asked:
         return tuple(t for t in CHECKPOINTS if t <= self.duration + 1e-9) or (self.duration,)
 
 
-def simulated(simulate: Simulate, asked: Asked, duration: float, refined: float = 1, **run: Any) -> Result:
+def simulated(
+    simulate: case.Simulate, asked: Asked, duration: float, refined: float = 1, **run: Any
+) -> Result:
     """One run of the model, with its own time step divided by `refined`."""
     step = asked.model.time_step / refined
     return simulate(ModelRun(model=asked.model, **run), time_step=step, duration=duration)  # type: ignore[arg-type]
@@ -51,7 +53,9 @@ def times_of(asked: Asked) -> tuple[float, ...]:
     return tuple(sorted({*asked.checkpoints, *(end * k / GRID for k in range(GRID + 1))}))
 
 
-def watched(asked: Asked, simulate: Simulate, rests: bool = True, refined: float = 1, **push: Any) -> Result:
+def watched(
+    asked: Asked, simulate: case.Simulate, rests: bool = True, refined: float = 1, **push: Any
+) -> Result:
     """The model as its file has it, read at all those times; where it `rests` on until it has settled. What is asked of its
     motion and of its rest is read off the same runs: both ask for them in the same words, and where runs are remembered
     they are made once."""
@@ -60,7 +64,7 @@ def watched(asked: Asked, simulate: Simulate, rests: bool = True, refined: float
     return simulated(simulate, asked, lasts, refined, samples=times_of(asked), until_settled=rests, **push)
 
 
-def pushed(asked: Asked, simulate: Simulate, run: Result, seed: int) -> Result:
+def pushed(asked: Asked, simulate: case.Simulate, run: Result, seed: int) -> Result:
     """The same with pushes of the last bits in every step; until it has settled where `run` has."""
     return watched(asked, simulate, settles(run), push=PUSH, seed=seed)
 
@@ -70,7 +74,7 @@ def in_time(runs: Iterator[Result]) -> list[Result]:
     found: list[Result] = []
     try:
         found.extend(runs)
-    except OutOfTime:
+    except case.OutOfTime:
         if not found:
             raise
     return found

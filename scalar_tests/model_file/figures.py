@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from spook_tracker.scalar_tests.case import Drawing, Figure, Simulate
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.model_file.facts import (
     PUSH,
     UNPREDICTABLE,
@@ -19,12 +19,12 @@ from spook_tracker.scalar_tests.model_file.facts import (
 from spook_tracker.scalar_tests.sweep import line
 
 
-def places(asked: Asked, simulate: Simulate) -> Drawing:
+def places(asked: Asked, simulate: case.Simulate) -> case.Drawing:
     """Distance of each watched body from its start."""
     times = times_of(asked)
     there = np.asarray(watched(asked, simulate).partial["position"])
     moved = np.linalg.norm(there - there[:1], axis=-1)
-    return Drawing(
+    return case.Drawing(
         curves=tuple(
             line(body.label, times[: len(moved)], moved[:, k]) for k, body in enumerate(asked.model.watched)
         ),
@@ -33,7 +33,7 @@ def places(asked: Asked, simulate: Simulate) -> Drawing:
     )
 
 
-def growth(asked: Asked, simulate: Simulate) -> Drawing:
+def growth(asked: Asked, simulate: case.Simulate) -> case.Drawing:
     """Distance between a run and the same with pushes of the last bits, of the body that is furthest off."""
     times, run = times_of(asked), watched(asked, simulate)
     size = float(run.partial["size"])
@@ -43,7 +43,7 @@ def growth(asked: Asked, simulate: Simulate) -> Drawing:
         for seed, grown in found
     ]
     limit = line("predictable up to here", times, np.full(len(times), UNPREDICTABLE * size), "limit")
-    return Drawing(
+    return case.Drawing(
         curves=(*shown, limit),
         x_label="time [s]",
         y_label="distance between the runs [m]",
@@ -53,9 +53,11 @@ def growth(asked: Asked, simulate: Simulate) -> Drawing:
     )
 
 
-def figures(asked: Asked) -> tuple[Figure, ...]:
+def figures(asked: Asked) -> tuple[case.Figure, ...]:
     """Both."""
     return (
-        Figure(name="places", title="Where the watched bodies go", draw=partial(places, asked)),
-        Figure(name="growth", title="How fast pushes of the last bits grow", draw=partial(growth, asked)),
+        case.Figure(name="places", title="Where the watched bodies go", draw=partial(places, asked)),
+        case.Figure(
+            name="growth", title="How fast pushes of the last bits grow", draw=partial(growth, asked)
+        ),
     )

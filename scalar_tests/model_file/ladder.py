@@ -12,15 +12,7 @@ import numpy as np
 from spook_tracker.engine.method import PLAIN, Method
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result, SimulationFailed
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Estimate,
-    Ladder,
-    Metric,
-    Simulate,
-    StabilityStudy,
-)
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.model_file.facts import Asked, apart, simulated
 
 LASTS = 0.5  # s that the runs of the ladder last
@@ -31,7 +23,7 @@ HOLDS = 2.0  # s that a run must hold
 LONGEST, STIFFEST = 64.0, 4096.0  # times the file's own
 BRACKET = 0.05  # relative width of the last bracket
 
-RESOLVED_TIME = Metric(
+RESOLVED_TIME = case.Metric(
     name="resolved_time",
     description="until when the two finest runs, an eighth and a sixteenth of the step, agree within a thousandth of the size",
     unit="s",
@@ -41,13 +33,13 @@ RESOLVED_TIME = Metric(
 
 
 def _place(
-    asked: Asked, simulate: Simulate, time_step: float, accurate: bool, times: tuple[float, ...]
+    asked: Asked, simulate: case.Simulate, time_step: float, accurate: bool, times: tuple[float, ...]
 ) -> Result:
     refined = asked.model.time_step / time_step
     return simulated(simulate, asked, times[-1], refined, samples=times, accurate=accurate)
 
 
-def _finest(asked: Asked, simulate: Simulate) -> tuple[tuple[float, ...], Result, Result]:
+def _finest(asked: Asked, simulate: case.Simulate) -> tuple[tuple[float, ...], Result, Result]:
     """The two finest runs, and when [s] both are read, last at the end of the ladder's: asked by all in the same words, so
     that they are made once where runs are remembered."""
     end = _lasts(asked)
@@ -58,20 +50,20 @@ def _finest(asked: Asked, simulate: Simulate) -> tuple[tuple[float, ...], Result
     return times, fine, finest
 
 
-def resolved(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
+def resolved(asked: Asked, simulate: case.Simulate) -> Mapping[str, float]:
     """The first checkpoint at which the two finest runs disagree; the last one if they never do."""
     times, fine, finest = _finest(asked, simulate)
     size = float(finest["size"])
     agree = apart(fine, finest, size) <= RESOLVED * size  # as far as both came
     until = next((t for k, t in enumerate(times) if k >= len(agree) or not agree[k]), times[-1])
-    return {"resolved_time": Estimate(until, rounding=0.0, scale=asked.duration)}
+    return {"resolved_time": case.Estimate(until, rounding=0.0, scale=asked.duration)}
 
 
 def _lasts(asked: Asked) -> float:
     return min(LASTS, asked.duration)
 
 
-def error(asked: Asked, simulate: Simulate, time_step: float, method: Method) -> float:
+def error(asked: Asked, simulate: case.Simulate, time_step: float, method: Method) -> float:
     """Distance [m] from the finest run at the end, of the watched body, or its rim, that is furthest off."""
     times, fine, finest = _finest(asked, simulate)
     fine["position"], finest["position"]  # of a run that broke off: the outcome is that
@@ -86,25 +78,25 @@ def error(asked: Asked, simulate: Simulate, time_step: float, method: Method) ->
     return float(apart(own, replace(finest, observables=last), size)[-1])
 
 
-def run(asked: Asked, simulate: Simulate, time_step: float, method: Method) -> Result:
+def run(asked: Asked, simulate: case.Simulate, time_step: float, method: Method) -> Result:
     """The same, to be timed."""
     return simulated(simulate, asked, _lasts(asked), asked.model.time_step / time_step)
 
 
-def ladder(asked: Asked) -> Ladder:
+def ladder(asked: Asked) -> case.Ladder:
     """Four times the file's own step to a quarter of it, against a sixteenth of it with Runge-Kutta."""
-    return Ladder(
+    return case.Ladder(
         name="finest",
         description=f"distance from the engine's own finest run after {_lasts(asked):g} s",
         unit="m",
         time_steps=tuple(asked.model.time_step * factor for factor in RUNGS),
-        configurations=(Configuration(name="file", method=PLAIN, expected_order=None),),
+        configurations=(case.Configuration(name="file", method=PLAIN, expected_order=None),),
         error=partial(error, asked),
         run=partial(run, asked),
     )
 
 
-def _holds(asked: Asked, simulate: Simulate, reach: float, factor: float, **more: Any) -> bool:
+def _holds(asked: Asked, simulate: case.Simulate, reach: float, factor: float, **more: Any) -> bool:
     """Whether a run ends with all watched bodies within `reach` [m] of their start."""
     try:
         found = simulated(
@@ -121,7 +113,7 @@ def _marks(asked: Asked) -> tuple[float, ...]:
     return tuple(end * k / 20 for k in range(21))
 
 
-def _bracket(asked: Asked, simulate: Simulate, most: float, name: str) -> BreakPoint:
+def _bracket(asked: Asked, simulate: case.Simulate, most: float, name: str) -> case.BreakPoint:
     """Doubled until it breaks, then halved in between, in the ratio."""
     own = np.asarray(
         simulated(simulate, asked, min(HOLDS, asked.duration), samples=_marks(asked))["position"]
@@ -141,28 +133,30 @@ def _bracket(asked: Asked, simulate: Simulate, most: float, name: str) -> BreakP
     while high <= most and holds(high):
         low, high = high, 2.0 * high
     if high > most:
-        return BreakPoint(value=low, resolution=1.0, evaluations=asks)
+        return case.BreakPoint(value=low, resolution=1.0, evaluations=asks)
     while high / low > 1.0 + BRACKET:
         middle = (low * high) ** 0.5
         low, high = (middle, high) if holds(middle) else (low, middle)
-    return BreakPoint(value=low, resolution=high / low - 1.0, evaluations=asks)
+    return case.BreakPoint(value=low, resolution=high / low - 1.0, evaluations=asks)
 
 
-def longest_step(asked: Asked, simulate: Simulate) -> BreakPoint:
+def longest_step(asked: Asked, simulate: case.Simulate) -> case.BreakPoint:
     """Times the file's own step."""
     return _bracket(asked, simulate, LONGEST, "step")
 
 
-def stiffest_gain(asked: Asked, simulate: Simulate) -> BreakPoint:
+def stiffest_gain(asked: Asked, simulate: case.Simulate) -> case.BreakPoint:
     """Times the file's own gains."""
     return _bracket(asked, simulate, STIFFEST, "gain")
 
 
-def studies(asked: Asked, driven: bool) -> tuple[StabilityStudy, ...]:
+def studies(asked: Asked, driven: bool) -> tuple[case.StabilityStudy, ...]:
     """How long a step and how stiff a servo may be."""
 
-    def one(name: str, title: str, study: Callable[[Asked, Simulate], BreakPoint]) -> StabilityStudy:
-        return StabilityStudy(
+    def one(
+        name: str, title: str, study: Callable[[Asked, case.Simulate], case.BreakPoint]
+    ) -> case.StabilityStudy:
+        return case.StabilityStudy(
             name=name,
             title=title,
             configuration="file",

@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 
 from spook_tracker.engine.result import Result
-from spook_tracker.scalar_tests.case import Estimate, Metric, OutOfTime, Seen, Simulate
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.model_file.facts import (
     BEYOND,
     GRID,
@@ -35,21 +35,21 @@ BY_CHANCE = (
 )
 
 
-def metrics(asked: Asked) -> tuple[Metric, ...]:
+def metrics(asked: Asked) -> tuple[case.Metric, ...]:
     """Place and turn of each watched body at each checkpoint, and the time that can be predicted."""
     found = []
     for at in asked.checkpoints:
         for body in asked.model.watched:
             label = body.label
             found += [
-                Metric(
+                case.Metric(
                     name=f"{label}.place@{at:g}s",
                     description=f"how far {label} is from where it started, after {at:g} s",
                     unit="m",
                     role="reported",
                     better="inside",
                 ),
-                Metric(
+                case.Metric(
                     name=f"{label}.turn@{at:g}s",
                     description=f"how far {label} has turned from its start, after {at:g} s",
                     unit="rad",
@@ -58,7 +58,7 @@ def metrics(asked: Asked) -> tuple[Metric, ...]:
                 ),
             ]
     found += [
-        Metric(
+        case.Metric(
             name=f"{body.label}.mean_place",
             description=f"how far {body.label} is from where it started at the end, in the mean over runs with small pushes",
             unit="m",
@@ -69,7 +69,7 @@ def metrics(asked: Asked) -> tuple[Metric, ...]:
     ]
     return (
         *found,
-        Metric(
+        case.Metric(
             name="predictable_time",
             description=f"when pushes of {PUSH:g} of the size have grown to a hundredth of it; the whole time if they have not",
             unit="s",
@@ -79,7 +79,7 @@ def metrics(asked: Asked) -> tuple[Metric, ...]:
     )
 
 
-def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
+def measure(asked: Asked, simulate: case.Simulate) -> Mapping[str, float]:
     """One run, the same with pushes of the last bits in every step, and one with half the time step; of these what there is
     time for."""
     end, times = asked.checkpoints[-1], times_of(asked)
@@ -90,14 +90,14 @@ def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
     others = in_time(pushed(asked, simulate, run, seed) for seed in range(1, PUSHED + 1))
     try:
         halved = watched(asked, simulate, settles(run), refined=2)
-    except OutOfTime:
+    except case.OutOfTime:
         halved = None
     grown = np.max(
         [_grown(run, other, size) for other in others], axis=0
     )  # of any watched body, at each time, m
     lost = np.flatnonzero(grown > UNPREDICTABLE * size)
     known = times[int(lost[0])] if len(lost) else end
-    found: dict[str, float] = {"predictable_time": Estimate(known, rounding=end / GRID * 2.0, scale=end)}
+    found: dict[str, float] = {"predictable_time": case.Estimate(known, rounding=end / GRID * 2.0, scale=end)}
     for at in asked.checkpoints:
         row = times.index(at)
         for column, body in enumerate(asked.model.watched):
@@ -105,7 +105,7 @@ def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
                 read = _read if name == "place" else _turned
                 value = float(values[row, column])
                 moved = max(_apart(read(other), row, column, value) for other in others)
-                found[f"{body.label}.{name}@{at:g}s"] = Estimate(
+                found[f"{body.label}.{name}@{at:g}s"] = case.Estimate(
                     value,
                     rounding=math.inf if at >= known and len(lost) else BEYOND * max(moved, PUSH * unit),
                     step_error=None if halved is None else _apart(read(halved), row, column, value),
@@ -118,7 +118,7 @@ def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
                 simulated(simulate, asked, end, samples=(0.0, end), push=PUSH, seed=seed)
                 for seed in range(len(others) + 1, DRAWN + 1)
             ]
-    except OutOfTime:
+    except case.OutOfTime:
         return found
     ends = np.array([_read(other)[-1] for other in others if other.completed])
     for column, body in enumerate(asked.model.watched):
@@ -127,27 +127,27 @@ def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
     return found
 
 
-def seen(asked: Asked) -> Seen:
+def seen(asked: Asked) -> case.Seen:
     """The model over the whole time, as a replay shows it."""
     steps = max(1, round(asked.duration / asked.model.time_step))
     every = math.ceil(steps / DRAWN_SAMPLES)
     step = every * asked.model.time_step
     times = tuple(step * k for k in range(steps // every + 1))
-    return Seen(run=partial(_shown, asked, times), step=step, gravity=asked.model.gravity)
+    return case.Seen(run=partial(_shown, asked, times), step=step, gravity=asked.model.gravity)
 
 
-def _shown(asked: Asked, times: tuple[float, ...], simulate: Simulate) -> Result:
+def _shown(asked: Asked, times: tuple[float, ...], simulate: case.Simulate) -> Result:
     return simulated(simulate, asked, times[-1], samples=times, shown=True)
 
 
-def mean_of(drawn: Array, size: float, chaotic: bool) -> Estimate:
+def mean_of(drawn: Array, size: float, chaotic: bool) -> case.Estimate:
     """The mean [m] of runs with small pushes. Two such means differ by rounding; of a chaotic model by chance, as their
     standard errors say."""
     if len(drawn) < 2:
-        return Estimate(0.0, rounding=math.inf, scale=size, unsettled="runs with small pushes broke off")
+        return case.Estimate(0.0, rounding=math.inf, scale=size, unsettled="runs with small pushes broke off")
     least = BEYOND * max(float(np.ptp(drawn)), PUSH * size)
     by_chance = BY_CHANCE * float(np.std(drawn, ddof=1)) * math.sqrt(2.0 / len(drawn))
-    return Estimate(float(np.mean(drawn)), rounding=by_chance if chaotic else least, scale=size)
+    return case.Estimate(float(np.mean(drawn)), rounding=by_chance if chaotic else least, scale=size)
 
 
 def _read(run: Result) -> Array:

@@ -8,11 +8,11 @@ from functools import partial
 
 from spook_tracker.engine.errors import SceneError
 from spook_tracker.engine.model_file import ModelFile
-from spook_tracker.scalar_tests.case import Example, Measurement, Metric, ScalarTest, Simulate
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.model_file import books, cost, figures, ladder, motion, rest
 from spook_tracker.scalar_tests.model_file.facts import LONGEST_REST, PUSH, Asked
 
-Measure = Callable[[Asked, Simulate], Mapping[str, float]]
+Measure = Callable[[Asked, case.Simulate], Mapping[str, float]]
 
 
 def test_of(
@@ -26,7 +26,7 @@ def test_of(
     files: int = 1,
     bodies: int = 0,
     driven: bool = False,
-) -> ScalarTest:
+) -> case.ScalarTest:
     """The test of a model watched for `duration` [s]; beyond `tolerance` [m, rad] a change is red.
 
     What is driven or pushed all the time does not rest: of it the tolerance is that of its motion.
@@ -35,9 +35,9 @@ def test_of(
     may_rest = model.drive.kind in ("zero", "hold") and not model.push
 
     def part(
-        configuration: str, metrics: tuple[Metric, ...], measure: Measure, note: str, held: bool = True
-    ) -> Measurement:
-        return Measurement(
+        configuration: str, metrics: tuple[case.Metric, ...], measure: Measure, note: str, held: bool = True
+    ) -> case.Measurement:
+        return case.Measurement(
             configuration=configuration,
             time_step=model.time_step,
             metrics=tuple(_held(metric, tolerance if held else 0.0) for metric in metrics),
@@ -45,7 +45,7 @@ def test_of(
             note=note,
         )
 
-    return ScalarTest(
+    return case.ScalarTest(
         title=title,
         question=f"Does {title} move, rest and cost what it did?",
         why="Engines are upgraded by people who use them, and their models break in silence. A model has no closed form, "
@@ -105,12 +105,12 @@ def test_of(
     )
 
 
-def _held(metric: Metric, tolerance: float) -> Metric:
+def _held(metric: case.Metric, tolerance: float) -> case.Metric:
     """A place or turn beyond the team's own tolerance decides."""
     if metric.better != "inside" or metric.unit not in ("m", "rad") or not tolerance:
         return metric
     return replace(metric, role="gate", tolerance=tolerance)
 
 
-def _no_scene() -> Example:
+def _no_scene() -> case.Example:
     raise SceneError("a model file is no scene of ours")

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from spook_tracker.engine.result import Result
-from spook_tracker.scalar_tests.case import Estimate, Metric, OutOfTime, Simulate
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.model_file.facts import (
     BEYOND,
     LONGEST_REST,
@@ -31,11 +31,11 @@ READ = {
 AXES = "xyz"
 
 
-def metrics(asked: Asked, stands_free: bool) -> tuple[Metric, ...]:
+def metrics(asked: Asked, stands_free: bool) -> tuple[case.Metric, ...]:
     """The rest pose of each watched body, and of the whole when it settled, its creep, its overlap and its load."""
 
-    def one(name: str, description: str, unit: str, better: Any = "inside") -> Metric:
-        return Metric(name=name, description=description, unit=unit, role="reported", better=better)
+    def one(name: str, description: str, unit: str, better: Any = "inside") -> case.Metric:
+        return case.Metric(name=name, description=description, unit=unit, role="reported", better=better)
 
     found = []
     for label in (body.label for body in asked.model.watched):
@@ -51,7 +51,7 @@ def metrics(asked: Asked, stands_free: bool) -> tuple[Metric, ...]:
     return tuple(found)
 
 
-def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
+def measure(asked: Asked, simulate: case.Simulate) -> Mapping[str, float]:
     """Run until it rests; again with pushes of the last bits, and with half the time step. Of what does not rest nothing more
     is asked: where it is after so long is no rest, and its motion is compared elsewhere."""
     run = watched(asked, simulate)
@@ -60,14 +60,14 @@ def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
     if not settles(run):
         moves = f"still moves at {float(run['fastest']):.2g} m/s after {run.steps * run.time_step:g} s"
         return {
-            name: Estimate(value, rounding=math.inf, scale=size, unsettled=moves)
+            name: case.Estimate(value, rounding=math.inf, scale=size, unsettled=moves)
             for name, value in values.items()
         }
     # from the other end than those who ask for its motion, perhaps in another process at the same time
     try:
         halved = _rest(asked, watched(asked, simulate, refined=2))
         others = [_rest(asked, pushed(asked, simulate, run, seed)) for seed in range(PUSHED, 0, -1)]
-    except OutOfTime:
+    except case.OutOfTime:
         return values
     creep = np.asarray(run["creep"])
     found: dict[str, float] = {}
@@ -76,7 +76,7 @@ def measure(asked: Asked, simulate: Simulate) -> Mapping[str, float]:
         unit = 1.0 if column is None or name.endswith("turn") else size
         crept = 0.0 if column is None else CALM * float(creep[column]) * (1.0 if unit == size else 2.0 / size)
         rounded = BEYOND * max(spread(value, [other.get(name, math.nan) for other in others]), PUSH * unit)
-        found[name] = Estimate(
+        found[name] = case.Estimate(
             value,
             rounding=max(rounded, crept, READ.get(name, 0.0) * (size if name == "creep" else 1.0)),
             step_error=abs(halved[name] - value) if name in halved else None,

@@ -7,30 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    WORLD,
-    Energy,
-    Hinge,
-    MaximumAbsolute,
-    Method,
-    Orientation,
-    Position,
-    Scene,
-    Trace,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, table
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Example,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityMap,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.multibody.library import (
     FIRST_ORDER,
     GRAVITY,
@@ -63,16 +42,20 @@ MAP_DEFINITION = (
 )
 
 
-def scene(time_step: float, compliance: float = COMPLIANCE) -> Scene:
+def scene(time_step: float, compliance: float = COMPLIANCE) -> engine.Scene:
     """Five rods of 1 m in a closed loop of six hinges, from rest; gravity along −y."""
     rods = []
     for k in range(5):
         inertia = [ACROSS] * 3
         inertia[int(np.argmax(np.abs(POINTS[k + 1] - POINTS[k])))] = ALONG
         rods.append(rod(f"rod {k + 1}", POINTS[k], POINTS[k + 1], MASS, (inertia[0], inertia[1], inertia[2])))
-    ends = [(WORLD, "rod 1"), *((f"rod {k}", f"rod {k + 1}") for k in range(1, 5)), (WORLD, "rod 5")]
+    ends = [
+        (engine.WORLD, "rod 1"),
+        *((f"rod {k}", f"rod {k + 1}") for k in range(1, 5)),
+        (engine.WORLD, "rod 5"),
+    ]
     hinges = tuple(
-        Hinge(
+        engine.Hinge(
             name=f"P{k}",
             between=between,
             at=(float(at[0]), float(at[1]), float(at[2])),
@@ -82,10 +65,12 @@ def scene(time_step: float, compliance: float = COMPLIANCE) -> Scene:
         )
         for k, (between, at, axis) in enumerate(zip(ends, POINTS, AXES, strict=True))
     )
-    return Scene(bodies=tuple(rods), constraints=hinges, gravity=(0.0, -GRAVITY, 0.0), contacts=False)
+    return engine.Scene(bodies=tuple(rods), constraints=hinges, gravity=(0.0, -GRAVITY, 0.0), contacts=False)
 
 
-def answers(simulate: Simulate, time_step: float, method: Method = PLAIN) -> dict[str, float]:
+def answers(
+    simulate: case.Simulate, time_step: float, method: engine.Method = engine.PLAIN
+) -> dict[str, float]:
     """The library's error of P3 at the four times, the largest change of energy, P3 after 1 s."""
     place, energy = _third(simulate, time_step, 10.0, COMPLIANCE, method)
     times = [round(time / time_step) for time in EXACT]
@@ -96,7 +81,11 @@ def answers(simulate: Simulate, time_step: float, method: Method = PLAIN) -> dic
 
 
 def _third(
-    simulate: Simulate, time_step: float, duration: float, compliance: float, method: Method = PLAIN
+    simulate: case.Simulate,
+    time_step: float,
+    duration: float,
+    compliance: float,
+    method: engine.Method = engine.PLAIN,
 ) -> tuple[np.ndarray, float]:
     """P3 [m] at every sample and the largest |E − E₀| [J]."""
     result = simulate(
@@ -105,41 +94,44 @@ def _third(
         duration=duration,
         method=method,
         observe={
-            "centre": Trace(quantity=Position("rod 3")),
-            "turn": Trace(quantity=Orientation("rod 3")),
-            "energy": MaximumAbsolute(quantity=Energy(), from_start=True),
+            "centre": engine.Trace(quantity=engine.Position("rod 3")),
+            "turn": engine.Trace(quantity=engine.Orientation("rod 3")),
+            "energy": engine.MaximumAbsolute(quantity=engine.Energy(), from_start=True),
         },
     )
     return result["centre"] + turned(result["turn"], (0.0, 0.0, 0.5)), float(result["energy"])
 
 
-def coarse(simulate: Simulate) -> dict[str, float]:
+def coarse(simulate: case.Simulate) -> dict[str, float]:
     """At h = 1/240 s."""
     return answers(simulate, 1 / 240)
 
 
-def fine(simulate: Simulate) -> dict[str, float]:
+def fine(simulate: case.Simulate) -> dict[str, float]:
     """At h = 1/4000 s."""
     return answers(simulate, 1 / 4000)
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Of P3 at four times in 10 s."""
     return answers(simulate, time_step, method)["library_error"]
 
 
-def stiffest(simulate: Simulate) -> BreakPoint:
+def stiffest(simulate: case.Simulate) -> case.BreakPoint:
     """Smallest compliance with which P3 is right after 1 s, h = 1/240 s."""
 
     def holds(compliance: float) -> bool:
-        return _cell(simulate, compliance, 1 / 240, PLAIN) == "settled"
+        return _cell(simulate, compliance, 1 / 240, engine.PLAIN) == "settled"
 
     return break_point(holds, 1e-7, 1e-14, resolution=0.01, walk=8)
 
 
-def _cell(simulate: Simulate, compliance: float, time_step: float, method: Method) -> str:
+def _cell(simulate: case.Simulate, compliance: float, time_step: float, method: engine.Method) -> str:
     """settled: right after 1 s; bounded: it holds together and is somewhere else; diverged: refused or lost."""
-    observe = {"centre": Trace(quantity=Position("rod 3")), "turn": Trace(quantity=Orientation("rod 3"))}
+    observe = {
+        "centre": engine.Trace(quantity=engine.Position("rod 3")),
+        "turn": engine.Trace(quantity=engine.Orientation("rod 3")),
+    }
     built = scene(time_step, compliance)
     result = simulate(built, time_step=time_step, duration=1.0, method=method, observe=observe)
     if not result.completed:
@@ -148,9 +140,9 @@ def _cell(simulate: Simulate, compliance: float, time_step: float, method: Metho
     return "settled" if float(np.linalg.norm(place[0] - EXACT[1.0])) <= AFTER_ONE_SECOND else "bounded"
 
 
-def _map(method: Method) -> Callable[[Simulate], StabilityMap]:
-    def study(simulate: Simulate) -> StabilityMap:
-        return StabilityMap(
+def _map(method: engine.Method) -> Callable[[case.Simulate], case.StabilityMap]:
+    def study(simulate: case.Simulate) -> case.StabilityMap:
+        return case.StabilityMap(
             x=MAP_COMPLIANCES,
             y=MAP_STEPS,
             cells=table(MAP_STEPS, MAP_COMPLIANCES, lambda c, h: _cell(simulate, c, h, method)),
@@ -163,7 +155,7 @@ def _map(method: Method) -> Callable[[Simulate], StabilityMap]:
     return study
 
 
-ENERGY = Metric(
+ENERGY = case.Metric(
     name="energy_deviation",
     description="largest |E − E₀| over the weight of all rods times 1 m",
     unit="1",
@@ -171,7 +163,7 @@ ENERGY = Metric(
     reference=0.0,
     relative_tolerance=1e-5,
 )
-HALF_STEP_CURVED = Method(half_step_velocities=True, corrections=2)
+HALF_STEP_CURVED = engine.Method(half_step_velocities=True, corrections=2)
 COMPOSED: Mapping[Literal["order4", "order6", "order8"], tuple[float, ...]] = {
     "order4": (1 / 12, 1 / 16, 1 / 20, 1 / 24),
     "order6": (1 / 12, 1 / 16),  # already the reference's last digit
@@ -179,7 +171,7 @@ COMPOSED: Mapping[Literal["order4", "order6", "order8"], tuple[float, ...]] = {
 }
 OUTPUTS = "P3 at 0.5, 1, 2.5 and 10 s"
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Multibody library A04: Bricard's mechanism",
     question="Does Bricard's mechanism move as it should, although counting its constraints says it cannot?",
     why="Six hinges take 30 freedoms from 30, and yet it moves: one constraint repeats the others as long as the shape "
@@ -196,14 +188,14 @@ TEST = ScalarTest(
     conclusion="Green: redundant rows share their load and let the mechanism go. Red: it locks or drifts.",
     source="Library for computational benchmarking of multibody dynamics, problem A04",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=1 / 240,
             metrics=(error_metric("companion", LOW, OUTPUTS), ENERGY),
             measure=coarse,
             note="the SPOOK step as it stands",
         ),
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=1 / 4000,
             metrics=(error_metric("gate", HIGH, OUTPUTS), ENERGY),
@@ -211,7 +203,7 @@ TEST = ScalarTest(
             note="the SPOOK step as it stands",
         ),
     ),
-    example=lambda: Example(scene=scene(1 / 240), time_step=1 / 240),
+    example=lambda: case.Example(scene=scene(1 / 240), time_step=1 / 240),
     ladders=ladders(
         "P3 at four times",
         {
@@ -220,9 +212,9 @@ TEST = ScalarTest(
                 (
                     FIRST_ORDER,
                     *(
-                        Configuration(
+                        case.Configuration(
                             name=order,
-                            method=Method(composition=order),
+                            method=engine.Method(composition=order),
                             expected_order=None,
                             time_steps=steps,
                         )
@@ -234,7 +226,7 @@ TEST = ScalarTest(
                 (1 / 500, 1 / 1000, 1 / 2000, 1 / 4000, 1 / 8000),
                 (
                     FIRST_ORDER,
-                    Configuration(
+                    case.Configuration(
                         name="half-step, curved twice", method=HALF_STEP_CURVED, expected_order=None
                     ),
                 ),
@@ -243,7 +235,7 @@ TEST = ScalarTest(
         ladder_error,
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="smallest-compliance",
             title="Smallest compliance with which the mechanism moves at h = 1/240 s",
             configuration="plain",
@@ -257,7 +249,7 @@ TEST = ScalarTest(
             "on the exact path, led half a step; a per cent for the search and two for the next order in h",
         ),
         *(
-            StabilityStudy(
+            case.StabilityStudy(
                 name=f"map-{name}",
                 title=f"Compliance of redundant hinges and time step, {told}",
                 configuration=told,
@@ -265,8 +257,8 @@ TEST = ScalarTest(
                 study=_map(method),
             )
             for name, told, method in (
-                ("plain", "plain", PLAIN),
-                ("curved", "curved", Method(corrections=1)),
+                ("plain", "plain", engine.PLAIN),
+                ("curved", "curved", engine.Method(corrections=1)),
             )
         ),
     ),

@@ -9,31 +9,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    WORLD,
-    Energy,
-    Final,
-    Hinge,
-    MaximumAbsolute,
-    Method,
-    Position,
-    RigidBody,
-    Scene,
-    Trace,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_count, break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Configuration,
-    Example,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.multibody.library import (
     GRAVITY,
     LOW,
@@ -61,10 +39,10 @@ ORDER_RANGES: dict[Literal["order4", "order6", "order8"], tuple[float, float]] =
 }
 
 
-def scene(count: int, time_step: float) -> Scene:
+def scene(count: int, time_step: float) -> engine.Scene:
     """`count` + 1 upright rods on hinges in the ground and `count` level ones on top, moving at PUSH along x."""
     sides = [
-        RigidBody(
+        engine.RigidBody(
             name=f"side {k}",
             mass=MASS,
             inertia=(ACROSS, THIN, ACROSS),
@@ -75,7 +53,7 @@ def scene(count: int, time_step: float) -> Scene:
         for k in range(count + 1)
     ]
     tops = [
-        RigidBody(
+        engine.RigidBody(
             name=f"top {k}",
             mass=MASS,
             inertia=(THIN, ACROSS, ACROSS),
@@ -85,16 +63,16 @@ def scene(count: int, time_step: float) -> Scene:
         for k in range(count)
     ]
 
-    def hinge(name: str, first: str, second: str, x: float, y: float) -> Hinge:
-        return Hinge(
+    def hinge(name: str, first: str, second: str, x: float, y: float) -> engine.Hinge:
+        return engine.Hinge(
             name=name, between=(first, second), at=(x, y, 0.0), compliance=COMPLIANCE, damping=time_step
         )
 
-    hinges = [hinge(f"foot {k}", WORLD, f"side {k}", k * LENGTH, 0.0) for k in range(count + 1)]
+    hinges = [hinge(f"foot {k}", engine.WORLD, f"side {k}", k * LENGTH, 0.0) for k in range(count + 1)]
     for k in range(count):
         hinges.append(hinge(f"left {k}", f"side {k}", f"top {k}", k * LENGTH, LENGTH))
         hinges.append(hinge(f"right {k}", f"side {k + 1}", f"top {k}", (k + 1) * LENGTH, LENGTH))
-    return Scene(
+    return engine.Scene(
         bodies=(*sides, *tops), constraints=tuple(hinges), gravity=(0.0, -GRAVITY, 0.0), contacts=False
     )
 
@@ -119,7 +97,7 @@ def exact(count: int, times: Any) -> np.ndarray:
 
 
 def answers(
-    simulate: Simulate, count: int, time_step: float, duration: float, method: Method
+    simulate: case.Simulate, count: int, time_step: float, duration: float, method: engine.Method
 ) -> dict[str, float]:
     """The library's error of B0 and the largest change of energy over m g l of all rods."""
     every = round(EVERY / time_step)
@@ -129,8 +107,8 @@ def answers(
         duration=duration,
         method=method,
         observe={
-            "side": Trace(quantity=Position("side 0"), first=every, every=every),
-            "energy": MaximumAbsolute(quantity=Energy(), from_start=True),
+            "side": engine.Trace(quantity=engine.Position("side 0"), first=every, every=every),
+            "energy": engine.MaximumAbsolute(quantity=engine.Energy(), from_start=True),
         },
     )
     corner = 2.0 * result["side"][:, :2]
@@ -140,35 +118,35 @@ def answers(
     }
 
 
-def many(simulate: Simulate) -> dict[str, float]:
+def many(simulate: case.Simulate) -> dict[str, float]:
     """The library's own case: 40 linkages, 20 s."""
-    return answers(simulate, MANY, 1e-3, 20.0, PLAIN)
+    return answers(simulate, MANY, 1e-3, 20.0, engine.PLAIN)
 
 
-def few(simulate: Simulate) -> dict[str, float]:
+def few(simulate: case.Simulate) -> dict[str, float]:
     """Two linkages, 10 s, coarser."""
-    return answers(simulate, FEW, 1e-3, 10.0, PLAIN)
+    return answers(simulate, FEW, 1e-3, 10.0, engine.PLAIN)
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Of two linkages over 10 s."""
     return answers(simulate, FEW, time_step, 10.0, method)["library_error"]
 
 
-def many_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def many_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Of forty linkages over 20 s, the library's own case."""
     return answers(simulate, MANY, time_step, 20.0, method)["library_error"]
 
 
-def falling_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def falling_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest component [m] of B0 away from the exact place after BEFORE_LEVEL, two linkages."""
-    observe = {"side": Final(quantity=Position("side 0"))}
+    observe = {"side": engine.Final(quantity=engine.Position("side 0"))}
     built = scene(FEW, time_step)
     result = simulate(built, time_step=time_step, duration=BEFORE_LEVEL, method=method, observe=observe)
     return float(np.abs(2.0 * result["side"][:2] - exact(FEW, (BEFORE_LEVEL,))[0]).max())
 
 
-def hangs(simulate: Simulate, count: int, time_step: float) -> bool:
+def hangs(simulate: case.Simulate, count: int, time_step: float) -> bool:
     """Whether linkages that hang, pushed a little, swing together, no wider than a hundred times what that is in a step."""
     upright = scene(count, time_step)
     bodies = tuple(
@@ -178,10 +156,12 @@ def hangs(simulate: Simulate, count: int, time_step: float) -> bool:
             angular_velocity=(0.0, 0.0, NUDGE * body.angular_velocity[2]),
         )
         for body in upright.bodies
-        if isinstance(body, RigidBody)
+        if isinstance(body, engine.RigidBody)
     )
     hanging = replace(upright, bodies=bodies, gravity=(0.0, GRAVITY, 0.0))
-    observe = {f"side {k}": Trace(quantity=Position(f"side {k}"), from_start=True) for k in (0, count)}
+    observe = {
+        f"side {k}": engine.Trace(quantity=engine.Position(f"side {k}"), from_start=True) for k in (0, count)
+    }
     result = simulate(hanging, time_step=time_step, steps=HUNG_STEPS, observe=observe)
     if not result.completed:
         return False
@@ -190,12 +170,12 @@ def hangs(simulate: Simulate, count: int, time_step: float) -> bool:
     return float(np.abs(first).max()) < wide and float(np.abs(first - last).max()) < 1e-3 * wide
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step [s] in which two hanging linkages swing."""
     return break_point(functools.partial(hangs, simulate, FEW), 0.02, 3.0, resolution=2e-3, walk=6)
 
 
-def most_linkages(simulate: Simulate) -> BreakPoint:
+def most_linkages(simulate: case.Simulate) -> case.BreakPoint:
     """The most hanging linkages that swing as one at h = 1/60 s."""
     return break_count(lambda count: hangs(simulate, count, 1 / 60), COUNTS)
 
@@ -203,14 +183,14 @@ def most_linkages(simulate: Simulate) -> BreakPoint:
 LONGEST = 2.0 / math.sqrt(_falls_over(FEW) * GRAVITY / LENGTH)  # s, .591: h ω = 2
 
 
-def _composed(order: Literal["order4", "order6", "order8"], *time_steps: float) -> Configuration:
+def _composed(order: Literal["order4", "order6", "order8"], *time_steps: float) -> case.Configuration:
     """A composition that meets a class at its first or second step: too few for a slope."""
-    return Configuration(
-        name=order, method=Method(composition=order), expected_order=None, time_steps=time_steps
+    return case.Configuration(
+        name=order, method=engine.Method(composition=order), expected_order=None, time_steps=time_steps
     )
 
 
-ENERGY = Metric(
+ENERGY = case.Metric(
     name="energy_deviation",
     description="largest |E − E₀| over the energy between upright and level, (3 N + 1)/2 m g l",
     unit="1",
@@ -223,7 +203,7 @@ HANGS = (
     "under the ground, pushed by 1e-6 m/s, the first and the last rod swing together and no wider than a hundred times what "
     "that is in a step, in 200 steps"
 )
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Multibody library A02: N four-bar linkages",
     question="Do forty four-bar linkages in a row, pushed over at once, stay one motion?",
     why="Level, all rods lie on one line: one freedom becomes 41, and an engine may fall into any of them.",
@@ -245,7 +225,7 @@ TEST = ScalarTest(
     conclusion="Green: redundant and singular linkages are solved as one. Red: they fold, lock or lose their energy.",
     source="Library for computational benchmarking of multibody dynamics, problem A02",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=1e-3,
             parameters={"N": MANY},
@@ -253,7 +233,7 @@ TEST = ScalarTest(
             measure=many,
             note="the SPOOK step as it stands",
         ),
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=1e-3,
             parameters={"N": FEW},
@@ -262,7 +242,7 @@ TEST = ScalarTest(
             note="the SPOOK step as it stands",
         ),
     ),
-    example=lambda: Example(scene=scene(FEW, 1e-3), time_step=1e-3),
+    example=lambda: case.Example(scene=scene(FEW, 1e-3), time_step=1e-3),
     ladders=(
         *ladders(
             "B0 of two linkages over 10 s",
@@ -271,22 +251,22 @@ TEST = ScalarTest(
                     (1 / 60, 1 / 120, 1 / 240, 1 / 480, 1 / 1000),
                     (
                         PLAIN_CONFIGURATION,
-                        Configuration(
+                        case.Configuration(
                             name="order4",
-                            method=Method(composition="order4"),
+                            method=engine.Method(composition="order4"),
                             expected_order=4.0,
                             order_range=(1 / 240, 1 / 60),
                             time_steps=(1 / 20, 1 / 40, 1 / 60, 1 / 120, 1 / 240),
                         ),
-                        Configuration(
+                        case.Configuration(
                             name="order6",
-                            method=Method(composition="order6"),
+                            method=engine.Method(composition="order6"),
                             expected_order=None,
                             time_steps=(1 / 20, 1 / 40, 1 / 60),
                         ),
-                        Configuration(
+                        case.Configuration(
                             name="order8",
-                            method=Method(composition="order8"),
+                            method=engine.Method(composition="order8"),
                             expected_order=None,  # rounding is near
                             time_steps=(1 / 20, 1 / 40),
                         ),
@@ -315,23 +295,25 @@ TEST = ScalarTest(
             many_error,
             of="forty, ",
         ),
-        Ladder(
+        case.Ladder(
             name="before level",
             description="largest component of B0's error after 2/3 s, just before the linkages lie level",
             unit="m",
             time_steps=FALLING_STEPS,
             configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=2.0, order_range=(1 / 120, 1 / 30)),
-                Configuration(
+                case.Configuration(
+                    name="plain", method=engine.PLAIN, expected_order=2.0, order_range=(1 / 120, 1 / 30)
+                ),
+                case.Configuration(
                     name="half step",
-                    method=Method(half_step_velocities=True),
+                    method=engine.Method(half_step_velocities=True),
                     expected_order=2.0,
                     order_range=(1 / 120, 1 / 30),
                 ),
                 *(
-                    Configuration(
+                    case.Configuration(
                         name=order,
-                        method=Method(composition=order),
+                        method=engine.Method(composition=order),
                         expected_order=float(order[-1]),
                         order_range=span,
                         time_steps=(1 / 3, 1 / 6, *FALLING_STEPS),
@@ -345,7 +327,7 @@ TEST = ScalarTest(
         ),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest step in which two linkages hang",
             configuration="plain",
@@ -356,7 +338,7 @@ TEST = ScalarTest(
             expected_source="hanging they are one swing, ω² = c g/l with c = ((3 N + 1)/2)/((4 N + 1)/3), gravity taken where a "
             "step begins: stable while h ω < 2; to the resolution of the search",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="most-linkages",
             title="Most hanging linkages that swing as one at h = 1/60 s",
             configuration="plain",

@@ -7,32 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    WORLD,
-    AngularMomentum,
-    AngularVelocity,
-    Distance,
-    Hinge,
-    Maximum,
-    MaximumAbsolute,
-    Method,
-    Position,
-    Prismatic,
-    RigidBody,
-    Scene,
-    Trace,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Example,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.multibody.library import (
     FIRST_ORDER,
     GRAVITY,
@@ -67,20 +44,20 @@ FINE = 1 / 2000  # s, of both searches
 STIFFEST = 1e15  # N/m, where the search for the stiffest spring ends
 
 
-def scene(time_step: float) -> Scene:
+def scene(time_step: float) -> engine.Scene:
     """Shaft, slider and two rods, each with its ball at the end as one body; g along −z."""
     mass, centre = ROD + BALL, (0.5 * ROD + BALL) / (ROD + BALL)  # kg; m from the hinge
     inertia = ACROSS + ROD * (centre - 0.5) ** 2 + BALL * (1.0 - centre) ** 2
     spin = (0.0, 0.0, SPIN)
     bodies = [
-        RigidBody(
+        engine.RigidBody(
             name="shaft",
             mass=ROD,
             inertia=(ACROSS, ACROSS, ALONG),
             position=(0.0, 0.0, MIDDLE),
             angular_velocity=spin,
         ),
-        RigidBody(
+        engine.RigidBody(
             name="slider",
             mass=SLIDER,
             inertia=(CUBE, CUBE, CUBE),
@@ -93,14 +70,14 @@ def scene(time_step: float) -> Scene:
         return {"name": name, "between": (first, second), "compliance": COMPLIANCE, "damping": time_step}
 
     up = (0.0, 0.0, 1.0)
-    rows: list[Hinge | Prismatic | Distance] = [
-        Hinge(**options("bearing", WORLD, "shaft"), at=(0.0, 0.0, 0.0), axis=up),  # type: ignore[arg-type]
-        Prismatic(**options("slide", "shaft", "slider"), at=(0.0, 0.0, MIDDLE), axis=up),  # type: ignore[arg-type]
+    rows: list[engine.Hinge | engine.Prismatic | engine.Distance] = [
+        engine.Hinge(**options("bearing", engine.WORLD, "shaft"), at=(0.0, 0.0, 0.0), axis=up),  # type: ignore[arg-type]
+        engine.Prismatic(**options("slide", "shaft", "slider"), at=(0.0, 0.0, MIDDLE), axis=up),  # type: ignore[arg-type]
     ]
     for side, sign in (("right", 1.0), ("left", -1.0)):
         x = sign * (OUT + centre * math.cos(LEAN))
         bodies.append(
-            RigidBody(
+            engine.RigidBody(
                 name=side,
                 mass=mass,
                 inertia=(ALONG, inertia, inertia),
@@ -111,9 +88,9 @@ def scene(time_step: float) -> Scene:
             )
         )
         at = (sign * OUT, 0.0, TOP)
-        rows.append(Hinge(**options(f"{side} hinge", "shaft", side), at=at, axis=(0.0, 1.0, 0.0)))  # type: ignore[arg-type]
+        rows.append(engine.Hinge(**options(f"{side} hinge", "shaft", side), at=at, axis=(0.0, 1.0, 0.0)))  # type: ignore[arg-type]
         rows.append(
-            Distance(
+            engine.Distance(
                 name=f"{side} spring",
                 between=("slider", side),
                 anchors=((sign * OUT, 0.0, 0.0), (sign * (0.5 - centre), 0.0, 0.0)),
@@ -122,10 +99,14 @@ def scene(time_step: float) -> Scene:
                 damping=VISCOSITY / STIFFNESS,
             )
         )
-    return Scene(bodies=tuple(bodies), constraints=tuple(rows), gravity=(0.0, 0.0, -GRAVITY), contacts=False)
+    return engine.Scene(
+        bodies=tuple(bodies), constraints=tuple(rows), gravity=(0.0, 0.0, -GRAVITY), contacts=False
+    )
 
 
-def answers(simulate: Simulate, time_step: float, method: Method = PLAIN) -> dict[str, float]:
+def answers(
+    simulate: case.Simulate, time_step: float, method: engine.Method = engine.PLAIN
+) -> dict[str, float]:
     """The library's error of the slider, the shaft's rate at the end, angular momentum."""
     result = simulate(
         scene(time_step),
@@ -133,10 +114,10 @@ def answers(simulate: Simulate, time_step: float, method: Method = PLAIN) -> dic
         duration=10.0,
         method=method,
         observe={
-            "slider": Trace(quantity=Position("slider")),
-            "rate": Trace(quantity=AngularVelocity("shaft")),
-            "turn": MaximumAbsolute(quantity=AngularMomentum()),
-            "drift": MaximumAbsolute(quantity=AngularMomentum(), from_start=True),
+            "slider": engine.Trace(quantity=engine.Position("slider")),
+            "rate": engine.Trace(quantity=engine.AngularVelocity("shaft")),
+            "turn": engine.MaximumAbsolute(quantity=engine.AngularMomentum()),
+            "drift": engine.MaximumAbsolute(quantity=engine.AngularMomentum(), from_start=True),
         },
     )
     times = [round(time / time_step) for time in EXACT]
@@ -148,22 +129,22 @@ def answers(simulate: Simulate, time_step: float, method: Method = PLAIN) -> dic
     }
 
 
-def coarse(simulate: Simulate) -> dict[str, float]:
+def coarse(simulate: case.Simulate) -> dict[str, float]:
     """At h = 1/60 s, 135 times what an explicit step could take."""
     return answers(simulate, 1 / 60)
 
 
-def fine(simulate: Simulate) -> dict[str, float]:
+def fine(simulate: case.Simulate) -> dict[str, float]:
     """At h = 1/4000 s."""
     return answers(simulate, 1 / 4000)
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Of the slider at six times in 10 s."""
     return answers(simulate, time_step, method)["library_error"]
 
 
-def spun(simulate: Simulate, spin: float, stiffness: float = STIFFNESS) -> float:
+def spun(simulate: case.Simulate, spin: float, stiffness: float = STIFFNESS) -> float:
     """The slider's highest place [m] in the first 0.6 s at FINE, the shaft starting with `spin` [rad/s]."""
     built = scene(FINE)
     bodies = (
@@ -173,14 +154,14 @@ def spun(simulate: Simulate, spin: float, stiffness: float = STIFFNESS) -> float
             angular_velocity=(0.0, 0.0, spin),
         )
         for body in built.bodies
-        if isinstance(body, RigidBody)
+        if isinstance(body, engine.RigidBody)
     )
     joints = (
-        replace(joint, compliance=1.0 / stiffness) if isinstance(joint, Distance) else joint
+        replace(joint, compliance=1.0 / stiffness) if isinstance(joint, engine.Distance) else joint
         for joint in built.constraints
     )
     built = replace(built, bodies=tuple(bodies), constraints=tuple(joints))
-    observe = {"slider": Maximum(quantity=Position("slider"))}
+    observe = {"slider": engine.Maximum(quantity=engine.Position("slider"))}
     result = simulate(built, time_step=FINE, duration=0.6, observe=observe)
     return float(result["slider"][2]) if result.completed else math.inf
 
@@ -213,14 +194,14 @@ def fastest_below(height: float) -> float:
     return low
 
 
-def fastest(simulate: Simulate) -> BreakPoint:
+def fastest(simulate: case.Simulate) -> case.BreakPoint:
     """The fastest spin [rad/s] at which the slider stays below CEILING."""
     return break_point(
         lambda spin: spun(simulate, spin) < CEILING, 0.8 * SPIN, 4.0 * SPIN, resolution=2e-3, walk=6
     )
 
 
-def stiffest(simulate: Simulate) -> BreakPoint:
+def stiffest(simulate: case.Simulate) -> case.BreakPoint:
     """The stiffest springs [N/m] with which the slider rises as high as with a link, to a centimetre."""
 
     def holds(stiffness: float) -> bool:
@@ -242,7 +223,7 @@ HIGHEST = highest()  # m
 FASTEST = fastest_below(CEILING)  # rad/s
 OUTPUTS = "the slider's height at 0.1, 0.5, 1, 2, 5 and 10 s"
 KEPT = (
-    Metric(
+    case.Metric(
         name="angular_momentum_error",
         description="largest |L_z| over 53.86899866 kg m²/s, minus one",
         unit="1",
@@ -252,7 +233,7 @@ KEPT = (
         reference=0.0,
         tolerance=1e-12,
     ),
-    Metric(
+    case.Metric(
         name="angular_momentum_drift",
         description="largest |L_z − L_z(0)| over L_z",
         unit="1",
@@ -262,7 +243,7 @@ KEPT = (
         reference=0.0,
         tolerance=1e-12,
     ),
-    Metric(
+    case.Metric(
         name="shaft_rate_error",
         description="rate of the shaft after 10 s over 5.5482036227 rad/s, minus one",
         unit="1",
@@ -272,7 +253,7 @@ KEPT = (
     ),
 )
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Multibody library A05: stiff flyball governor",
     question="Does a stiff flyball governor settle and slow its shaft as it should?",
     why="Time constants of 0.1 ms beside motions of seconds: a step that follows the springs takes 100 000 steps, one "
@@ -294,14 +275,14 @@ TEST = ScalarTest(
     conclusion="Green: stiff spring-dampers are solved, not followed. Red: they are cut, ring, or take momentum away.",
     source="Library for computational benchmarking of multibody dynamics, problem A05",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=1 / 60,
             metrics=(error_metric("companion", LOW, OUTPUTS), *KEPT),
             measure=coarse,
             note="the SPOOK step as it stands",
         ),
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=1 / 4000,
             metrics=(error_metric("gate", HIGH, OUTPUTS), *KEPT),
@@ -309,7 +290,7 @@ TEST = ScalarTest(
             note="the SPOOK step as it stands",
         ),
     ),
-    example=lambda: Example(scene=scene(1 / 60), time_step=1 / 60),
+    example=lambda: case.Example(scene=scene(1 / 60), time_step=1 / 60),
     ladders=ladders(
         "the slider at six times",
         {
@@ -331,7 +312,7 @@ TEST = ScalarTest(
         ladder_error,
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="fastest",
             title="Fastest spin at which the slider stays below 0.9 m at h = 1/2000 s",
             configuration="plain",
@@ -343,7 +324,7 @@ TEST = ScalarTest(
             "tenths of a per cent, and the bend of a step for a motion: a speed of ½ h v²/r, 0.3 % at this step (2.4 % at "
             "1/240 s); 0.2 % is the search's",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="stiffest-springs",
             title="Stiffest springs with which the slider rises as high as with links",
             configuration="plain",

@@ -13,20 +13,22 @@ from typing import Any
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from spook_tracker.engine import PLAIN, Method, RigidBody
-from spook_tracker.scalar_tests.case import Configuration, Ladder, LimitKind, Metric, Role, Simulate
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 
 GRAVITY = 9.81  # m/s²
 LOW, HIGH = 1e-1, 1e-3  # allowed errors of the two classes
 THRESHOLD = 1e-3  # of a reference that passes zero
 ALLOWED = {"low": LOW, "high": HIGH}
-PLAIN_CONFIGURATION = Configuration(name="plain", method=PLAIN, expected_order=None)  # not yet in its range
-FIRST_ORDER = Configuration(name="plain", method=PLAIN, expected_order=1.0)
+PLAIN_CONFIGURATION = case.Configuration(
+    name="plain", method=engine.PLAIN, expected_order=None
+)  # not yet in its range
+FIRST_ORDER = case.Configuration(name="plain", method=engine.PLAIN, expected_order=1.0)
 
 
-SECOND_ORDER = Configuration(
+SECOND_ORDER = case.Configuration(
     name="half-step, curved twice",
-    method=Method(half_step_velocities=True, corrections=2),
+    method=engine.Method(half_step_velocities=True, corrections=2),
     expected_order=2.0,
 )
 
@@ -39,10 +41,12 @@ def library_error(found: Any, reference: Any, threshold: float = THRESHOLD) -> f
     )
 
 
-def rod(name: str, start: Any, end: Any, mass: float, inertia: tuple[float, float, float]) -> RigidBody:
+def rod(
+    name: str, start: Any, end: Any, mass: float, inertia: tuple[float, float, float]
+) -> engine.RigidBody:
     """A rod at rest between two points [m], its own axes those of the world at the start."""
     x, y, z = (0.5 * (np.asarray(start, dtype=float) + np.asarray(end, dtype=float))).tolist()
-    return RigidBody(name=name, mass=mass, inertia=inertia, position=(x, y, z))
+    return engine.RigidBody(name=name, mass=mass, inertia=inertia, position=(x, y, z))
 
 
 def turned(orientation: Any, arm: Any) -> Any:
@@ -63,17 +67,17 @@ def tightly(
 
 def ladders(
     what: str,
-    classes: Mapping[str, tuple[tuple[float, ...], tuple[Configuration, ...]]],
-    error: Callable[[Simulate, float, Method], float],
+    classes: Mapping[str, tuple[tuple[float, ...], tuple[case.Configuration, ...]]],
+    error: Callable[[case.Simulate, float, engine.Method], float],
     of: str = "",
-) -> tuple[Ladder, ...]:
+) -> tuple[case.Ladder, ...]:
     """A ladder for each precision class, {"low" or "high": (time steps, configurations that reach it)}; `of` stands
     before their names.
 
     The time at which it is reached is the library's own question.
     """
     return tuple(
-        Ladder(
+        case.Ladder(
             name=f"{of}{name} precision",
             description=f"{what}, the library's error; allowed {ALLOWED[name]:g}",
             unit="1",
@@ -87,10 +91,10 @@ def ladders(
 
 
 def error_metric(
-    role: Role, allowed: float, outputs: str, kind: LimitKind = "physical", **told: Any
-) -> Metric:
+    role: case.Role, allowed: float, outputs: str, kind: case.LimitKind = "physical", **told: Any
+) -> case.Metric:
     """The library's error of a run, against one of its classes; `kind` is whose its limit is at this time step."""
-    return Metric(
+    return case.Metric(
         name="library_error",
         description=f"root mean square of |y − y_ref| / max(|y_ref|, 1e-3) over {outputs}",
         unit="1",

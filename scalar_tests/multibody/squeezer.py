@@ -9,30 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    WORLD,
-    Distance,
-    Hinge,
-    JointCoordinate,
-    Load,
-    Method,
-    Result,
-    RigidBody,
-    Scene,
-    Trace,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Example,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.heavier import heavier
 from spook_tracker.scalar_tests.multibody.library import (
     HIGH,
@@ -77,7 +57,7 @@ def _place(point: Any) -> tuple[float, float, float]:
     return (float(point[0]), float(point[1]), 0.0)
 
 
-def scene(time_step: float) -> Scene:
+def scene(time_step: float) -> engine.Scene:
     """Seven bodies, ten hinges, a spring from C to D; no gravity, at rest, a torque on the crank."""
     fixed = np.zeros(2)
     crank_end = _turn(START["crank"]) @ [0.007, 0.0]  # F
@@ -86,8 +66,10 @@ def scene(time_step: float) -> Scene:
     lower = A + _turn(START["lower"]) @ [0.04, 0.0]  # G
     upper = A + _turn(START["upper"]) @ [0.0, -0.04]  # H
 
-    def body(name: str, mass: float, inertia: float, centre: np.ndarray) -> RigidBody:
-        return RigidBody(name=name, mass=mass, inertia=(inertia, inertia, inertia), position=_place(centre))
+    def body(name: str, mass: float, inertia: float, centre: np.ndarray) -> engine.RigidBody:
+        return engine.RigidBody(
+            name=name, mass=mass, inertia=(inertia, inertia, inertia), position=_place(centre)
+        )
 
     bodies = (
         body("K1", 0.04325, 2.194e-6, _along(fixed, crank_end, 0.00092)),
@@ -99,13 +81,13 @@ def scene(time_step: float) -> Scene:
         body("K7", 0.05498, 1.912e-5, A + _turn(START["upper"]) @ [0.01228, -0.00449]),
     )
 
-    def hinge(name: str, first: str, second: str, at: np.ndarray) -> Hinge:
+    def hinge(name: str, first: str, second: str, at: np.ndarray) -> engine.Hinge:
         damping = 2.0 * time_step
-        return Hinge(
+        return engine.Hinge(
             name=name, between=(first, second), at=_place(at), compliance=COMPLIANCE, damping=damping
         )
 
-    spring = Distance(
+    spring = engine.Distance(
         name="spring",
         between=(_place(C), "K3"),
         anchors=((0.0, 0.0, 0.0), _place(hook - bodies[2].position[:2])),
@@ -114,19 +96,19 @@ def scene(time_step: float) -> Scene:
         damping=0.0,
     )
     hinges = (
-        hinge("O", WORLD, "K1", fixed),
+        hinge("O", engine.WORLD, "K1", fixed),
         hinge("F", "K1", "K2", crank_end),
         hinge("E", "K2", "K3", joint),
         hinge("E lower", "K2", "K4", joint),
         hinge("E upper", "K2", "K6", joint),
-        hinge("B", WORLD, "K3", B),
-        hinge("A lower", WORLD, "K5", A),
+        hinge("B", engine.WORLD, "K3", B),
+        hinge("A lower", engine.WORLD, "K5", A),
         hinge("G", "K5", "K4", lower),
-        hinge("A upper", WORLD, "K7", A),
+        hinge("A upper", engine.WORLD, "K7", A),
         hinge("H", "K7", "K6", upper),
     )
-    torque = Load(name="torque", body="K1", torque=(0.0, 0.0, TORQUE))
-    return Scene(
+    torque = engine.Load(name="torque", body="K1", torque=(0.0, 0.0, TORQUE))
+    return engine.Scene(
         bodies=bodies,
         constraints=(*hinges, spring),
         forces=(torque,),
@@ -135,10 +117,12 @@ def scene(time_step: float) -> Scene:
     )
 
 
-def answers(simulate: Simulate, time_step: float, method: Method = PLAIN) -> dict[str, float]:
+def answers(
+    simulate: case.Simulate, time_step: float, method: engine.Method = engine.PLAIN
+) -> dict[str, float]:
     """The library's error of the four angles at the ground, and how far F is off after 0.01 s."""
     observe: dict[str, Observable] = {
-        name: Trace(quantity=JointCoordinate(hinge)) for name, hinge in HINGES.items()
+        name: engine.Trace(quantity=engine.JointCoordinate(hinge)) for name, hinge in HINGES.items()
     }
     result = simulate(
         scene(time_step), time_step=time_step, duration=DURATION, method=method, observe=observe
@@ -151,44 +135,46 @@ def answers(simulate: Simulate, time_step: float, method: Method = PLAIN) -> dic
     }
 
 
-def fine(simulate: Simulate) -> dict[str, float]:
+def fine(simulate: case.Simulate) -> dict[str, float]:
     """In steps of 1e-5 s."""
     return answers(simulate, 1e-5)
 
 
-def coarse(simulate: Simulate) -> dict[str, float]:
+def coarse(simulate: case.Simulate) -> dict[str, float]:
     """In steps of 1e-4 s, two hundred to a turn of the crank."""
     return answers(simulate, 1e-4)
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Of the four angles after 0.03 s."""
     return answers(simulate, time_step, method)["library_error"]
 
 
-def in_class(simulate: Simulate, time_step: float) -> bool:
+def in_class(simulate: case.Simulate, time_step: float) -> bool:
     """Whether the low class is kept, 0.03 s being divided into the number of steps nearest to that one [s]."""
     return answers(simulate, DURATION / round(DURATION / time_step))["library_error"] < LOW
 
 
-def longest_step(simulate: Simulate) -> BreakPoint:
+def longest_step(simulate: case.Simulate) -> case.BreakPoint:
     """The longest step [s] that keeps the low class."""
     return break_point(functools.partial(in_class, simulate), 5e-5, 5e-4, resolution=2e-3, walk=6)
 
 
-def scales(simulate: Simulate, times: float) -> bool:
+def scales(simulate: case.Simulate, times: float) -> bool:
     """Whether a mechanism so many times as heavy, driven and stiff keeps the low class in steps of 1e-4 s."""
 
-    def stronger(scene: Scene, **options: Any) -> Result:
+    def stronger(scene: engine.Scene, **options: Any) -> engine.Result:
         rows = tuple(
-            replace(row, compliance=(COMPLIANCE if isinstance(row, Hinge) else 1.0 / STIFFNESS) / times)
+            replace(
+                row, compliance=(COMPLIANCE if isinstance(row, engine.Hinge) else 1.0 / STIFFNESS) / times
+            )
             for row in scene.constraints
-            if isinstance(row, Hinge | Distance)
+            if isinstance(row, engine.Hinge | engine.Distance)
         )
         loads = tuple(
             replace(load, torque=(0.0, 0.0, times * load.torque[2]))
             for load in scene.forces
-            if isinstance(load, Load)
+            if isinstance(load, engine.Load)
         )
         return simulate(replace(heavier(scene, times), constraints=rows, forces=loads), **options)
 
@@ -198,7 +184,7 @@ def scales(simulate: Simulate, times: float) -> bool:
 CURVED = replace(SECOND_ORDER, expected_order=None)  # not yet in its range
 OUTPUTS = "the angles of crank, triangle and both rockers after 0.03 s"
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Multibody library A03: Andrews' squeezing mechanism",
     question="Is Andrews' squeezing mechanism where it should be after 0.03 s?",
     why="Millimetres, grams and 1200 rad/s: a mechanism whose compliances and time steps fit no engine's defaults.",
@@ -219,12 +205,12 @@ TEST = ScalarTest(
     conclusion="Green: rigid joints are rigid at every scale. Red: a default meant for metres and kilograms is in the way.",
     source="Library for computational benchmarking of multibody dynamics, problem A03",
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=1e-5,
             metrics=(
                 error_metric("gate", HIGH, OUTPUTS),
-                Metric(
+                case.Metric(
                     name="place_of_f",
                     description="distance of the crank's end from its place after 0.01 s",
                     unit="m",
@@ -236,7 +222,7 @@ TEST = ScalarTest(
             measure=fine,
             note="the SPOOK step as it stands",
         ),
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=1e-4,
             metrics=(error_metric("companion", LOW, OUTPUTS),),
@@ -244,7 +230,7 @@ TEST = ScalarTest(
             note="the SPOOK step as it stands",
         ),
     ),
-    example=lambda: Example(scene=scene(1e-5), time_step=1e-5),
+    example=lambda: case.Example(scene=scene(1e-5), time_step=1e-5),
     ladders=ladders(
         "four angles after 0.03 s",
         {
@@ -257,7 +243,7 @@ TEST = ScalarTest(
         ladder_error,
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="longest-step",
             title="Longest step that keeps the low precision class",
             configuration="plain",

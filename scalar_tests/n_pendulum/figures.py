@@ -5,22 +5,22 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from spook_tracker.engine import PLAIN, Energy, MaximumAbsolute, Method, Trace, Violation
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
-from spook_tracker.scalar_tests.case import Drawing, Figure, Simulate
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.chain import fall_to_hanging, level_chain
 from spook_tracker.scalar_tests.sweep import at, line, sweep, told
 
 COUNT = 26
 DURATION = 22.0  # s
 TIME_STEP = 1.0 / 60.0  # s
-CURVED_TWICE = Method(corrections=2)
-TWO_SUBSTEPS = Method(substeps=2)
+CURVED_TWICE = engine.Method(corrections=2)
+TWO_SUBSTEPS = engine.Method(substeps=2)
 TIME_STEPS = (0.001, 0.002, 0.004, 0.006, 0.008, 0.01, 0.012, 0.014, 1.0 / 60.0, 0.018, 0.02)  # s
 COUNTS = (1, 2, 5, 10, 15, 20, 26, 35, 50, 70, 85, 100)
 OBSERVE: dict[str, Observable] = {
-    "violation": MaximumAbsolute(quantity=Violation()),
-    "energy": Trace(quantity=Energy(), from_start=True),
+    "violation": engine.MaximumAbsolute(quantity=engine.Violation()),
+    "energy": engine.Trace(quantity=engine.Energy(), from_start=True),
 }
 
 
@@ -31,7 +31,10 @@ OTHER_LINK, OTHER_DURATION = (
 
 
 def swing(
-    simulate: Simulate, count: int = COUNT, time_step: float = TIME_STEP, method: Method = PLAIN
+    simulate: case.Simulate,
+    count: int = COUNT,
+    time_step: float = TIME_STEP,
+    method: engine.Method = engine.PLAIN,
 ) -> tuple[Any, Any]:
     """(count,) largest |violation| of each link [%] and E − E₀ at every sample [% of the fall to hanging]."""
     result = simulate(
@@ -44,7 +47,7 @@ def swing(
     return 100.0 * result["violation"], 100.0 * result["energy"] / fall_to_hanging(count)
 
 
-def other_reading(simulate: Simulate, count: int = COUNT, time_step: float = TIME_STEP) -> Any:
+def other_reading(simulate: case.Simulate, count: int = COUNT, time_step: float = TIME_STEP) -> Any:
     """(count,) largest |violation| of each link [%] of plain SPOOK with links of OTHER_LINK over OTHER_DURATION.
 
     A chain of longer links under the same gravity is one of links of 1 m under so much less, in shares of a link.
@@ -55,17 +58,21 @@ def other_reading(simulate: Simulate, count: int = COUNT, time_step: float = TIM
     return 100.0 * result["violation"]
 
 
-def draw_links(simulate: Simulate) -> Drawing:
+def draw_links(simulate: case.Simulate) -> case.Drawing:
     """Largest deviation of each link."""
     links = range(1, COUNT + 1)
     found = {
         name: swing(simulate, method=method)[0]
-        for name, method in (("plain", PLAIN), ("two substeps", TWO_SUBSTEPS), ("curved twice", CURVED_TWICE))
+        for name, method in (
+            ("plain", engine.PLAIN),
+            ("two substeps", TWO_SUBSTEPS),
+            ("curved twice", CURVED_TWICE),
+        )
     }
     most = int(found["plain"].argmax())
     found["plain, links of 3 m, 15 s"] = other_reading(simulate)
     other = found["plain, links of 3 m, 15 s"]
-    return Drawing(
+    return case.Drawing(
         curves=tuple(line(name, links, values, "points") for name, values in found.items()),
         x_label="link, counted from the pivot",
         y_label="largest deviation in 22 s [%]",
@@ -75,13 +82,13 @@ def draw_links(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_length(simulate: Simulate) -> Drawing:
+def draw_length(simulate: case.Simulate) -> case.Drawing:
     """Largest deviation against time step."""
 
-    def worst(method: Method) -> tuple[float, ...]:
+    def worst(method: engine.Method) -> tuple[float, ...]:
         return sweep(TIME_STEPS, lambda h: swing(simulate, time_step=h, method=method)[0].max())
 
-    plain = worst(PLAIN)
+    plain = worst(engine.PLAIN)
     other = sweep(TIME_STEPS, lambda h: other_reading(simulate, time_step=h).max())
     kept = [h for h, deviation in zip(TIME_STEPS, plain, strict=True) if deviation <= 16.0]
     keeps = (
@@ -89,7 +96,7 @@ def draw_length(simulate: Simulate) -> Drawing:
         if kept
         else "keeps the printed 16 % at none of these"
     )
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("plain", TIME_STEPS, plain, "both"),
             line("curved twice", TIME_STEPS, worst(CURVED_TWICE), "both"),
@@ -103,14 +110,14 @@ def draw_length(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_energy(simulate: Simulate) -> Drawing:
+def draw_energy(simulate: case.Simulate) -> case.Drawing:
     """Gain and loss of energy against time step."""
     gains, losses = [], []
     for h in TIME_STEPS:
         energy = swing(simulate, time_step=h)[1]
         gains.append(energy.max())
         losses.append(-energy.min())
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("largest gain", TIME_STEPS, gains, "both"),
             line("largest loss", TIME_STEPS, losses, "both"),
@@ -123,16 +130,16 @@ def draw_energy(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_length_by_count(simulate: Simulate) -> Drawing:
+def draw_length_by_count(simulate: case.Simulate) -> case.Drawing:
     """Largest deviation against the number of spheres."""
 
-    def worst(method: Method) -> tuple[float, ...]:
+    def worst(method: engine.Method) -> tuple[float, ...]:
         return sweep(COUNTS, lambda n: swing(simulate, count=int(n), method=method)[0].max())
 
     other = sweep(COUNTS, lambda n: other_reading(simulate, int(n)).max())
-    return Drawing(
+    return case.Drawing(
         curves=(
-            line("plain", COUNTS, worst(PLAIN), "both"),
+            line("plain", COUNTS, worst(engine.PLAIN), "both"),
             line("curved twice", COUNTS, worst(CURVED_TWICE), "both"),
             line("plain, links of 3 m, 15 s", COUNTS, other, "both"),
         ),
@@ -143,11 +150,11 @@ def draw_length_by_count(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_energy_by_count(simulate: Simulate) -> Drawing:
+def draw_energy_by_count(simulate: case.Simulate) -> case.Drawing:
     """Gain and loss of energy against the number of spheres."""
     gains = sweep(COUNTS, lambda n: swing(simulate, count=int(n))[1].max())
     losses = sweep(COUNTS, lambda n: -swing(simulate, count=int(n))[1].min())
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("largest gain", COUNTS, gains, "both"),
             line("largest loss", COUNTS, losses, "both"),
@@ -161,23 +168,23 @@ def draw_energy_by_count(simulate: Simulate) -> Drawing:
 
 
 FIGURES = (
-    Figure(name="links", title="Deviation of each link", draw=draw_links, thesis="Fig 3.26"),
-    Figure(
+    case.Figure(name="links", title="Deviation of each link", draw=draw_links, thesis="Fig 3.26"),
+    case.Figure(
         name="length-against-time-step",
         title="Length deviation against time step",
         draw=draw_length,
         thesis="Fig 3.27",
     ),
-    Figure(
+    case.Figure(
         name="energy-against-time-step", title="Energy against time step", draw=draw_energy, thesis="Fig 3.28"
     ),
-    Figure(
+    case.Figure(
         name="length-against-number",
         title="Length deviation against the number of spheres",
         draw=draw_length_by_count,
         thesis="Fig 3.29",
     ),
-    Figure(
+    case.Figure(
         name="energy-against-number",
         title="Energy against the number of spheres",
         draw=draw_energy_by_count,

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Final, MaximumAbsolute, Method, Position, Trace, Violation
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
-from spook_tracker.scalar_tests.case import Simulate
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.chain import LENGTH, chain, exact_tip, level_chain, small_motion
 from spook_tracker.scalar_tests.n_pendulum.figures import COUNT, CURVED_TWICE, TIME_STEP, TWO_SUBSTEPS, swing
 
@@ -20,24 +20,24 @@ TIP_TIME = 2.0  # s: before the chain whips, so that errors are still smooth in 
 
 LONG_COUNT = 400
 
-EIGHT_SUBSTEPS = Method(substeps=8)
+EIGHT_SUBSTEPS = engine.Method(substeps=8)
 
-EIGHT_SUBSTEPS_CURVED = Method(substeps=8, corrections=1)
+EIGHT_SUBSTEPS_CURVED = engine.Method(substeps=8, corrections=1)
 
 AMPLITUDE = 1e-7  # m: the nonlinearity of small motion is its square
 
 SMALL_MOTION_STEPS = 100
 
-ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")
+ORDER_4, ORDER_6 = engine.Method(composition="order4"), engine.Method(composition="order6")
 
-ORDER_8 = Method(composition="order8")
+ORDER_8 = engine.Method(composition="order8")
 
-HALF_STEP = Method(half_step_velocities=True)
+HALF_STEP = engine.Method(half_step_velocities=True)
 
-HALF_STEP_CURVED = Method(half_step_velocities=True, corrections=2)
+HALF_STEP_CURVED = engine.Method(half_step_velocities=True, corrections=2)
 
 
-def _answers(simulate: Simulate, method: Method, count: int = COUNT) -> dict[str, float]:
+def _answers(simulate: case.Simulate, method: engine.Method, count: int = COUNT) -> dict[str, float]:
     violation, energy = swing(simulate, count, method=method)
     return {
         "length_deviation": float(violation.max()),
@@ -47,38 +47,38 @@ def _answers(simulate: Simulate, method: Method, count: int = COUNT) -> dict[str
     }
 
 
-def plain(simulate: Simulate) -> dict[str, float]:
+def plain(simulate: case.Simulate) -> dict[str, float]:
     """Plain SPOOK, with the first 4 s by themselves and the link that stretches most."""
-    early: dict[str, Observable] = {"violation": MaximumAbsolute(quantity=Violation())}
+    early: dict[str, Observable] = {"violation": engine.MaximumAbsolute(quantity=engine.Violation())}
     result = simulate(level_chain(COUNT, TIME_STEP), time_step=TIME_STEP, steps=EARLY_STEPS, observe=early)
     violation, _ = swing(simulate)
-    return _answers(simulate, PLAIN) | {
+    return _answers(simulate, engine.PLAIN) | {
         "length_deviation_early": 100.0 * float(result["violation"].max()) / LENGTH,
         "weakest_link": float(np.argmax(violation)) + 1.0,
     }
 
 
-def curved_twice(simulate: Simulate) -> dict[str, float]:
+def curved_twice(simulate: case.Simulate) -> dict[str, float]:
     """Curved constraints, two corrections."""
     return _answers(simulate, CURVED_TWICE)
 
 
-def two_substeps(simulate: Simulate) -> dict[str, float]:
+def two_substeps(simulate: case.Simulate) -> dict[str, float]:
     """Plain SPOOK in two steps of h/2, damping one of them."""
     return _answers(simulate, TWO_SUBSTEPS)
 
 
-def long_chain(simulate: Simulate) -> dict[str, float]:
+def long_chain(simulate: case.Simulate) -> dict[str, float]:
     """400 spheres, eight substeps."""
     return _answers(simulate, EIGHT_SUBSTEPS, LONG_COUNT)
 
 
-def long_chain_curved(simulate: Simulate) -> dict[str, float]:
+def long_chain_curved(simulate: case.Simulate) -> dict[str, float]:
     """400 spheres, eight substeps with curved constraints."""
     return _answers(simulate, EIGHT_SUBSTEPS_CURVED, LONG_COUNT)
 
 
-def small_oscillations(simulate: Simulate) -> dict[str, float]:
+def small_oscillations(simulate: case.Simulate) -> dict[str, float]:
     """Every mode started by itself; its squared frequency from x₊ − 2x + x₋ = −h² ω² x."""
     squares, shapes = small_motion(COUNT)
     errors = []
@@ -88,7 +88,7 @@ def small_oscillations(simulate: Simulate) -> dict[str, float]:
             chain(places, TIME_STEP),
             time_step=TIME_STEP,
             steps=SMALL_MOTION_STEPS,
-            observe={"places": Trace(quantity=Position())},
+            observe={"places": engine.Trace(quantity=engine.Position())},
         )
         mode = result["places"][:, :, 0] @ shape
         bend = 2.0 * mode[1:-1] - mode[2:] - mode[:-2]
@@ -96,30 +96,30 @@ def small_oscillations(simulate: Simulate) -> dict[str, float]:
     return {"frequency_error": max(errors, key=abs)}
 
 
-def _scene(time_step: float, method: Method) -> Any:
+def _scene(time_step: float, method: engine.Method) -> Any:
     return level_chain(COUNT, time_step / method.substeps)
 
 
-def tip_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def tip_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Distance of the last sphere from where it should be at 2 s [m]."""
     result = simulate(
         _scene(time_step, method),
         time_step=time_step,
         duration=TIP_TIME,
         method=method,
-        observe={"tip": Final(quantity=Position(f"sphere {COUNT}"))},
+        observe={"tip": engine.Final(quantity=engine.Position(f"sphere {COUNT}"))},
     )
     x, z = exact_tip(COUNT, TIP_TIME)
     return float(np.hypot(result["tip"][0] - x, result["tip"][2] - z))
 
 
-def length_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def length_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest deviation of any link over 2 s [%]."""
     result = simulate(
         _scene(time_step, method),
         time_step=time_step,
         duration=TIP_TIME,
         method=method,
-        observe={"violation": MaximumAbsolute(quantity=Violation())},
+        observe={"violation": engine.MaximumAbsolute(quantity=engine.Violation())},
     )
     return 100.0 * float(result["violation"].max()) / LENGTH

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from spook_tracker.engine import PLAIN
-from spook_tracker.scalar_tests.case import Configuration, Ladder, LimitKind, Measurement, Metric, Unobserved
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.n_pendulum.figures import COUNT, CURVED_TWICE, TIME_STEP, TWO_SUBSTEPS
 from spook_tracker.scalar_tests.n_pendulum.measure import (
     HALF_STEP,
@@ -31,9 +31,9 @@ def _length(
     source: str,
     set_point: tuple[float, float],
     why: str,
-    kind: LimitKind = "physical",
-) -> Metric:
-    return Metric(
+    kind: case.LimitKind = "physical",
+) -> case.Metric:
+    return case.Metric(
         name="length_deviation",
         description="largest |length − 1 m| of any of the 26 links in 22 s",
         unit="%",
@@ -55,8 +55,8 @@ def _around(value: float, relative: float) -> tuple[float, float]:
 PROTOTYPE = "the method's own discrete solution: the prototype tests/oracles/chain.py, written from the equations alone"
 
 
-def _energy_at_10_s(limit: float, source: str) -> Metric:
-    return Metric(
+def _energy_at_10_s(limit: float, source: str) -> case.Metric:
+    return case.Metric(
         name="energy_at_10_s",
         description="Energy drift after 10 s, of the fall to hanging (+ gained, − lost)",
         unit="%",
@@ -81,8 +81,8 @@ ENERGY_AT_10_S_LONG = _energy_at_10_s(
 )
 
 
-def _energy_at_the_end(set_point: tuple[float, float] | None = None) -> Metric:
-    return Metric(
+def _energy_at_the_end(set_point: tuple[float, float] | None = None) -> case.Metric:
+    return case.Metric(
         name="energy_at_the_end",
         description="Energy drift after 22 s, of the fall to hanging (+ gained, − lost); in curved configurations chaos decides its digits",
         unit="%",
@@ -96,8 +96,8 @@ def _energy_at_the_end(set_point: tuple[float, float] | None = None) -> Metric:
     )
 
 
-def _energy_gain(limit: float, source: str) -> Metric:
-    return Metric(
+def _energy_gain(limit: float, source: str) -> case.Metric:
+    return case.Metric(
         name="energy_gain",
         description="largest E − E₀ in 22 s, of the fall to hanging: all the thesis counts",
         unit="%",
@@ -111,7 +111,7 @@ def _energy_gain(limit: float, source: str) -> Metric:
 
 
 MEASUREMENTS = (
-    Measurement(
+    case.Measurement(
         configuration="curved twice",
         time_step=TIME_STEP,
         metrics=(
@@ -124,14 +124,14 @@ MEASUREMENTS = (
         parameters={"N": COUNT},
         note="curved constraints, two extra back-substitutions",
     ),
-    Measurement(
+    case.Measurement(
         configuration="plain",
         time_step=TIME_STEP,
         metrics=(
             _length(
                 "companion", 40.0, "Fig 3.27 reads 30 to 40 %", _around(34.483031, 1e-6), PROTOTYPE, "method"
             ),
-            Metric(
+            case.Metric(
                 name="length_deviation_early",
                 description="the same in the first 4 s",
                 unit="%",
@@ -144,7 +144,7 @@ MEASUREMENTS = (
                 reference=0.0,
                 relative_tolerance=1e-6,
             ),
-            Metric(
+            case.Metric(
                 name="weakest_link",
                 description="the link that stretches most, counted from the pivot",
                 unit="1",
@@ -161,7 +161,7 @@ MEASUREMENTS = (
         parameters={"N": COUNT},
         note="the SPOOK step as it stands",
     ),
-    Measurement(
+    case.Measurement(
         configuration="two substeps",
         time_step=TIME_STEP,
         metrics=(
@@ -175,7 +175,7 @@ MEASUREMENTS = (
         note="plain SPOOK in two steps of 1/120 s",
     ),
     *(
-        Measurement(
+        case.Measurement(
             configuration=name,
             time_step=TIME_STEP,
             metrics=(
@@ -199,11 +199,11 @@ MEASUREMENTS = (
             ("eight substeps, curved", 0.69675903, long_chain_curved),
         )
     ),
-    Measurement(
+    case.Measurement(
         configuration="small motion",
         time_step=TIME_STEP,
         metrics=(
-            Metric(
+            case.Metric(
                 name="frequency_error",
                 description="squared frequency of each mode over (g/l) x_i, minus one: the largest of 26",
                 unit="1",
@@ -222,55 +222,65 @@ MEASUREMENTS = (
 )
 
 LADDERS = (
-    Ladder(
+    case.Ladder(
         name="tip",
         description="distance of the last sphere from the DOP853 reference at 2 s",
         unit="m",
         time_steps=tuple(1.0 / n for n in (20, 30, 60, 120, 240, 480, 960, 1920, 3840)),
         configurations=(
-            Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 3840, 1 / 240)),
-            Configuration(
+            case.Configuration(
+                name="plain", method=engine.PLAIN, expected_order=1.0, order_range=(1 / 3840, 1 / 240)
+            ),
+            case.Configuration(
                 name="half-step", method=HALF_STEP, expected_order=2.0, order_range=(1 / 3840, 1 / 240)
             ),
-            Configuration(
+            case.Configuration(
                 name="half-step, curved twice",
                 method=HALF_STEP_CURVED,
                 expected_order=2.0,
                 order_range=(1 / 3840, 1 / 240),
             ),
-            Configuration(name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1 / 480, 1 / 60)),
-            Configuration(name="order 6", method=ORDER_6, expected_order=6.0, order_range=(1 / 240, 1 / 60)),
-            Configuration(name="order 8", method=ORDER_8, expected_order=8.0, order_range=(1 / 60, 1 / 20)),
+            case.Configuration(
+                name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1 / 480, 1 / 60)
+            ),
+            case.Configuration(
+                name="order 6", method=ORDER_6, expected_order=6.0, order_range=(1 / 240, 1 / 60)
+            ),
+            case.Configuration(
+                name="order 8", method=ORDER_8, expected_order=8.0, order_range=(1 / 60, 1 / 20)
+            ),
         ),
         error=tip_error,
         target_error=0.01,
         target_seconds=5e-3,
     ),
-    Ladder(
+    case.Ladder(
         name="length",
         description="largest deviation of any link over 2 s",
         unit="%",
         time_steps=tuple(1.0 / n for n in (30, 60, 120, 240, 480, 960)),
         configurations=(
-            Configuration(name="plain", method=PLAIN, expected_order=2.0, order_range=(1 / 960, 1 / 120)),
-            Configuration(
+            case.Configuration(
+                name="plain", method=engine.PLAIN, expected_order=2.0, order_range=(1 / 960, 1 / 120)
+            ),
+            case.Configuration(
                 name="two substeps",
                 method=TWO_SUBSTEPS,
                 expected_order=2.0,
                 order_range=(1 / 960, 1 / 120),
             ),
-            Configuration(
+            case.Configuration(
                 name="curved twice",
                 method=CURVED_TWICE,
                 expected_order=4.0,
                 order_range=(1 / 960, 1 / 120),
             ),
-            Configuration(  # joint coordinates: links keep their length at any step
+            case.Configuration(  # joint coordinates: links keep their length at any step
                 name="order 4", method=ORDER_4, expected_order=None, time_steps=(1 / 20, 1 / 30, 1 / 60)
             ),
         ),
         error=length_error,
-        run=Unobserved(tip_error),
+        run=case.Unobserved(tip_error),
         target_error=0.01,
         target_seconds=1e-2,
     ),

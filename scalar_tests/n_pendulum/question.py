@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from spook_tracker.scalar_tests.case import Example, ScalarTest
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.chain import level_chain
 from spook_tracker.scalar_tests.n_pendulum.figures import COUNT, CURVED_TWICE, FIGURES, OBSERVE, TIME_STEP
 from spook_tracker.scalar_tests.n_pendulum.metrics import LADDERS, MEASUREMENTS
 from spook_tracker.scalar_tests.n_pendulum.stability import STUDIES
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="N-pendulum",
     question="Does a chain of 26 spheres hold together when it swings down from the level?",
     why="Ropes, cables and tracks are chains. The free end whips round at many times the speed of a pendulum: a "
@@ -50,7 +50,7 @@ TEST = ScalarTest(
         "Figs 3.26 and 3.29 contradict each other on the deviation at 26 spheres.",
     ),
     measurements=MEASUREMENTS,
-    example=lambda: Example(
+    example=lambda: case.Example(
         scene=level_chain(COUNT, TIME_STEP), time_step=TIME_STEP, method=CURVED_TWICE, observe=OBSERVE
     ),
     figures=FIGURES,

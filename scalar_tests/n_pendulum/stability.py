@@ -6,22 +6,22 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Energy, Method, Trace, Violation
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_count, break_point, cell, is_stable, table
-from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
 from spook_tracker.scalar_tests.chain import COMPLIANCE, LENGTH, fall_to_hanging, level_chain
 from spook_tracker.scalar_tests.n_pendulum.figures import COUNT, CURVED_TWICE, DURATION, TIME_STEP
 
-FOUR_SUBSTEPS = Method(substeps=4)
-EIGHT_SUBSTEPS = Method(substeps=8)
+FOUR_SUBSTEPS = engine.Method(substeps=4)
+EIGHT_SUBSTEPS = engine.Method(substeps=8)
 COUNTS = (2, 5, 10, 15, 20, 26, 30, 40, 50, 60, 80, 100, 130, 150, 170, 200, 230, 300, 400)
 STRETCH_BOUND, ENERGY_BOUND = 1.0, 0.15  # of a link's length; of the fall to hanging
 RELATIVE_DAMPINGS = (0.01, 0.03, 0.1, 0.3, 0.5, 1.0, 2.0, 3.0, 5.0, 10.0)  # τ/h
 COMPLIANCES = tuple(float(value) for value in np.geomspace(1e-13, 1e-3, 11))  # m/N
 OBSERVE: dict[str, Observable] = {
-    "violation": Trace(quantity=Violation()),
-    "energy": Trace(quantity=Energy(), from_start=True),
+    "violation": engine.Trace(quantity=engine.Violation()),
+    "energy": engine.Trace(quantity=engine.Energy(), from_start=True),
 }
 DISCRETE = "where the method's own discrete solution breaks: the prototype tests/oracles/chain.py"
 HOLDS = (
@@ -31,10 +31,10 @@ HOLDS = (
 
 
 def _kind(
-    simulate: Simulate,
+    simulate: case.Simulate,
     count: int,
     time_step: float = TIME_STEP,
-    method: Method = PLAIN,
+    method: engine.Method = engine.PLAIN,
     *,
     relative_damping: float = 1.0,
     compliance: float = COMPLIANCE,
@@ -53,15 +53,15 @@ def _kind(
     return cell(result, np.maximum(stretch, gain), bound=1.0, rest=1.0).replace("settled", "bounded")
 
 
-def _longest(method: Method) -> Any:
-    def study(simulate: Simulate) -> BreakPoint:
+def _longest(method: engine.Method) -> Any:
+    def study(simulate: case.Simulate) -> case.BreakPoint:
         return break_count(lambda count: is_stable(_kind(simulate, count, method=method)), COUNTS)
 
     return study
 
 
-def _largest_step(method: Method) -> Any:
-    def study(simulate: Simulate) -> BreakPoint:
+def _largest_step(method: engine.Method) -> Any:
+    def study(simulate: case.Simulate) -> case.BreakPoint:
         return break_point(
             lambda h: is_stable(_kind(simulate, COUNT, h, method)), 0.002, 0.2, resolution=0.02, walk=15
         )
@@ -69,7 +69,7 @@ def _largest_step(method: Method) -> Any:
     return study
 
 
-def smallest_damping(simulate: Simulate) -> BreakPoint:
+def smallest_damping(simulate: case.Simulate) -> case.BreakPoint:
     """Smallest τ/h for 26 spheres."""
     return break_point(
         lambda theta: is_stable(_kind(simulate, COUNT, relative_damping=theta)),
@@ -80,13 +80,13 @@ def smallest_damping(simulate: Simulate) -> BreakPoint:
     )
 
 
-def damping_map(simulate: Simulate) -> StabilityMap:
+def damping_map(simulate: case.Simulate) -> case.StabilityMap:
     """(τ/h, compliance) for 26 spheres at h = 1/60 s."""
 
     def kind(theta: float, compliance: float) -> str:
         return _kind(simulate, COUNT, relative_damping=theta, compliance=compliance)
 
-    return StabilityMap(
+    return case.StabilityMap(
         x=RELATIVE_DAMPINGS,
         y=COMPLIANCES,
         cells=table(COMPLIANCES, RELATIVE_DAMPINGS, kind),
@@ -99,7 +99,7 @@ def damping_map(simulate: Simulate) -> StabilityMap:
 
 STUDIES = (
     *(
-        StabilityStudy(
+        case.StabilityStudy(
             name=f"longest-chain-{name.replace(' ', '-')}",
             title="Longest chain that swings down from the level",
             configuration=name,
@@ -110,7 +110,7 @@ STUDIES = (
             expected_source=source,
         )
         for name, method, expected, source in (
-            ("plain", PLAIN, (55.0, 57.0), DISCRETE + ", to one sphere"),
+            ("plain", engine.PLAIN, (55.0, 57.0), DISCRETE + ", to one sphere"),
             (
                 "curved twice",
                 CURVED_TWICE,
@@ -123,7 +123,7 @@ STUDIES = (
         )
     ),
     *(
-        StabilityStudy(
+        case.StabilityStudy(
             name=f"largest-time-step-{name.replace(' ', '-')}",
             title="Largest time step for 26 spheres",
             configuration=name,
@@ -134,7 +134,7 @@ STUDIES = (
             expected_source=source,
         )
         for name, method, expected, source in (
-            ("plain", PLAIN, (0.0382, 0.0398), DISCRETE + ", to the search's 2 %"),
+            ("plain", engine.PLAIN, (0.0382, 0.0398), DISCRETE + ", to the search's 2 %"),
             (
                 "curved twice",
                 CURVED_TWICE,
@@ -144,7 +144,7 @@ STUDIES = (
             ),
         )
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="smallest-damping",
         title="Smallest τ/h that holds 26 spheres",
         configuration="plain",
@@ -155,7 +155,7 @@ STUDIES = (
         expected=(0.0195, 0.0216),
         expected_source=DISCRETE + ", to the search's 5 %",
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="damping-compliance-map",
         title="Damping and compliance, 26 spheres",
         configuration="plain",

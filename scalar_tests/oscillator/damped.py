@@ -7,17 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import Method, Position, Trace
-from spook_tracker.scalar_tests.case import (
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-)
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.oscillator.scene import (
     MASS,
@@ -47,7 +38,7 @@ def _damped_wave(time: Any) -> Any:
     return START * np.exp(-rate * time) * (np.cos(wave * time) + rate / wave * np.sin(wave * time))
 
 
-def damped(simulate: Simulate) -> dict[str, float]:
+def damped(simulate: case.Simulate) -> dict[str, float]:
     """Path against the powers of the map, decay against √α."""
     _, x, v = traced(simulate, row_scene(STIFFNESS, DAMPING))
     step, state, worst = one_step(STIFFNESS, DAMPING), np.array([START, 0.0]), 0.0
@@ -64,16 +55,16 @@ def damped(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def over_the_map(simulate: Simulate) -> dict[str, float]:
+def over_the_map(simulate: case.Simulate) -> dict[str, float]:
     """Growth per step against the eigenvalue, over h ω = 0.01 … 1e6 and τ/h = 0 … 10."""
     return {"growth_error": growth_error(simulate)}
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Simulation, continuum and decay."""
     time, x, _ = traced(simulate, row_scene(STIFFNESS, DAMPING), steps=round(SHOWN / TIME_STEP))
     envelope = START * decay(STIFFNESS, DAMPING) ** np.arange(len(time))
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulation", time, x),
             line("damped oscillator", time, _damped_wave(time), "reference"),
@@ -85,9 +76,9 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest distance from the oscillator of the continuum over 2 s [m]."""
-    observe = {"x": Trace(quantity=Position("mass"))}
+    observe = {"x": engine.Trace(quantity=engine.Position("mass"))}
     result = simulate(
         row_scene(STIFFNESS, DAMPING), time_step=time_step, duration=2.0, method=method, observe=observe
     )
@@ -95,7 +86,7 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(np.abs(result["x"][:, 2] - exact).max())
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Oscillator: damping",
     question="Does a damped distance row decay by √α a step, as the theory of the method says?",
     why="SPOOK's damping is what keeps stiff constraints quiet. Its strength is known exactly, so it can be held to "
@@ -124,11 +115,11 @@ TEST = ScalarTest(
         "For real eigenvalues |λ| = |α| is false: α is their product.",
     ),
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="difference",
                     description="largest |x − Aᵏ x₀| over x₀ in 5 s",
                     unit="1",
@@ -138,7 +129,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-13,
                 ),
-                Metric(
+                case.Metric(
                     name="decay_error",
                     description="decay per step read off two runs over √α, minus one",
                     unit="1",
@@ -148,7 +139,7 @@ TEST = ScalarTest(
                     reference=0.0,
                     tolerance=1e-13,
                 ),
-                Metric(
+                case.Metric(
                     name="against_continuum",
                     description="largest distance from the damped oscillator of the continuum",
                     unit="m",
@@ -159,7 +150,7 @@ TEST = ScalarTest(
                     set_point_source="both in closed form",
                     reference=0.0,
                 ),
-                Metric(
+                case.Metric(
                     name="final_speed",
                     description="speed after 5 s",
                     unit="m/s",
@@ -170,11 +161,11 @@ TEST = ScalarTest(
             measure=damped,
             note="damping two time steps",
         ),
-        Measurement(
+        case.Measurement(
             configuration="map",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="growth_error",
                     description="largest |growth − |eigenvalue|| per step over h ω = 0.01 … 1e6, τ/h = 0 … 10",
                     unit="1",
@@ -189,11 +180,11 @@ TEST = ScalarTest(
             note="170 oscillators, each read off two runs of 8 steps",
         ),
     ),
-    example=lambda: Example(scene=row_scene(STIFFNESS, DAMPING), time_step=TIME_STEP),
-    figures=(Figure(name="damped", title="Damped oscillation", draw=draw, thesis="Fig 2.7"),),
+    example=lambda: case.Example(scene=row_scene(STIFFNESS, DAMPING), time_step=TIME_STEP),
+    figures=(case.Figure(name="damped", title="Damped oscillation", draw=draw, thesis="Fig 2.7"),),
     stability=(MAP_STUDY,),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="position",
             description="largest distance from the damped oscillator over 2 s",
             unit="m",

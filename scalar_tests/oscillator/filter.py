@@ -7,18 +7,8 @@ import math
 
 import numpy as np
 
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.case import (
-    BreakPoint,
-    Drawing,
-    Example,
-    Figure,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-    StabilityStudy,
-)
 from spook_tracker.scalar_tests.oscillator.scene import (
     START,
     TIME_STEP,
@@ -41,12 +31,12 @@ SHORTEST = 1e-6  # steps a period, where the search for the shortest ends: h ω 
 HALVED = 3.0 * math.pi * math.sqrt(1.0 / (9.0 / 8.0 * (1.0 - 2.0**-0.2)) - 1.0)  # steps a period, 23
 
 
-def left(simulate: Simulate, period: float) -> float:
+def left(simulate: case.Simulate, period: float) -> float:
     """Fraction of an oscillation of `period` steps that is left after ten steps, read off two runs."""
     return growth(run_map(simulate, stiffness_of_period(period), DAMPING, TIME_STEP, STEPS))
 
 
-def filtered(simulate: Simulate) -> dict[str, float]:
+def filtered(simulate: case.Simulate) -> dict[str, float]:
     """What is left at seven periods, and the largest deviation from √α¹⁰."""
     answers, worst = {}, 0.0
     for period in PERIODS:
@@ -57,27 +47,27 @@ def filtered(simulate: Simulate) -> dict[str, float]:
     return answers | {"filter_error": worst}
 
 
-def halves(simulate: Simulate, period: float) -> bool:
+def halves(simulate: case.Simulate, period: float) -> bool:
     """Whether ten steps leave less than a half of an oscillation of `period` steps."""
     return left(simulate, period) < 0.5
 
 
-def filters(simulate: Simulate, period: float) -> bool:
+def filters(simulate: case.Simulate, period: float) -> bool:
     """Whether what is left is √α¹⁰ to 1e-6."""
     return abs(left(simulate, period) / decay(stiffness_of_period(period), DAMPING) ** STEPS - 1.0) < 1e-6
 
 
-def slowest(simulate: Simulate) -> BreakPoint:
+def slowest(simulate: case.Simulate) -> case.BreakPoint:
     """The longest period, in steps, that ten steps halve."""
     return break_point(functools.partial(halves, simulate), 2.0, 200.0, resolution=1e-3, walk=5)
 
 
-def stiffest(simulate: Simulate) -> BreakPoint:
+def stiffest(simulate: case.Simulate) -> case.BreakPoint:
     """The shortest period, in steps, that is filtered as theory says."""
     return break_point(functools.partial(filters, simulate), 2.0, SHORTEST, walk=8)
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Amplitude against steps for six periods."""
     curves = []
     for period in DRAWN:
@@ -85,7 +75,7 @@ def draw(simulate: Simulate) -> Drawing:
             simulate, row_scene(stiffness_of_period(period), DAMPING), TIME_STEP, steps=DRAWN_STEPS
         )
         curves.append(line(f"{period:g} steps a period", range(DRAWN_STEPS + 1), x))
-    return Drawing(
+    return case.Drawing(
         curves=tuple(curves),
         x_label="number of time steps",
         y_label="position z [m]",
@@ -94,12 +84,12 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_response(simulate: Simulate) -> Drawing:
+def draw_response(simulate: case.Simulate) -> case.Drawing:
     """What is left after ten steps against the period."""
     periods = [float(p) for p in np.geomspace(1.0, 300.0, 40)]
     exact = [decay(stiffness_of_period(p), DAMPING) ** STEPS for p in periods]
     found = [left(simulate, p) for p in periods]
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("read off the run", periods, found, "points"),
             line("√α¹⁰", periods, exact, "reference"),
@@ -112,9 +102,9 @@ def draw_response(simulate: Simulate) -> Drawing:
     )
 
 
-def _left(period: int) -> Metric:
+def _left(period: int) -> case.Metric:
     exact = decay(stiffness_of_period(period), DAMPING) ** STEPS
-    return Metric(
+    return case.Metric(
         name=f"left_at_{period}",
         description=f"fraction left after ten steps at {period} steps a period",
         unit="1",
@@ -127,7 +117,7 @@ def _left(period: int) -> Metric:
     )
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Oscillator: filter",
     question="Which oscillations does damping of two time steps remove, and how fast?",
     why="Damping of two time steps is the default. What it takes away from motion that is meant to be there must be "
@@ -153,11 +143,11 @@ TEST = ScalarTest(
     ),
     lacks={"ladder": "exact at every step"},
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="filter_error",
                     description="fraction left after ten steps over √α¹⁰, minus one: the largest of seven",
                     unit="1",
@@ -173,13 +163,13 @@ TEST = ScalarTest(
             note="damping two time steps",
         ),
     ),
-    example=lambda: Example(scene=row_scene(stiffness_of_period(10.0), DAMPING), time_step=TIME_STEP),
+    example=lambda: case.Example(scene=row_scene(stiffness_of_period(10.0), DAMPING), time_step=TIME_STEP),
     figures=(
-        Figure(name="filter", title="Decay at six frequencies", draw=draw, thesis="Fig 2.8"),
-        Figure(name="response", title="Left after ten steps against the period", draw=draw_response),
+        case.Figure(name="filter", title="Decay at six frequencies", draw=draw, thesis="Fig 2.8"),
+        case.Figure(name="response", title="Left after ten steps against the period", draw=draw_response),
     ),
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="slowest",
             title="Longest period that ten steps halve",
             configuration="plain",
@@ -189,7 +179,7 @@ TEST = ScalarTest(
             expected=(0.999 * HALVED, HALVED),
             expected_source="√α¹⁰ = ½ with α = 1 − 8/9 ρ and ρ = 1/(1 + 4/(9 (h ω)²)); to the resolution of the search",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="stiffest",
             title="Shortest period that is filtered as theory says",
             configuration="plain",

@@ -6,18 +6,9 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import Method, Position, Trace
+from spook_tracker import engine
 from spook_tracker.engine.theory import undamped_row_invariant, undamped_row_phase
-from spook_tracker.scalar_tests.case import (
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-)
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.configurations import configured
 from spook_tracker.scalar_tests.oscillator.scene import (
     MASS,
@@ -47,7 +38,7 @@ def _path(stiffness: float, steps: int) -> np.ndarray:
     return np.array(states)
 
 
-def _answers(simulate: Simulate, stiffness: float) -> dict[str, float]:
+def _answers(simulate: case.Simulate, stiffness: float) -> dict[str, float]:
     _, x, v = traced(simulate, row_scene(stiffness, 0.0))
     exact = _path(stiffness, STEPS)
     square = stiffness / MASS
@@ -60,7 +51,7 @@ def _answers(simulate: Simulate, stiffness: float) -> dict[str, float]:
     }
 
 
-def slow(simulate: Simulate) -> dict[str, float]:
+def slow(simulate: case.Simulate) -> dict[str, float]:
     """53 steps a period; the frequency from x₊ + x₋ = 2 cos φ x."""
     answers = _answers(simulate, STIFFNESS)
     _, x, _ = traced(simulate, row_scene(STIFFNESS, 0.0))
@@ -69,19 +60,19 @@ def slow(simulate: Simulate) -> dict[str, float]:
     return answers | {"frequency_error": math.acos(cosine) / expected - 1.0}
 
 
-def fast(simulate: Simulate) -> dict[str, float]:
+def fast(simulate: case.Simulate) -> dict[str, float]:
     """h ω = 20: aliased, but bounded."""
     return _answers(simulate, FAST_STIFFNESS)
 
 
-def fast_and_long(simulate: Simulate) -> dict[str, float]:
+def fast_and_long(simulate: case.Simulate) -> dict[str, float]:
     """The same for 100 000 steps."""
     _, x, _ = traced(simulate, row_scene(FAST_STIFFNESS, 0.0), steps=LONG_STEPS)
     bound = START * math.sqrt(1.0 + FAST_STIFFNESS / MASS * TIME_STEP**2 / 4.0)
     return {"amplitude": float(np.abs(x).max()) / bound}
 
 
-def stiff(simulate: Simulate) -> dict[str, float]:
+def stiff(simulate: case.Simulate) -> dict[str, float]:
     """No compliance and no damping: −1 is a double eigenvalue and x grows as (−1)ⁿ (2n + 1)."""
     scene = row_scene(math.inf, 0.0, start=1.0 / 64.0)
     _, x, _ = traced(simulate, scene, steps=STIFF_STEPS)
@@ -89,10 +80,10 @@ def stiff(simulate: Simulate) -> dict[str, float]:
     return {"linear_growth_error": float(np.abs(64.0 * x - (-1.0) ** n * (2 * n + 1)).max())}
 
 
-def draw_row(simulate: Simulate) -> Drawing:
+def draw_row(simulate: case.Simulate) -> case.Drawing:
     """Row and Verlet against time."""
     time, x, _ = traced(simulate, row_scene(STIFFNESS, 0.0))
-    return Drawing(
+    return case.Drawing(
         curves=(line("distance row", time, x), line("Verlet", time, verlet(), "reference")),
         x_label="time [s]",
         y_label="position z [m]",
@@ -100,10 +91,10 @@ def draw_row(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_difference(simulate: Simulate) -> Drawing:
+def draw_difference(simulate: case.Simulate) -> case.Drawing:
     """Row minus Verlet."""
     time, x, _ = traced(simulate, row_scene(STIFFNESS, 0.0))
-    return Drawing(
+    return case.Drawing(
         curves=(line("distance row minus Verlet", time, x - verlet()),),
         x_label="time [s]",
         y_label="difference [m]",
@@ -112,11 +103,11 @@ def draw_difference(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_fast(simulate: Simulate) -> Drawing:
+def draw_fast(simulate: case.Simulate) -> case.Drawing:
     """h ω = 20."""
     time, x, _ = traced(simulate, row_scene(FAST_STIFFNESS, 0.0))
     bound = START * math.sqrt(1.0 + FAST_STIFFNESS / MASS * TIME_STEP**2 / 4.0)
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("distance row, h ω = 20", time, x),
             line("± x₀ √(1 + (h ω/2)²)", [0.0, 5.0, 5.0, 0.0], [bound, bound, -bound, -bound], "limit"),
@@ -128,7 +119,7 @@ def draw_fast(simulate: Simulate) -> Drawing:
     )
 
 
-DIFFERENCE = Metric(
+DIFFERENCE = case.Metric(
     name="difference",
     description="largest |x − Aᵏ x₀| over the amplitude, 300 steps",
     unit="1",
@@ -140,8 +131,8 @@ DIFFERENCE = Metric(
 )
 
 
-def _invariant(limit: float) -> Metric:
-    return Metric(
+def _invariant(limit: float) -> case.Metric:
+    return case.Metric(
         name="invariant_drift",
         description="largest relative change of v² + ω² (x − h v/2)²",
         unit="1",
@@ -153,7 +144,7 @@ def _invariant(limit: float) -> Metric:
     )
 
 
-AMPLITUDE = Metric(
+AMPLITUDE = case.Metric(
     name="amplitude",
     description="largest |x| over x₀ √(1 + (h ω/2)²)",
     unit="1",
@@ -164,9 +155,9 @@ AMPLITUDE = Metric(
 )
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest distance from the oscillator of the continuum over 2 s [m]."""
-    observe = {"x": Trace(quantity=Position("mass"))}
+    observe = {"x": engine.Trace(quantity=engine.Position("mass"))}
     result = simulate(
         row_scene(STIFFNESS, 0.0), time_step=time_step, duration=2.0, method=method, observe=observe
     )
@@ -174,7 +165,7 @@ def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
     return float(np.abs(result["x"][:, 2] - exact).max())
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Oscillator: distance row",
     question="Does a distance row with compliance 1/κ oscillate as a spring κ, bounded at any frequency?",
     why="A constraint with compliance is SPOOK's spring. It must be the right spring, and unlike an explicit one it "
@@ -203,14 +194,14 @@ TEST = ScalarTest(
         "Eqs 2.21 and 2.26 write ε where Σ = 4 ε/(h² (1 + 4θ)) is meant.",
     ),
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
                 DIFFERENCE,
                 _invariant(1e-13),
                 AMPLITUDE,
-                Metric(
+                case.Metric(
                     name="frequency_error",
                     description="measured frequency over (2/h) atan(h ω/2), minus one",
                     unit="1",
@@ -225,7 +216,7 @@ TEST = ScalarTest(
             parameters={"(h w)^2": 0.014},
             note="a row of compliance 1/κ, no damping",
         ),
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(DIFFERENCE, _invariant(1e-11), AMPLITUDE),
@@ -233,7 +224,7 @@ TEST = ScalarTest(
             parameters={"(h w)^2": 400.0},
             note="a hundred times beyond the bound of an explicit spring",
         ),
-        Measurement(
+        case.Measurement(
             configuration="long run",
             time_step=TIME_STEP,
             metrics=(AMPLITUDE,),
@@ -241,11 +232,11 @@ TEST = ScalarTest(
             parameters={"(h w)^2": 400.0, "steps": LONG_STEPS},
             note="the same for 100 000 steps",
         ),
-        Measurement(
+        case.Measurement(
             configuration="stiff",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="linear_growth_error",
                     description="largest |x/x₀ − (−1)ⁿ (2n + 1)| in 50 steps",
                     unit="1",
@@ -260,20 +251,20 @@ TEST = ScalarTest(
             note="compliance 0 and damping 0: legal to ask for, never a default; what Fig 3.23 shows",
         ),
     ),
-    example=lambda: Example(scene=row_scene(STIFFNESS, 0.0), time_step=TIME_STEP),
+    example=lambda: case.Example(scene=row_scene(STIFFNESS, 0.0), time_step=TIME_STEP),
     figures=(
-        Figure(name="row", title="Distance row and Verlet", draw=draw_row, thesis="Fig 2.5, upper"),
-        Figure(
+        case.Figure(name="row", title="Distance row and Verlet", draw=draw_row, thesis="Fig 2.5, upper"),
+        case.Figure(
             name="difference",
             title="Distance row minus Verlet",
             draw=draw_difference,
             thesis="Fig 2.5, lower",
         ),
-        Figure(name="fast", title="Far beyond h ω = 2", draw=draw_fast, thesis="Fig 2.6"),
+        case.Figure(name="fast", title="Far beyond h ω = 2", draw=draw_fast, thesis="Fig 2.6"),
     ),
     stability=(ROW_STUDY, SOFT_ROW_STUDY),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="position",
             description="largest distance from x₀ cos ω t over 2 s",
             unit="m",

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import Distance, Particle, Position, Scene, Spring, Trace, Velocity
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.theory import one_row_matrix
-from spook_tracker.scalar_tests.case import Simulate
+from spook_tracker.scalar_tests import case
 
 MASS = 1.0  # kg
 TIME_STEP = 1.0 / 60.0  # s
@@ -24,33 +24,33 @@ STEPS = 300  # 5 s
 REST_LENGTH = 64.0  # m: far beyond every amplitude, so that the row stays on its line; a power of two
 
 
-def spring_scene(stiffness: float = STIFFNESS) -> Scene:
+def spring_scene(stiffness: float = STIFFNESS) -> engine.Scene:
     """The mass on a spring that is a plain force; no gravity."""
-    mass = Particle(name="mass", position=(0.0, 0.0, START), mass=MASS)
-    spring = Spring(name="spring", between=((0.0, 0.0, 0.0), "mass"), stiffness=stiffness)
-    return Scene(bodies=(mass,), forces=(spring,))
+    mass = engine.Particle(name="mass", position=(0.0, 0.0, START), mass=MASS)
+    spring = engine.Spring(name="spring", between=((0.0, 0.0, 0.0), "mass"), stiffness=stiffness)
+    return engine.Scene(bodies=(mass,), forces=(spring,))
 
 
-def row_scene(stiffness: float, damping: float, *, start: float = START, speed: float = 0.0) -> Scene:
+def row_scene(stiffness: float, damping: float, *, start: float = START, speed: float = 0.0) -> engine.Scene:
     """The mass on a distance row of compliance 1/κ along z; `damping` in s, `start` [m] from rest length."""
-    mass = Particle(name="mass", position=(0.0, 0.0, start), velocity=(0.0, 0.0, speed), mass=MASS)
-    row = Distance(
+    mass = engine.Particle(name="mass", position=(0.0, 0.0, start), velocity=(0.0, 0.0, speed), mass=MASS)
+    row = engine.Distance(
         name="spring",
         between=((0.0, 0.0, -REST_LENGTH), "mass"),
         rest_length=REST_LENGTH,
         compliance=1.0 / stiffness,
         damping=damping,
     )
-    return Scene(bodies=(mass,), constraints=(row,))
+    return engine.Scene(bodies=(mass,), constraints=(row,))
 
 
 def traced(
-    simulate: Simulate, scene: Scene, time_step: float = TIME_STEP, steps: int = STEPS
+    simulate: case.Simulate, scene: engine.Scene, time_step: float = TIME_STEP, steps: int = STEPS
 ) -> tuple[Any, Any, Any]:
     """Times [s], positions [m] and velocities [m/s] along z at every sample."""
     observe: dict[str, Observable] = {
-        "x": Trace(quantity=Position("mass")),
-        "v": Trace(quantity=Velocity("mass")),
+        "x": engine.Trace(quantity=engine.Position("mass")),
+        "v": engine.Trace(quantity=engine.Velocity("mass")),
     }
     result = simulate(scene, time_step=time_step, steps=steps, observe=observe)
     return result.sample_times["x"], result["x"][:, 2], result["v"][:, 2]
@@ -78,7 +78,9 @@ def growth(matrix: np.ndarray, steps: int = 1) -> float:
     return math.pow(largest, 1.0 / steps)
 
 
-def run_map(simulate: Simulate, stiffness: float, damping: float, time_step: float, steps: int) -> np.ndarray:
+def run_map(
+    simulate: case.Simulate, stiffness: float, damping: float, time_step: float, steps: int
+) -> np.ndarray:
     """The map of (x, h v) over `steps` steps, read off two runs: one from x = 1, one from h v = 1."""
     columns = []
     for start, speed in ((1.0, 0.0), (0.0, 1.0 / time_step)):

@@ -4,19 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Method, Position, Trace
+from spook_tracker import engine
 from spook_tracker.engine.theory import plain_spring_invariant
-from spook_tracker.scalar_tests.case import (
-    Configuration,
-    Drawing,
-    Example,
-    Figure,
-    Ladder,
-    Measurement,
-    Metric,
-    ScalarTest,
-    Simulate,
-)
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.oscillator.scene import (
     MASS,
     START,
@@ -29,7 +19,7 @@ from spook_tracker.scalar_tests.oscillator.scene import (
 from spook_tracker.scalar_tests.oscillator.stability import SOFT_SPRING_STUDY, SPRING_STUDY
 from spook_tracker.scalar_tests.sweep import apart, line
 
-ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")
+ORDER_4, ORDER_6 = engine.Method(composition="order4"), engine.Method(composition="order6")
 
 
 def verlet(steps: int = STEPS) -> np.ndarray:
@@ -43,7 +33,7 @@ def verlet(steps: int = STEPS) -> np.ndarray:
     return np.array(path)
 
 
-def against_verlet(simulate: Simulate) -> dict[str, float]:
+def against_verlet(simulate: case.Simulate) -> dict[str, float]:
     """Difference to Verlet, and the spread of the quantity symplectic Euler keeps."""
     _, x, v = traced(simulate, spring_scene())
     kept = plain_spring_invariant(x, v, STIFFNESS / MASS, TIME_STEP)
@@ -53,10 +43,10 @@ def against_verlet(simulate: Simulate) -> dict[str, float]:
     }
 
 
-def draw(simulate: Simulate) -> Drawing:
+def draw(simulate: case.Simulate) -> case.Drawing:
     """Both against time."""
     time, x, _ = traced(simulate, spring_scene())
-    return Drawing(
+    return case.Drawing(
         curves=(line("simulation", time, x), line("Verlet", time, verlet(), "reference")),
         x_label="time [s]",
         y_label="position z [m]",
@@ -64,15 +54,15 @@ def draw(simulate: Simulate) -> Drawing:
     )
 
 
-def ladder_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest distance from the oscillator of the continuum over 2 s [m]."""
-    observe = {"x": Trace(quantity=Position("mass"))}
+    observe = {"x": engine.Trace(quantity=engine.Position("mass"))}
     result = simulate(spring_scene(), time_step=time_step, duration=2.0, method=method, observe=observe)
     exact = START * np.cos(np.sqrt(STIFFNESS / MASS) * result.sample_times["x"])
     return float(np.abs(result["x"][:, 2] - exact).max())
 
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Oscillator: spring force",
     question="Is a spring that is a plain force integrated exactly as Verlet's stepper does it?",
     why="With nothing constrained SPOOK is symplectic Euler, the stepper of Verlet. Any bit of difference means that "
@@ -94,11 +84,11 @@ TEST = ScalarTest(
     source="thesis, section 2.1.2.2, Fig 2.4",
     misprints=("Eq 2.17 lacks the sine term that a start from rest needs when there is damping.",),
     measurements=(
-        Measurement(
+        case.Measurement(
             configuration="plain",
             time_step=TIME_STEP,
             metrics=(
-                Metric(
+                case.Metric(
                     name="difference",
                     description="largest |simulation − Verlet| in 5 s",
                     unit="m",
@@ -109,7 +99,7 @@ TEST = ScalarTest(
                     set_point_source="equal to the bit",
                     reference=0.0,
                 ),
-                Metric(
+                case.Metric(
                     name="invariant_drift",
                     description="largest relative change of v² − h ω² x v + ω² x²",
                     unit="1",
@@ -124,22 +114,24 @@ TEST = ScalarTest(
             note="the SPOOK step with a force and no row",
         ),
     ),
-    example=lambda: Example(scene=spring_scene(), time_step=TIME_STEP),
-    figures=(Figure(name="position", title="Position against time", draw=draw, thesis="Fig 2.4"),),
+    example=lambda: case.Example(scene=spring_scene(), time_step=TIME_STEP),
+    figures=(case.Figure(name="position", title="Position against time", draw=draw, thesis="Fig 2.4"),),
     stability=(SPRING_STUDY, SOFT_SPRING_STUDY),
     ladders=(
-        Ladder(
+        case.Ladder(
             name="position",
             description="largest distance from x₀ cos ω t over 2 s",
             unit="m",
             time_steps=tuple(1.0 / n for n in (60, 120, 240, 480, 960, 1920)),
             configurations=(
-                Configuration(name="plain", method=PLAIN, expected_order=1.0),
-                Configuration(name="half-step", method=Method(half_step_velocities=True), expected_order=2.0),
-                Configuration(
+                case.Configuration(name="plain", method=engine.PLAIN, expected_order=1.0),
+                case.Configuration(
+                    name="half-step", method=engine.Method(half_step_velocities=True), expected_order=2.0
+                ),
+                case.Configuration(
                     name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1 / 480, 1 / 60)
                 ),
-                Configuration(
+                case.Configuration(
                     name="order 6", method=ORDER_6, expected_order=6.0, order_range=(1 / 240, 1 / 60)
                 ),
             ),

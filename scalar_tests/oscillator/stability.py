@@ -6,11 +6,11 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import MaximumAbsolute, Position, Trace
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.theory import one_row_oscillates
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, cell, table
-from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
 from spook_tracker.scalar_tests.oscillator.scene import (
     MASS,
     START,
@@ -36,7 +36,7 @@ def stiffness_of(speed: float) -> float:
     return MASS * (speed / TIME_STEP) ** 2
 
 
-def measured_growth(simulate: Simulate, speed: float, theta: float) -> float:
+def measured_growth(simulate: case.Simulate, speed: float, theta: float) -> float:
     """Growth per step read off two runs."""
     found = run_map(simulate, stiffness_of(speed), theta * TIME_STEP, TIME_STEP, MAP_STEPS)
     return _growth(found, speed, theta, MAP_STEPS)
@@ -64,7 +64,7 @@ def amplitude(speed: float) -> float:
     return math.sqrt(1.0 + speed * speed / 4.0)
 
 
-def growth_error(simulate: Simulate) -> float:
+def growth_error(simulate: case.Simulate) -> float:
     """Largest |measured − predicted| growth per step over the whole map."""
     return max(
         abs(measured_growth(simulate, speed, theta) - predicted_growth(speed, theta))
@@ -73,17 +73,17 @@ def growth_error(simulate: Simulate) -> float:
     )
 
 
-def _kind(simulate: Simulate, speed: float, theta: float) -> str:
-    observe: dict[str, Observable] = {"x": Trace(quantity=Position("mass"))}
+def _kind(simulate: case.Simulate, speed: float, theta: float) -> str:
+    observe: dict[str, Observable] = {"x": engine.Trace(quantity=engine.Position("mass"))}
     start = 1.0 / amplitude(speed)  # so that no run comes near turning the row over
     scene = row_scene(stiffness_of(speed), theta * TIME_STEP, start=start)
     result = simulate(scene, time_step=TIME_STEP, steps=CELL_STEPS, observe=observe)
     return cell(result, result.partial["x"][:, 2] / start, bound=2.0 * amplitude(speed), rest=AT_REST)
 
 
-def growth_map(simulate: Simulate) -> StabilityMap:
+def growth_map(simulate: case.Simulate) -> case.StabilityMap:
     """(h ω, τ/h): what a run does, beside the method's own eigenvalue."""
-    return StabilityMap(
+    return case.StabilityMap(
         x=SPEEDS,
         y=DAMPINGS,
         cells=table(DAMPINGS, SPEEDS, lambda speed, theta: _kind(simulate, speed, theta)),
@@ -95,8 +95,8 @@ def growth_map(simulate: Simulate) -> StabilityMap:
     )
 
 
-def _largest(simulate: Simulate, spring: bool) -> BreakPoint:
-    observe: dict[str, Observable] = {"x": MaximumAbsolute(quantity=Position("mass"))}
+def _largest(simulate: case.Simulate, spring: bool) -> case.BreakPoint:
+    observe: dict[str, Observable] = {"x": engine.MaximumAbsolute(quantity=engine.Position("mass"))}
 
     def holds(speed: float) -> bool:
         start = START if spring else 1.0 / amplitude(speed)
@@ -108,18 +108,18 @@ def _largest(simulate: Simulate, spring: bool) -> BreakPoint:
     return break_point(holds, 0.1, 1e8, resolution=1e-4, walk=19)
 
 
-def largest_spring(simulate: Simulate) -> BreakPoint:
+def largest_spring(simulate: case.Simulate) -> case.BreakPoint:
     """Largest h ω of a spring that is a plain force."""
     return _largest(simulate, True)
 
 
-def largest_row(simulate: Simulate) -> BreakPoint:
+def largest_row(simulate: case.Simulate) -> case.BreakPoint:
     """Largest h ω of an undamped row."""
     return _largest(simulate, False)
 
 
-def _softest(simulate: Simulate, spring: bool) -> BreakPoint:
-    observe: dict[str, Observable] = {"x": Trace(quantity=Position("mass"))}
+def _softest(simulate: case.Simulate, spring: bool) -> case.BreakPoint:
+    observe: dict[str, Observable] = {"x": engine.Trace(quantity=engine.Position("mass"))}
 
     def moves(speed: float) -> bool:
         scene = spring_scene(stiffness_of(speed)) if spring else row_scene(stiffness_of(speed), 0.0)
@@ -129,12 +129,12 @@ def _softest(simulate: Simulate, spring: bool) -> BreakPoint:
     return break_point(moves, 0.1, 1e-12, resolution=1e-3, walk=5)
 
 
-def softest_spring(simulate: Simulate) -> BreakPoint:
+def softest_spring(simulate: case.Simulate) -> case.BreakPoint:
     """Smallest h ω of a spring force that moves the mass in its first step."""
     return _softest(simulate, True)
 
 
-def softest_row(simulate: Simulate) -> BreakPoint:
+def softest_row(simulate: case.Simulate) -> case.BreakPoint:
     """Smallest h ω of an undamped row that does."""
     return _softest(simulate, False)
 
@@ -143,7 +143,7 @@ BOUNDED = (
     "finite, and never beyond a hundred times the amplitude that the start holds by the method's invariant, in "
     "20 000 steps"
 )
-SPRING_STUDY = StabilityStudy(
+SPRING_STUDY = case.StabilityStudy(
     name="stiffest-spring",
     title="Largest h ω of a spring that is a plain force",
     configuration="plain",
@@ -153,7 +153,7 @@ SPRING_STUDY = StabilityStudy(
     expected=(1.999, 2.001),
     expected_source="symplectic Euler is stable while h ω < 2",
 )
-ROW_STUDY = StabilityStudy(
+ROW_STUDY = case.StabilityStudy(
     name="stiffest-row",
     title="Largest h ω of an undamped distance row",
     configuration="plain",
@@ -164,7 +164,7 @@ ROW_STUDY = StabilityStudy(
     expected_source="the undamped row is neutral at every h ω; the search ends at 1e8",
 )
 SOFT_SPRING_STUDY, SOFT_ROW_STUDY = (
-    StabilityStudy(
+    case.StabilityStudy(
         name=f"softest-{name}",
         title=f"Smallest h ω of {told} that moves the mass in its first step",
         configuration="plain",
@@ -181,7 +181,7 @@ SOFT_SPRING_STUDY, SOFT_ROW_STUDY = (
         ("row", "an undamped distance row", softest_row),
     )
 )
-MAP_STUDY = StabilityStudy(
+MAP_STUDY = case.StabilityStudy(
     name="growth-map",
     title="Growth over h ω and damping",
     configuration="plain",

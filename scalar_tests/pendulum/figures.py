@@ -6,8 +6,8 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Method
-from spook_tracker.scalar_tests.case import Drawing, Figure, Simulate
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.pendulum.scene import (
     CURVED,
     CURVED_TWICE,
@@ -26,11 +26,11 @@ MASSES = (1.0, 5.0, 25.0, 100.0, 300.0, 600.0, 900.0, 1200.0)  # kg
 SHOWN_BLOW_UP = 1e6  # %, where a curve that has left the page is cut
 
 
-def _length(simulate: Simulate, time_step: float, method: Method = PLAIN) -> float:
+def _length(simulate: case.Simulate, time_step: float, method: engine.Method = engine.PLAIN) -> float:
     return percent_of_length(swing(simulate, time_step, method))
 
 
-def draw_length(simulate: Simulate) -> Drawing:
+def draw_length(simulate: case.Simulate) -> case.Drawing:
     """Length deviation against time step, log-log."""
     theory = [100.0 * 1.5 * GRAVITY * h**2 / LENGTH for h in TIME_STEPS]
     plain = sweep(TIME_STEPS, lambda h: _length(simulate, h))
@@ -38,7 +38,7 @@ def draw_length(simulate: Simulate) -> Drawing:
     inside = [h for h, value in zip(TIME_STEPS, twice, strict=True) if value <= 0.004]
     kept = f"keeps it up to h = {max(inside):.2g} s" if inside else "keeps it at none of these steps"
     slope = np.polyfit(np.log(TIME_STEPS), np.log(plain), 1)[0] if all(v > 0.0 for v in plain) else math.nan
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("plain", TIME_STEPS, plain, "both"),
             line("curved", TIME_STEPS, sweep(TIME_STEPS, lambda h: _length(simulate, h, CURVED)), "both"),
@@ -56,7 +56,7 @@ def draw_length(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_energy(simulate: Simulate) -> Drawing:
+def draw_energy(simulate: case.Simulate) -> case.Drawing:
     """Energy deviation against time step."""
 
     def worst(h: float) -> float:
@@ -65,7 +65,7 @@ def draw_energy(simulate: Simulate) -> Drawing:
     def swing_about_decay(h: float) -> float:
         return _oscillation(percent_of_energy(swing(simulate, h)), h)
 
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("largest |E − E₀|", TIME_STEPS, sweep(TIME_STEPS, worst), "both"),
             line(
@@ -88,11 +88,11 @@ def _oscillation(percent: np.ndarray, time_step: float) -> float:
     return max((float(window.max() - window.min()) / 2.0 for window in windows), default=0.0)
 
 
-def draw_energy_in_time(simulate: Simulate) -> Drawing:
+def draw_energy_in_time(simulate: case.Simulate) -> case.Drawing:
     """Energy against time at the coarsest step."""
     result = swing(simulate, 0.07)
     energy = MASS * GRAVITY * LENGTH + result["energy"]
-    return Drawing(
+    return case.Drawing(
         curves=(line("h = 0.07 s", result.sample_times["energy"], energy),),
         x_label="time [s]",
         y_label="energy above hanging [J]",
@@ -100,14 +100,14 @@ def draw_energy_in_time(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_stiff(simulate: Simulate) -> Drawing:
+def draw_stiff(simulate: case.Simulate) -> case.Drawing:
     """Length deviation with neither compliance nor damping."""
 
     def stiff(h: float) -> float:
         result = swing(simulate, h, compliance=0.0, damping=0.0)
         return min(100.0 * float(result.partial["violation"]) / LENGTH, SHOWN_BLOW_UP)
 
-    return Drawing(
+    return case.Drawing(
         curves=(line("compliance 0, damping 0", TIME_STEPS, sweep(TIME_STEPS, stiff), "both"),),
         x_label="time step [s]",
         y_label="largest length deviation [%]",
@@ -117,10 +117,10 @@ def draw_stiff(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_mass(simulate: Simulate) -> Drawing:
+def draw_mass(simulate: case.Simulate) -> case.Drawing:
     """Length deviation against mass."""
     values = sweep(MASSES, lambda mass: percent_of_length(swing(simulate, TIME_STEP, mass=mass)))
-    return Drawing(
+    return case.Drawing(
         curves=(line("plain, h = 1/60 s", MASSES, values, "both"),),
         x_label="mass [kg]",
         y_label="largest length deviation [%]",
@@ -129,7 +129,7 @@ def draw_mass(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_mass_energy(simulate: Simulate) -> Drawing:
+def draw_mass_energy(simulate: case.Simulate) -> case.Drawing:
     """Energy deviation against mass."""
 
     def worst(mass: float) -> float:
@@ -138,7 +138,7 @@ def draw_mass_energy(simulate: Simulate) -> Drawing:
 
     found = sweep(MASSES, worst)
     low, high = told(min(found)), told(max(found))
-    return Drawing(
+    return case.Drawing(
         curves=(line("plain, h = 1/60 s", MASSES, found, "both"),),
         x_label="mass [kg]",
         y_label="largest |E − E₀| [% of m g l]",
@@ -147,29 +147,29 @@ def draw_mass_energy(simulate: Simulate) -> Drawing:
 
 
 FIGURES = (
-    Figure(
+    case.Figure(
         name="length-against-time-step",
         title="Length deviation against time step",
         draw=draw_length,
         thesis="Fig 3.20",
     ),
-    Figure(
+    case.Figure(
         name="energy-against-time-step",
         title="Energy deviation against time step",
         draw=draw_energy,
         thesis="Fig 3.21",
     ),
-    Figure(name="energy", title="Energy at h = 0.07 s", draw=draw_energy_in_time, thesis="Fig 3.22"),
-    Figure(
+    case.Figure(name="energy", title="Energy at h = 0.07 s", draw=draw_energy_in_time, thesis="Fig 3.22"),
+    case.Figure(
         name="stiff",
         title="Length deviation without compliance and damping",
         draw=draw_stiff,
         thesis="Fig 3.23",
     ),
-    Figure(
+    case.Figure(
         name="length-against-mass", title="Length deviation against mass", draw=draw_mass, thesis="Fig 3.24"
     ),
-    Figure(
+    case.Figure(
         name="energy-against-mass",
         title="Energy deviation against mass",
         draw=draw_mass_energy,

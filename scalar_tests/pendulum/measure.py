@@ -4,18 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from spook_tracker.engine import (
-    PLAIN,
-    ConstraintForce,
-    Energy,
-    Maximum,
-    MaximumAbsolute,
-    Method,
-    Trace,
-    Violation,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
-from spook_tracker.scalar_tests.case import Simulate
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.pendulum.scene import (
     CURVED,
     CURVED_TWICE,
@@ -32,22 +23,22 @@ from spook_tracker.scalar_tests.pendulum.scene import (
 
 LADDER_DURATION = 10.0  # s
 
-ORDER_4, ORDER_6 = Method(composition="order4"), Method(composition="order6")
+ORDER_4, ORDER_6 = engine.Method(composition="order4"), engine.Method(composition="order6")
 
-ORDER_8 = Method(composition="order8")
+ORDER_8 = engine.Method(composition="order8")
 
-HALF_STEP = Method(half_step_velocities=True)
+HALF_STEP = engine.Method(half_step_velocities=True)
 
-HALF_STEP_CURVED = Method(half_step_velocities=True, corrections=2)
+HALF_STEP_CURVED = engine.Method(half_step_velocities=True, corrections=2)
 
 OBSERVE: dict[str, Observable] = {
-    "violation": MaximumAbsolute(quantity=Violation("rod")),
-    "energy": Trace(quantity=Energy(), from_start=True),
-    "tension": Maximum(quantity=ConstraintForce("rod")),
+    "violation": engine.MaximumAbsolute(quantity=engine.Violation("rod")),
+    "energy": engine.Trace(quantity=engine.Energy(), from_start=True),
+    "tension": engine.Maximum(quantity=engine.ConstraintForce("rod")),
 }
 
 
-def _answers(simulate: Simulate, method: Method) -> dict[str, float]:
+def _answers(simulate: case.Simulate, method: engine.Method) -> dict[str, float]:
     result = swing(simulate, TIME_STEP, method, observe=OBSERVE)
     energy = percent_of_energy(result)
     return {
@@ -59,7 +50,7 @@ def _answers(simulate: Simulate, method: Method) -> dict[str, float]:
     }
 
 
-def _measured_period(simulate: Simulate, method: Method) -> float:
+def _measured_period(simulate: case.Simulate, method: engine.Method) -> float:
     """Mean period [s] between upward passages of the bottom, placed by straight lines between samples."""
     time, theta = traced_angle(simulate, TIME_STEP, 22.0, method)
     before = np.flatnonzero((theta[:-1] < 0.0) & (theta[1:] >= 0.0))
@@ -67,28 +58,28 @@ def _measured_period(simulate: Simulate, method: Method) -> float:
     return float(np.diff(passages).mean())
 
 
-def plain(simulate: Simulate) -> dict[str, float]:
+def plain(simulate: case.Simulate) -> dict[str, float]:
     """Plain SPOOK."""
-    return _answers(simulate, PLAIN)
+    return _answers(simulate, engine.PLAIN)
 
 
-def curved(simulate: Simulate) -> dict[str, float]:
+def curved(simulate: case.Simulate) -> dict[str, float]:
     """Curved constraints, one correction."""
     return _answers(simulate, CURVED)
 
 
-def curved_twice(simulate: Simulate) -> dict[str, float]:
+def curved_twice(simulate: case.Simulate) -> dict[str, float]:
     """Curved constraints, two corrections."""
     return _answers(simulate, CURVED_TWICE)
 
 
-def length_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def length_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest length deviation over 10 s [%]."""
-    observe: dict[str, Observable] = {"violation": MaximumAbsolute(quantity=Violation("rod"))}
+    observe: dict[str, Observable] = {"violation": engine.MaximumAbsolute(quantity=engine.Violation("rod"))}
     return percent_of_length(swing(simulate, time_step, method, duration=LADDER_DURATION, observe=observe))
 
 
-def angle_error(simulate: Simulate, time_step: float, method: Method) -> float:
+def angle_error(simulate: case.Simulate, time_step: float, method: engine.Method) -> float:
     """Largest |angle − exact angle| over 10 s [rad]."""
     time, theta = traced_angle(simulate, time_step, LADDER_DURATION, method)
     return float(np.abs(theta - angle(time)).max())

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from spook_tracker.engine import PLAIN
-from spook_tracker.scalar_tests.case import Configuration, Ladder, LimitKind, Measurement, Metric, Unobserved
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.pendulum.measure import (
     HALF_STEP,
     HALF_STEP_CURVED,
@@ -27,8 +27,10 @@ def _around(value: float, relative: float = 1e-6) -> tuple[float, float]:
     return (value * (1.0 - relative), value * (1.0 + relative))
 
 
-def _length(role: Any, limit: float, source: str, value: float, kind: LimitKind = "physical") -> Metric:
-    return Metric(
+def _length(
+    role: Any, limit: float, source: str, value: float, kind: case.LimitKind = "physical"
+) -> case.Metric:
+    return case.Metric(
         name="length_deviation",
         description="largest |length − 1 m| in 22 s",
         unit="%",
@@ -44,8 +46,8 @@ def _length(role: Any, limit: float, source: str, value: float, kind: LimitKind 
     )
 
 
-def _energy(limit: float, source: str, value: float) -> Metric:
-    return Metric(
+def _energy(limit: float, source: str, value: float) -> case.Metric:
+    return case.Metric(
         name="energy_deviation",
         description="largest |E − E₀| in 22 s, of m g l",
         unit="%",
@@ -59,7 +61,7 @@ def _energy(limit: float, source: str, value: float) -> Metric:
     )
 
 
-ENERGY_AT_THE_END = Metric(
+ENERGY_AT_THE_END = case.Metric(
     name="energy_at_the_end",
     description="Energy drift after 22 s, of m g l (+ gained, − lost)",
     unit="%",
@@ -72,7 +74,7 @@ ENERGY_AT_THE_END = Metric(
     relative_tolerance=1e-7,
 )
 
-TENSION = Metric(
+TENSION = case.Metric(
     name="tension_at_the_bottom",
     description="largest rod tension over 3 m g, minus one",
     unit="1",
@@ -83,7 +85,7 @@ TENSION = Metric(
     relative_tolerance=1e-7,
 )
 
-PERIOD = Metric(
+PERIOD = case.Metric(
     name="period_error",
     description="measured period over 4 K(½) √(l/g), minus one",
     unit="1",
@@ -102,7 +104,7 @@ HALF_STEP_OLD = (
 COMPANIONS = (ENERGY_AT_THE_END, TENSION, PERIOD)
 
 MEASUREMENTS = (
-    Measurement(
+    case.Measurement(
         configuration="curved",
         time_step=TIME_STEP,
         metrics=(
@@ -113,7 +115,7 @@ MEASUREMENTS = (
         measure=curved,
         note="curved constraints, one extra back-substitution",
     ),
-    Measurement(
+    case.Measurement(
         configuration="plain",
         time_step=TIME_STEP,
         metrics=(
@@ -130,7 +132,7 @@ MEASUREMENTS = (
         measure=plain,
         note="the SPOOK step as it stands: rows linearised at the start of the step",
     ),
-    Measurement(
+    case.Measurement(
         configuration="curved twice",
         time_step=TIME_STEP,
         metrics=(
@@ -149,15 +151,19 @@ MEASUREMENTS = (
 )
 
 LADDERS = (
-    Ladder(
+    case.Ladder(
         name="length",
         description="largest length deviation over 10 s",
         unit="%",
         time_steps=tuple(1.0 / n for n in (15, 30, 60, 120, 240, 480)),
         configurations=(
-            Configuration(name="plain", method=PLAIN, expected_order=2.0, order_range=(1 / 480, 1 / 30)),
-            Configuration(name="curved", method=CURVED, expected_order=4.0, order_range=(1 / 480, 1 / 60)),
-            Configuration(
+            case.Configuration(
+                name="plain", method=engine.PLAIN, expected_order=2.0, order_range=(1 / 480, 1 / 30)
+            ),
+            case.Configuration(
+                name="curved", method=CURVED, expected_order=4.0, order_range=(1 / 480, 1 / 60)
+            ),
+            case.Configuration(
                 name="curved twice",
                 method=CURVED_TWICE,
                 expected_order=6.0,
@@ -168,28 +174,36 @@ LADDERS = (
         target_error=0.01,
         target_seconds=1e-3,
     ),
-    Ladder(
+    case.Ladder(
         name="angle",
         description="largest angle error over 10 s against elliptic functions",
         unit="rad",
         time_steps=tuple(1.0 / n for n in (15, 20, 30, 60, 120, 240, 480, 960, 1920, 3840)),
         configurations=(
-            Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 3840, 1 / 480)),
-            Configuration(
+            case.Configuration(
+                name="plain", method=engine.PLAIN, expected_order=1.0, order_range=(1 / 3840, 1 / 480)
+            ),
+            case.Configuration(
                 name="half-step", method=HALF_STEP, expected_order=2.0, order_range=(1 / 3840, 1 / 480)
             ),
-            Configuration(
+            case.Configuration(
                 name="half-step, curved twice",
                 method=HALF_STEP_CURVED,
                 expected_order=2.0,
                 order_range=(1 / 3840, 1 / 240),
             ),
-            Configuration(name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1 / 480, 1 / 60)),
-            Configuration(name="order 6", method=ORDER_6, expected_order=6.0, order_range=(1 / 120, 1 / 30)),
-            Configuration(name="order 8", method=ORDER_8, expected_order=8.0, order_range=(1 / 30, 1 / 15)),
+            case.Configuration(
+                name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1 / 480, 1 / 60)
+            ),
+            case.Configuration(
+                name="order 6", method=ORDER_6, expected_order=6.0, order_range=(1 / 120, 1 / 30)
+            ),
+            case.Configuration(
+                name="order 8", method=ORDER_8, expected_order=8.0, order_range=(1 / 30, 1 / 15)
+            ),
         ),
         error=angle_error,
-        run=Unobserved(length_error),
+        run=case.Unobserved(length_error),
         target_error=1e-3,
         target_seconds=1e-2,
     ),

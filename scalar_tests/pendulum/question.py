@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from spook_tracker.scalar_tests.case import Example, ScalarTest
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.pendulum.figures import FIGURES
 from spook_tracker.scalar_tests.pendulum.measure import OBSERVE
 from spook_tracker.scalar_tests.pendulum.metrics import LADDERS, MEASUREMENTS
 from spook_tracker.scalar_tests.pendulum.scene import TIME_STEP, scene
 from spook_tracker.scalar_tests.pendulum.stability import STUDIES
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Pendulum",
     question="How well does a distance constraint keep a pendulum's length?",
     why="A constraint that stretches is a spring that was not asked for. Length alone says little, since a length can be "
@@ -49,7 +49,7 @@ TEST = ScalarTest(
         "multiplier is an impulse.",
     ),
     measurements=MEASUREMENTS,
-    example=lambda: Example(scene=scene(TIME_STEP), time_step=TIME_STEP, observe=OBSERVE),
+    example=lambda: case.Example(scene=scene(TIME_STEP), time_step=TIME_STEP, observe=OBSERVE),
     figures=FIGURES,
     ladders=LADDERS,
     stability=STUDIES,

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import PLAIN, Energy, MaximumAbsolute, Method, Result, Trace, Violation
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.theory import one_row_matrix
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.bracket import break_point, cell, is_stable, table
-from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
 from spook_tracker.scalar_tests.oscillator.scene import growth
 from spook_tracker.scalar_tests.pendulum.scene import (
     COMPLIANCE,
@@ -28,8 +28,8 @@ BOUND = 0.1  # of the length, and of m g l
 RELATIVE_DAMPINGS = tuple(float(value) for value in np.geomspace(1e-5, 10.0, 13))  # τ/h
 COMPLIANCES = tuple(float(value) for value in np.geomspace(1e-14, 1e-2, 13))  # m/N
 OBSERVE: dict[str, Observable] = {
-    "violation": Trace(quantity=Violation("rod")),
-    "energy": Trace(quantity=Energy(), from_start=True),
+    "violation": engine.Trace(quantity=engine.Violation("rod")),
+    "energy": engine.Trace(quantity=engine.Energy(), from_start=True),
 }
 DISCRETE = (
     "where the method's own discrete solution breaks: the dense prototype tests/oracles/particles.py, to 1 %"
@@ -40,7 +40,7 @@ HOLDS = (
 )
 
 
-def _excess(result: Result, compliance: float) -> Any:
+def _excess(result: engine.Result, compliance: float) -> Any:
     """Violation and energy gain over their bounds; below a tenth of them nothing is growing, only swinging."""
     yielded = 4.5 * MASS * GRAVITY * compliance / LENGTH
     lag = 1.5 * result.time_step * np.sqrt(GRAVITY / LENGTH)
@@ -50,9 +50,9 @@ def _excess(result: Result, compliance: float) -> Any:
 
 
 def _kind(
-    simulate: Simulate,
+    simulate: case.Simulate,
     time_step: float = TIME_STEP,
-    method: Method = PLAIN,
+    method: engine.Method = engine.PLAIN,
     *,
     relative_damping: float = 1.0,
     compliance: float = COMPLIANCE,
@@ -68,30 +68,32 @@ def _kind(
     return cell(result, _excess(result, compliance), bound=1.0)
 
 
-def _largest_step(method: Method) -> Any:
-    def study(simulate: Simulate) -> BreakPoint:
+def _largest_step(method: engine.Method) -> Any:
+    def study(simulate: case.Simulate) -> case.BreakPoint:
         return break_point(lambda h: is_stable(_kind(simulate, h, method)), 0.002, 2.0, resolution=0.005)
 
     return study
 
 
-def smallest_damping(simulate: Simulate) -> BreakPoint:
+def smallest_damping(simulate: case.Simulate) -> case.BreakPoint:
     """Smallest τ/h at compliance 1e-13 m/N and h = 1/60 s."""
     return break_point(lambda theta: is_stable(_kind(simulate, relative_damping=theta)), 1.0, 1e-8, walk=9)
 
 
-def smallest_compliance(simulate: Simulate) -> BreakPoint:
+def smallest_compliance(simulate: case.Simulate) -> case.BreakPoint:
     """Smallest compliance [m/N] without any damping, at h = 1/60 s."""
     return break_point(
         lambda c: is_stable(_kind(simulate, relative_damping=0.0, compliance=c)), 1e-3, 1e-13, walk=11
     )
 
 
-def farthest(simulate: Simulate) -> BreakPoint:
+def farthest(simulate: case.Simulate) -> case.BreakPoint:
     """Farthest pivot [m] from the origin at which the length deviation is that at the origin to 1e-3."""
 
     def worst(away: float) -> float:
-        observe: dict[str, Observable] = {"violation": MaximumAbsolute(quantity=Violation("rod"))}
+        observe: dict[str, Observable] = {
+            "violation": engine.MaximumAbsolute(quantity=engine.Violation("rod"))
+        }
         result = swing(simulate, TIME_STEP, observe=observe, away=away)
         return float(result["violation"]) if result.completed else math.inf
 
@@ -99,7 +101,7 @@ def farthest(simulate: Simulate) -> BreakPoint:
     return break_point(lambda away: abs(worst(away) / home - 1.0) <= 1e-3, 1.0, 1e15, walk=16, resolution=0.1)
 
 
-def largest_start(simulate: Simulate) -> BreakPoint:
+def largest_start(simulate: case.Simulate) -> case.BreakPoint:
     """Largest start violation, as a fraction of the length, that is gone within five seconds."""
 
     def holds(violation: float) -> bool:
@@ -113,7 +115,7 @@ def largest_start(simulate: Simulate) -> BreakPoint:
     return break_point(holds, 0.001, 1000.0, walk=13, resolution=0.05)
 
 
-def damping_map(simulate: Simulate) -> StabilityMap:
+def damping_map(simulate: case.Simulate) -> case.StabilityMap:
     """(τ/h, compliance) at h = 1/60 s beside the eigenvalue of the rod's own motion."""
 
     def eigenvalue(theta: float, compliance: float) -> float:
@@ -122,7 +124,7 @@ def damping_map(simulate: Simulate) -> StabilityMap:
     def kind(theta: float, compliance: float) -> str:
         return _kind(simulate, relative_damping=theta, compliance=compliance)
 
-    return StabilityMap(
+    return case.StabilityMap(
         x=RELATIVE_DAMPINGS,
         y=COMPLIANCES,
         cells=table(COMPLIANCES, RELATIVE_DAMPINGS, kind),
@@ -136,7 +138,7 @@ def damping_map(simulate: Simulate) -> StabilityMap:
 
 STUDIES = (
     *(
-        StabilityStudy(
+        case.StabilityStudy(
             name=f"largest-time-step-{name.replace(' ', '-')}",
             title="Largest stable time step",
             configuration=name,
@@ -149,7 +151,7 @@ STUDIES = (
         for name, method, expected, source in (
             (
                 "plain",
-                PLAIN,
+                engine.PLAIN,
                 (0.0862, 0.0879),
                 DISCRETE + "; to first order 10 % of the length is 3 g h²/(2 l), h = 0.082 s",
             ),
@@ -157,7 +159,7 @@ STUDIES = (
             ("curved twice", CURVED_TWICE, (0.1897, 0.1936), DISCRETE),
         )
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="smallest-damping",
         title="Smallest τ/h that holds at compliance 1e-13 m/N",
         configuration="plain",
@@ -168,7 +170,7 @@ STUDIES = (
         expected=(2.43e-4, 2.53e-4),
         expected_source=DISCRETE.replace("1 %", "2 %"),
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="smallest-compliance",
         title="Smallest compliance that holds without damping",
         configuration="plain",
@@ -179,7 +181,7 @@ STUDIES = (
         expected=(9.04e-8, 9.41e-8),
         expected_source=DISCRETE.replace("1 %", "2 %"),
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="farthest-from-origin",
         title="Farthest from the origin that the pendulum keeps its error",
         configuration="plain",
@@ -189,7 +191,7 @@ STUDIES = (
         expected=(1e6, 1e15),
         expected_source="a place is rounded to 1e-16 of its distance; the deviation is 4e-3 m",
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="largest-start-violation",
         title="Largest start violation that the rod takes back",
         configuration="plain",
@@ -201,7 +203,7 @@ STUDIES = (
         expected_source="the first step takes the rod back at a g₀, a = 4/(h (1 + 4 τ/h)) = 48 per second: ½ (a g₀)² is "
         "10 % of g l at g₀ = 0.0292, found to 5 %",
     ),
-    StabilityStudy(
+    case.StabilityStudy(
         name="damping-compliance-map",
         title="Damping and compliance",
         configuration="plain",

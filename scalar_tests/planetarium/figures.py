@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from spook_tracker.engine import Position, Trace
-from spook_tracker.scalar_tests.case import Drawing, Figure, Simulate
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.planetarium.scene import (
     DURATION,
     HALF_STEP,
@@ -21,19 +21,19 @@ TIME_STEPS = (TIME_STEP, 0.1, 0.25, 0.5, 1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0)  # s
 EVERY = 120  # samples apart in the figures, 2 s
 
 
-def _orbit(simulate: Simulate) -> np.ndarray:
-    observe = {"planet": Trace(quantity=Position("planet"), every=EVERY)}
+def _orbit(simulate: case.Simulate) -> np.ndarray:
+    observe = {"planet": engine.Trace(quantity=engine.Position("planet"), every=EVERY)}
     result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=observe)
     return np.asarray(result["planet"])
 
 
-def draw_orbit(simulate: Simulate) -> Drawing:
+def draw_orbit(simulate: case.Simulate) -> case.Drawing:
     """The orbit in its plane."""
     planet = _orbit(simulate)
     angle, far = np.unwrap(np.arctan2(planet[:, 1], planet[:, 0])), np.hypot(planet[:, 0], planet[:, 1])
     rounds = float(angle[-1] - angle[0]) / (2.0 * np.pi)
     exact = [exact_position(t) for t in np.linspace(0.0, 366.0, 184)]
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulation", planet[:, 0], planet[:, 1]),
             line("Kepler", [x for x, _ in exact], [y for _, y in exact], "reference"),
@@ -44,10 +44,10 @@ def draw_orbit(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_energy(simulate: Simulate) -> Drawing:
+def draw_energy(simulate: case.Simulate) -> case.Drawing:
     """Energy deviation against time, right and as printed."""
     time, right, printed = energies(simulate, TIME_STEP, every=EVERY)
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("½v² − k²/r", time, right),
             line("½v² + k²/r, as printed", time, printed),
@@ -59,22 +59,22 @@ def draw_energy(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_energy_itself(simulate: Simulate) -> Drawing:
+def draw_energy_itself(simulate: case.Simulate) -> case.Drawing:
     """The right energy alone, since the printed one hides it."""
     time, right, _ = energies(simulate, TIME_STEP, every=EVERY)
     time_half, half, _ = energies(simulate, TIME_STEP, HALF_STEP, every=EVERY)
-    return Drawing(
+    return case.Drawing(
         curves=(line("plain", time, right), line("half-step", time_half, half)),
         x_label="time [s]",
         y_label="energy deviation [%]",
     )
 
 
-def draw_radius(simulate: Simulate) -> Drawing:
+def draw_radius(simulate: case.Simulate) -> case.Drawing:
     """Distance against angle."""
     planet = _orbit(simulate)
     angle = np.unwrap(np.arctan2(planet[:, 1], planet[:, 0]))
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("simulation", angle, np.hypot(planet[:, 0], planet[:, 1])),
             line("1/(1 + ξ sin θ)", angle, orbit_radius(angle), "reference"),
@@ -85,14 +85,14 @@ def draw_radius(simulate: Simulate) -> Drawing:
     )
 
 
-def draw_time_step(simulate: Simulate) -> Drawing:
+def draw_time_step(simulate: case.Simulate) -> case.Drawing:
     """Energy deviation against time step."""
 
     def worst(which: int) -> tuple[float, ...]:
         return sweep(TIME_STEPS, lambda h: np.abs(energies(simulate, h)[which]).max())
 
     right = worst(1)
-    return Drawing(
+    return case.Drawing(
         curves=(
             line("½v² − k²/r", TIME_STEPS, right, "both"),
             line("½v² + k²/r, as printed", TIME_STEPS, worst(2), "both"),
@@ -105,11 +105,13 @@ def draw_time_step(simulate: Simulate) -> Drawing:
 
 
 FIGURES = (
-    Figure(name="orbit", title="The orbit", draw=draw_orbit, thesis="Fig 3.32"),
-    Figure(name="energy", title="Energy deviation against time", draw=draw_energy, thesis="Fig 3.33"),
-    Figure(name="energy-itself", title="Energy deviation against time, right sign", draw=draw_energy_itself),
-    Figure(name="radius", title="Distance against angle", draw=draw_radius, thesis="Fig 3.34"),
-    Figure(
+    case.Figure(name="orbit", title="The orbit", draw=draw_orbit, thesis="Fig 3.32"),
+    case.Figure(name="energy", title="Energy deviation against time", draw=draw_energy, thesis="Fig 3.33"),
+    case.Figure(
+        name="energy-itself", title="Energy deviation against time, right sign", draw=draw_energy_itself
+    ),
+    case.Figure(name="radius", title="Distance against angle", draw=draw_radius, thesis="Fig 3.34"),
+    case.Figure(
         name="energy-against-time-step",
         title="Energy deviation against time step",
         draw=draw_time_step,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from spook_tracker.engine import PLAIN
-from spook_tracker.scalar_tests.case import Configuration, Ladder, LimitKind, Measurement, Metric
+from spook_tracker import engine
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.planetarium.measure import (
     ORDER_4,
     ORDER_6,
@@ -16,7 +16,7 @@ from spook_tracker.scalar_tests.planetarium.measure import (
 )
 from spook_tracker.scalar_tests.planetarium.scene import HALF_STEP, LONG_STEPS, TIME_STEP
 
-AS_PRINTED = Metric(
+AS_PRINTED = case.Metric(
     name="energy_oscillation_as_printed",
     description="largest deviation of ½v² + k²/r, the printed sign, from its start",
     unit="%",
@@ -29,7 +29,7 @@ AS_PRINTED = Metric(
     relative_tolerance=1e-8,
 )
 
-TURN = Metric(
+TURN = case.Metric(
     name="angular_momentum_drift",
     description="largest |L − L₀| over L₀",
     unit="1",
@@ -41,8 +41,8 @@ TURN = Metric(
 )
 
 
-def _radius(limit: float, source: str) -> Metric:
-    return Metric(
+def _radius(limit: float, source: str) -> case.Metric:
+    return case.Metric(
         name="radius_error",
         description="largest |r − 1/(1 + ξ sin θ)|",
         unit="m",
@@ -54,8 +54,8 @@ def _radius(limit: float, source: str) -> Metric:
     )
 
 
-def _position(limit: float, source: str) -> Metric:
-    return Metric(
+def _position(limit: float, source: str) -> case.Metric:
+    return case.Metric(
         name="position_error",
         description="distance from Kepler's position after 1200 s",
         unit="m",
@@ -68,9 +68,9 @@ def _position(limit: float, source: str) -> Metric:
 
 
 def _oscillation(
-    role: str, limit: float, source: str, low: float, high: float, why: str, kind: LimitKind = "physical"
-) -> Metric:
-    return Metric(
+    role: str, limit: float, source: str, low: float, high: float, why: str, kind: case.LimitKind = "physical"
+) -> case.Metric:
+    return case.Metric(
         name="energy_oscillation",
         description="largest |E/E₀ − 1| with E = ½v² − k²/r",
         unit="%",
@@ -101,7 +101,7 @@ LEAPFROG = "leapfrog iterated by itself, second order in h k: "
 SYMPLECTIC = "symplectic Euler iterated by itself: "
 
 MEASUREMENTS = (
-    Measurement(
+    case.Measurement(
         configuration="plain",
         time_step=TIME_STEP,
         metrics=(
@@ -114,7 +114,7 @@ MEASUREMENTS = (
         measure=plain,
         note="the SPOOK step as it stands; symplectic Euler where nothing is constrained",
     ),
-    Measurement(
+    case.Measurement(
         configuration="half-step",
         time_step=TIME_STEP,
         metrics=(
@@ -128,7 +128,7 @@ MEASUREMENTS = (
         measure=half_step,
         note="velocities live at mid-step",
     ),
-    Measurement(
+    case.Measurement(
         configuration="plain",
         time_step=5.0,
         metrics=(
@@ -144,12 +144,12 @@ MEASUREMENTS = (
         measure=coarse,
         note="the coarsest step of Fig 3.35",
     ),
-    Measurement(
+    case.Measurement(
         configuration="long run",
         time_step=TIME_STEP,
         parameters={"steps": LONG_STEPS},
         metrics=(
-            Metric(
+            case.Metric(
                 name="energy_drift",
                 description="mean energy of the last round minus that of the first, of |E₀|",
                 unit="%",
@@ -167,7 +167,7 @@ MEASUREMENTS = (
                 9.85e-4,
                 OUR_SET_POINT,
             ),
-            Metric(
+            case.Metric(
                 name="angular_momentum_drift",
                 description="largest |L − L₀| over L₀ in 1.404e6 steps",
                 unit="1",
@@ -184,17 +184,21 @@ MEASUREMENTS = (
 )
 
 LADDERS = (
-    Ladder(
+    case.Ladder(
         name="position",
         description="distance from Kepler's position after 1200 s",
         unit="m",
         time_steps=(40.0, 20.0, 10.0, 5.0, 2.5, 1.25, 0.625, 0.3125, 0.125, 0.0625, 1.0 / 60.0),
         configurations=(
-            Configuration(name="plain", method=PLAIN, expected_order=1.0, order_range=(1 / 60, 0.3125)),
-            Configuration(name="half-step", method=HALF_STEP, expected_order=2.0, order_range=(1 / 60, 1.25)),
-            Configuration(name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1.25, 10.0)),
-            Configuration(name="order 6", method=ORDER_6, expected_order=6.0, order_range=(2.5, 10.0)),
-            Configuration(name="order 8", method=ORDER_8, expected_order=8.0, order_range=(5.0, 20.0)),
+            case.Configuration(
+                name="plain", method=engine.PLAIN, expected_order=1.0, order_range=(1 / 60, 0.3125)
+            ),
+            case.Configuration(
+                name="half-step", method=HALF_STEP, expected_order=2.0, order_range=(1 / 60, 1.25)
+            ),
+            case.Configuration(name="order 4", method=ORDER_4, expected_order=4.0, order_range=(1.25, 10.0)),
+            case.Configuration(name="order 6", method=ORDER_6, expected_order=6.0, order_range=(2.5, 10.0)),
+            case.Configuration(name="order 8", method=ORDER_8, expected_order=8.0, order_range=(5.0, 20.0)),
         ),
         error=position_error,
         target_error=1e-3,

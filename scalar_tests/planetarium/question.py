@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from spook_tracker.scalar_tests.case import Example, ScalarTest, StabilityStudy
+from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.planetarium.figures import FIGURES
 from spook_tracker.scalar_tests.planetarium.measure import FASTEST, OBSERVE, fastest, largest_step
 from spook_tracker.scalar_tests.planetarium.metrics import LADDERS, MEASUREMENTS
 from spook_tracker.scalar_tests.planetarium.scene import TIME_STEP, scene
 
-TEST = ScalarTest(
+TEST = case.ScalarTest(
     title="Planetarium",
     question="Is the integrator stable over many rounds of an orbit?",
     why="Errors that add up show only after a long time: an orbit that gains energy flies off, one that loses it "
@@ -40,11 +40,11 @@ TEST = ScalarTest(
         "The axis labels of Figs 3.34 and 3.35 are swapped.",
     ),
     measurements=MEASUREMENTS,
-    example=lambda: Example(scene=scene(), time_step=TIME_STEP, observe=OBSERVE),
+    example=lambda: case.Example(scene=scene(), time_step=TIME_STEP, observe=OBSERVE),
     figures=FIGURES,
     ladders=LADDERS,
     stability=(
-        StabilityStudy(
+        case.StabilityStudy(
             name="largest-time-step",
             title="Largest time step that keeps the orbit",
             configuration="plain",
@@ -54,7 +54,7 @@ TEST = ScalarTest(
             expected=(15.8, 19.0),
             expected_source="the start, half a step off, adds h k/2 to the eccentricity ξ, so the energy swings by 2 h k (ξ + h k/2): 10 % at h = 17.4 s; the next order is (h k)² = 9 % of it",
         ),
-        StabilityStudy(
+        case.StabilityStudy(
             name="fastest",
             title="Fastest planet, over a circle's speed, that turns back within ten years",
             configuration="plain",

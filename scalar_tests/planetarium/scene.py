@@ -8,25 +8,16 @@ from typing import Any
 import numpy as np
 from scipy.optimize import brentq
 
-from spook_tracker.engine import (
-    PLAIN,
-    CentralGravity,
-    KineticEnergy,
-    Method,
-    Particle,
-    PotentialEnergy,
-    Scene,
-    Trace,
-)
+from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
-from spook_tracker.scalar_tests.case import Simulate
+from spook_tracker.scalar_tests import case
 
 GAUSS = 2.0 * math.pi / 365.0  # k, 1/s
 ECCENTRICITY = 0.017  # ξ; r = 1 at the start is the semi-latus rectum
 DURATION = 1200.0  # s
 TIME_STEP = 1.0 / 60.0  # s
 LONG_STEPS = 1_404_000  # 6.5 h
-HALF_STEP = Method(half_step_velocities=True)
+HALF_STEP = engine.Method(half_step_velocities=True)
 SPEED = (-ECCENTRICITY * GAUSS, GAUSS, 0.0)  # m/s at the start
 START_ENERGY = 0.5 * GAUSS**2 * (1.0 + ECCENTRICITY**2) - GAUSS**2  # J: ½ v² − k²/r
 SEMI_MAJOR = 1.0 / (1.0 - ECCENTRICITY**2)  # m, from the energy −k²/(2a)
@@ -34,10 +25,10 @@ MEAN_MOTION = GAUSS / SEMI_MAJOR**1.5  # 1/s
 PERIOD = 2.0 * math.pi / MEAN_MOTION  # s, 365.1583
 
 
-def scene() -> Scene:
+def scene() -> engine.Scene:
     """A planet of 1 kg at (1, 0, 0) m; the sun at the origin attracts and does not move."""
-    planet = Particle(name="planet", position=(1.0, 0.0, 0.0), velocity=SPEED, mass=1.0)
-    return Scene(bodies=(planet,), forces=(CentralGravity(name="sun", strength=GAUSS**2),))
+    planet = engine.Particle(name="planet", position=(1.0, 0.0, 0.0), velocity=SPEED, mass=1.0)
+    return engine.Scene(bodies=(planet,), forces=(engine.CentralGravity(name="sun", strength=GAUSS**2),))
 
 
 def exact_position(time: float) -> tuple[float, float]:
@@ -60,12 +51,12 @@ def orbit_radius(angle: Any) -> Any:
 
 
 def energies(
-    simulate: Simulate, time_step: float, method: Method = PLAIN, every: int = 1
+    simulate: case.Simulate, time_step: float, method: engine.Method = engine.PLAIN, every: int = 1
 ) -> tuple[Any, Any, Any]:
     """Times [s], E = ½v² − k²/r and the printed ½v² + k²/r: each minus its start, in % of it."""
     observe: dict[str, Observable] = {
-        "kinetic": Trace(quantity=KineticEnergy(), every=every),
-        "potential": Trace(quantity=PotentialEnergy(), every=every),
+        "kinetic": engine.Trace(quantity=engine.KineticEnergy(), every=every),
+        "potential": engine.Trace(quantity=engine.PotentialEnergy(), every=every),
     }
     result = simulate(scene(), time_step=time_step, duration=DURATION, method=method, observe=observe)
     right = result["kinetic"] + result["potential"]

@@ -5,8 +5,9 @@ reaches, the values of the constants it reads (a Method, a mass, a table), and t
 direction, limit, reference, time step, parameters. Docstrings, comments, layout, names of tests and every
 text a reader sees are not reached, so rewording never makes two runs incomparable. The engine is not hashed
 either: it is what is being measured, and of its options only those a test sets itself count. Set points and
-tolerances judge a value and do not make another one. A field with the metadata definition=False is left out: where
-a file lies, whose content is hashed.
+tolerances judge a value and do not make another one. What the engine or the questions' vocabulary gives counts by its
+name, imported by itself or with its module. A field with the metadata definition=False is left out: where a file
+lies, whose content is hashed.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 
 OWN_PACKAGES = ("scalar_tests",)
 INSTALLED = "spook_tracker."
+NAMED_ALONE = ("engine", "scalar_tests.case")  # modules: `engine.Box` is `Box`
 WORDING = {
     "conclusion",
     "counter_roles",
@@ -168,7 +170,9 @@ def _describe_class(kind: type, seen: _Seen) -> Described:
     if not seen.owns(kind.__module__):
         return ("class", _inside(kind.__module__), kind.__qualname__)
     node = _classes(kind.__module__).get(kind.__name__)
-    return ("class", kind.__qualname__ if node is None else _definition(node))
+    if node is None:
+        return ("class", kind.__qualname__)
+    return ("class", _definition(node, kind.__module__))
 
 
 def _describe_function(function: types.FunctionType, seen: _Seen) -> Described:
@@ -176,20 +180,48 @@ def _describe_function(function: types.FunctionType, seen: _Seen) -> Described:
         return ("function", _inside(function.__module__ or ""), function.__qualname__)
     code = function.__code__
     nodes = _functions(function.__module__).get((code.co_name, code.co_firstlineno), ())
-    body: Described = tuple(map(_definition, nodes)) or ("bytecode", code.co_code.hex(), _plain(code))
+    written = tuple(_definition(node, function.__module__) for node in nodes)
+    body: Described = written or ("bytecode", code.co_code.hex(), _plain(code))
     captured = tuple(_describe(_cell(cell), seen) for cell in function.__closure__ or ())
     defaults = _describe((function.__defaults__, function.__kwdefaults__), seen)
     reached = []
-    for name in sorted(_names(code)):
-        if name not in function.__globals__:
+    alone = _named_alone(function.__module__) if nodes else {}
+    given = {name: module for node in nodes for name, module in _given(node, alone)}
+    for name in sorted(_names(code) - alone.keys()):
+        if name not in given and name not in function.__globals__:
             continue
-        value = function.__globals__[name]
+        value = getattr(given[name], name, None) if name in given else function.__globals__[name]
         if isinstance(value, types.ModuleType) and seen.owns(value.__name__):
             inside = {n: getattr(value, n) for n in sorted(_names(code)) if hasattr(value, n)}
             reached.append((name, _describe(inside, seen)))
         else:
             reached.append((name, _describe(value, seen)))
     return ("function", body, captured, defaults, tuple(reached))
+
+
+@functools.lru_cache(maxsize=256)
+def _named_alone(module: str) -> dict[str, types.ModuleType]:
+    """What a module calls those whose things count by their own names."""
+    return {
+        name: value
+        for name, value in vars(sys.modules[module]).items()
+        if isinstance(value, types.ModuleType) and _inside(value.__name__) in NAMED_ALONE
+    }
+
+
+def _given(
+    node: ast.AST | list[ast.AST], alone: Mapping[str, types.ModuleType]
+) -> Iterator[tuple[str, types.ModuleType]]:
+    """What a function takes out of those modules: names, and where from."""
+    if isinstance(node, list):
+        for item in node:
+            yield from _given(item, alone)
+    elif isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in alone:
+        yield node.attr, alone[node.value.id]
+    elif isinstance(node, ast.AST):
+        for name, value in ast.iter_fields(node):
+            if name not in SKIPPED_FIELDS:
+                yield from _given(value, alone)
 
 
 def _cell(cell: types.CellType) -> object:
@@ -255,29 +287,35 @@ def _nodes(module: str) -> Iterator[ast.AST]:
 
 
 @functools.lru_cache(maxsize=4096)
-def _definition(node: ast.AST) -> Described:
+def _definition(node: ast.AST, module: str) -> Described:
     """Of a function or class: what several reach is put in its canonical form once."""
-    return _canonical(node)
+    return _canonical(node, module)
 
 
 SKIPPED_FIELDS = {"type_comment", "type_params", "kind", "ctx", "returns", "annotation"}
 
 
-def _canonical(node: object) -> Described:
+def _canonical(node: object, module: str) -> Described:
     """The tree without positions, docstrings and annotations; the same on every version of Python."""
     if isinstance(node, list):
-        return tuple(_canonical(item) for item in node)
+        return tuple(_canonical(item, module) for item in node)
     if not isinstance(node, ast.AST):
         return repr(node)
+    if (
+        isinstance(node, ast.Attribute)
+        and isinstance(node.value, ast.Name)
+        and node.value.id in _named_alone(module)
+    ):
+        return ("Name", ("id", repr(node.attr)))
     if isinstance(node, ast.AnnAssign) and node.value is not None:
-        return ("Assign", _canonical(node.target), _canonical(node.value))
+        return ("Assign", _canonical(node.target, module), _canonical(node.value, module))
     parts: list[Described] = [type(node).__name__]
     for name, value in ast.iter_fields(node):
         if name in SKIPPED_FIELDS or value is None or value == []:
             continue
         if name == "body" and isinstance(value, list) and _is_docstring(value[0]):
             value = value[1:]
-        parts.append((name, _canonical(value)))
+        parts.append((name, _canonical(value, module)))
     return tuple(parts)
 
 

@@ -97,6 +97,17 @@ def test_another_scene_constant_or_method_is_another_version(version, function, 
     assert version(MODULE.replace(old, new), function) != version(MODULE, function)
 
 
+def test_what_the_engine_gives_counts_by_its_name_however_it_is_imported(version):
+    inside = MODULE.replace("method=METHOD", "method=Method(corrections=0)")
+    by_module = inside.replace(
+        "from spook_tracker.engine.method import Method", "from spook_tracker import engine"
+    )
+    by_module = by_module.replace("Method(", "engine.Method(")
+    assert by_module.count("engine.") == 2
+    assert version(by_module) == version(inside)
+    assert version(by_module.replace("corrections=0))", "corrections=1))")) != version(inside)
+
+
 def test_another_limit_is_another_version(version):
     assert version(MODULE, facts=("m", 0.2)) != version(MODULE, facts=("m", 0.1))
 
