@@ -17,6 +17,7 @@ from sqlalchemy.orm import Session
 from spook_tracker.tracker.cli.console import PIPE_WIDTH
 from spook_tracker.tracker.measure.request import Request
 from spook_tracker.tracker.store.database import open_database
+from tests import warm
 from tests.places import TOYS
 from tests.skips import pytest_make_collect_report, pytest_runtest_makereport  # noqa: F401 (hooks)
 from tests.tracker.store import postgresql
@@ -36,6 +37,14 @@ LONG = (
     "website/test_publish_history", "tracker/judge/test_detection", "team/test_workflow", "tracker/measure/test_executors",
 )  # fmt: skip
 FIRST = [Path(__file__).parent / f"{name}.py" for name in LONG]
+
+
+def pytest_configure() -> None:
+    warm.begin()
+
+
+def pytest_unconfigure() -> None:
+    warm.close()
 
 
 @pytest.hookimpl(wrapper=True)

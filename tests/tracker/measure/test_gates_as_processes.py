@@ -31,8 +31,9 @@ def ended(
     Path("their_catalogue.py").write_text(QUESTIONS)
     words = [*command, "--engine", "their_engine", "--catalogue", "their_catalogue", "--workers", "1"]
     own = {name: value for name, value in os.environ.items() if not name.startswith(("TRACKER", "GITHUB"))}
+    line = ["bash", "-c", f'"{TRACKER}" {" ".join(words)} {shell}'] if shell else [str(TRACKER), *words]
     done = subprocess.run(
-        ["bash", "-c", f'"{TRACKER}" {" ".join(words)} {shell}'],
+        line,
         env={**own, "PYTHONPATH": str(TOYS), **settings}, capture_output=True, text=True, stdin=subprocess.DEVNULL,
         timeout=120, check=False,
     )  # fmt: skip
