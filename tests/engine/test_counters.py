@@ -19,7 +19,6 @@ from spook_tracker.engine import (
     SimulationFailed,
     Spring,
     Trace,
-    compile,
     simulate,
 )
 from tests.scenes.particle import KINDS, TIME_STEP, chain, loop, tree
@@ -95,11 +94,9 @@ def test_samples_are_counted_as_they_are_read() -> None:
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_equal_input_gives_equal_bits_and_a_hair_more_mass_another_hash(kind: str) -> None:
+def test_a_hair_more_mass_gives_another_hash(kind: str) -> None:
     scene = KINDS[kind](np.random.default_rng(4))
-    program = compile(scene, time_step=TIME_STEP)
-    first, again = program.run(60), program.run(60)
-    fresh = simulate(scene, time_step=TIME_STEP, steps=60)
+    first = simulate(scene, time_step=TIME_STEP, steps=60)
     body = scene.bodies[0]
     nudged = Particle(
         name=body.name,
@@ -114,10 +111,6 @@ def test_equal_input_gives_equal_bits_and_a_hair_more_mass_another_hash(kind: st
         gravity=scene.gravity,
     )
 
-    assert first.state_hash == again.state_hash == fresh.state_hash
-    assert first.counters == again.counters == fresh.counters
-    for name, state in first.final_state.items():
-        np.testing.assert_array_equal(state, fresh.final_state[name])
     assert simulate(other, time_step=TIME_STEP, steps=60).state_hash != first.state_hash
 
 
@@ -142,7 +135,7 @@ def test_a_runaway_names_the_step_in_which_a_bound_was_crossed() -> None:
     assert (result.status, result.failed_body, result.failed_step) == ("diverged", "wild", step)
     assert result.steps == step - 1
     assert "'wild'" in result.failure and f"step {step}" in result.failure
-    assert result.partial["x"].shape == (step, 3)
+    assert result.partial["x"].shape == (step, 3) and np.isfinite(result.partial["x"]).all()
     with pytest.raises(SimulationFailed) as failed:
         result["end"]
     assert failed.value.result is result

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,12 +20,9 @@ from spook_tracker.engine import (
     JointCoordinate,
     JointSpring,
     Load,
-    Material,
-    Method,
     MethodError,
     Motor,
     Particle,
-    Plane,
     Position,
     Prismatic,
     RigidBody,
@@ -42,131 +38,9 @@ from spook_tracker.engine import (
     simulate,
     start,
 )
-from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from tests.engine.test_bits import rng, tumble
 from tests.scenes import particle as particle_scenes
 from tests.scenes import rigid as rigid_scenes
-
-STEPS = 90
-
-
-def tumble(friction: float = 0.5) -> Scene:
-    """Boxes and balls that fall on each other and on a floor: impacts, resting contacts, friction."""
-    material = Material(friction=friction, restitution=0.3)
-    floor = RigidBody(
-        name="floor", position=(0.0, 0.0, 0.0), shape=Plane(), motion="static", material=material
-    )
-    bodies = [
-        RigidBody(
-            name=f"body {k}",
-            mass=1.0 + k,
-            shape=Box((0.4, 0.3, 0.2)) if k % 2 else Sphere(0.2),
-            position=(0.05 * k, -0.03 * k, 0.3 + 0.35 * k),
-            angular_velocity=(0.3, -0.2 * k, 0.1),
-            material=material,
-        )
-        for k in range(5)
-    ]
-    return Scene(bodies=(floor, *bodies), gravity=(0.2, 0.1, -9.81))
-
-
-def rng() -> np.random.Generator:
-    return np.random.default_rng(7)
-
-
-def stiff(scene: Scene) -> Scene:
-    """Its rows held rigidly, as compositions want them."""
-    held: dict[str, Any] = {"compliance": 0.0, "damping": None}
-    rows = [
-        replace(row, rest_length=None, **held) if isinstance(row, Distance) else replace(row, **held)
-        for row in scene.constraints
-    ]
-    return replace(scene, constraints=tuple(rows))
-
-
-SCENES: dict[str, tuple[Scene, Method]] = {
-    **{f"particles: {name}": (build(rng()), Method()) for name, build in particle_scenes.KINDS.items()},
-    "particles, half-step": (particle_scenes.chain(rng()), Method(half_step_velocities=True)),
-    "particles, curved": (particle_scenes.loop(rng()), Method(corrections=2)),
-    "particles, order 4": (stiff(particle_scenes.tree(rng())), Method(composition="order4")),
-    "particles, strings": (particle_scenes.tree(rng()), Method(string_stiffness=True)),
-    "particles, sweeps": (particle_scenes.tree(rng()), Method(solver="iterative")),
-    "rigid": (rigid_scenes.tree(rng()), Method()),
-    "rigid, loop": (rigid_scenes.loop(rng()), Method(corrections=1)),
-    "rigid, everything": (rigid_scenes.everything(rng()), Method(substeps=2)),
-    "rigid, half-step": (rigid_scenes.tree(rng()), Method(half_step_velocities=True)),
-    "rigid, order 6": (stiff(rigid_scenes.tree(rng())), Method(composition="order6")),
-    "rigid, strings": (CATALOGUE["loaded_rods"].example().scene, Method(string_stiffness=True)),
-    "rigid, sweeps": (rigid_scenes.everything(rng()), Method(solver="iterative")),
-    "contacts": (tumble(), Method()),
-    "contacts, sweeps": (tumble(), Method(solver="iterative", iterations=30)),
-    "contacts, box": (tumble(), Method(friction="box")),
-}
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_a_run_in_pieces_gives_the_bits_of_a_run_in_one_go(name: str) -> None:
-    scene, method = SCENES[name]
-    observe = {"x": Position(), "v": Velocity()}
-    whole = simulate(
-        scene,
-        time_step=0.01,
-        steps=STEPS,
-        method=method,
-        observe={key: Trace(quantity=what) for key, what in observe.items()},
-    )
-
-    with start(scene, time_step=0.01, method=method, observe=observe) as run:
-        for piece in (1, 0, 36, 1, 52):
-            run.step(piece)
-
-            for key in observe:
-                np.testing.assert_array_equal(whole[key][run.steps], run[key])
-        result = run.result()
-
-    assert whole.state_hash == result.state_hash
-    assert whole.steps == result.steps == STEPS
-    if (
-        method.composition == "none" and not method.half_step_velocities
-    ):  # there a reading is a solve of its own
-        assert {**whole.counters, "samples": 0} == {**result.counters, "samples": 0}
-    assert whole.residual == result.residual
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_what_was_saved_goes_on_with_the_same_bits_whenever_it_is_restored(name: str) -> None:
-    scene, method = SCENES[name]
-    with start(scene, time_step=0.01, method=method) as run:
-        run.step(40)
-        saved = run.save()
-        run.step(50)
-        once = run.result()
-        run.step(13)
-        run.restore(saved)
-        assert run.steps == 40
-        run.step(50)
-
-        assert once.state_hash == run.result().state_hash
-        with start(scene, time_step=0.01, method=method) as other:
-            other.restore(saved)
-            other.step(50)
-
-            assert once.state_hash == other.result().state_hash
-
-
-def test_every_example_of_the_catalogue_can_be_held_and_saved() -> None:
-    for name, test in CATALOGUE.items():
-        if test.example is None:
-            continue
-        example = test.example()
-        whole = simulate(example.scene, time_step=example.time_step, steps=12, method=example.method)
-        with start(example.scene, time_step=example.time_step, method=example.method) as run:
-            run.step(5)
-            saved = run.save()
-            run.step(3)
-            run.restore(saved)
-            run.step(7)
-
-            assert whole.state_hash == run.result().state_hash, name
 
 
 def test_a_run_goes_on_from_a_final_state() -> None:

@@ -147,7 +147,8 @@ def test_a_time_limit_holds_inside_a_step(name: str) -> None:
     assert result.status == "timed_out"
     assert result.cpu_seconds < LIMIT + LATE
     assert result.failed_step == result.steps + 1
-    assert program.run(min(result.steps, 2)).steps == min(result.steps, 2)
+    if done := min(result.steps, 2):
+        assert program.run(done).steps == done
 
 
 ENERGY = {"energy": Trace(quantity=Energy())}
@@ -188,7 +189,8 @@ def test_the_clock_runs_while_a_scene_is_compiled(side: int, limit: float) -> No
 
 
 def test_a_held_run_tells_in_time_how_far_it_came() -> None:
-    scene, method = wedged(600, Method(half_step_velocities=True))
+    """Its velocities of the start take .3 s, are found without a limit, and again after it."""
+    scene, method = wedged(300, Method(half_step_velocities=True))
     with start(scene, time_step=TIME_STEP, method=method, observe={"energy": Energy()}) as run:
         began = time.process_time()
         with pytest.raises(SimulationFailed) as failed:

@@ -244,31 +244,6 @@ def test_a_ball_rolls_down_a_slope_with_five_sevenths_of_gravity() -> None:
     assert result["f"][0] == pytest.approx(-2.0 / 7.0 * 2.0 * GRAVITY * math.sin(theta), abs=1e-7)
 
 
-def test_a_conveyor_takes_its_load_along() -> None:
-    """A kinematic belt moves at 1 m/s: the load is pulled by mu g until it moves with the belt."""
-    material = Material(friction=0.25)
-    bodies = (
-        RigidBody(
-            name="belt",
-            position=(0, 0, -0.5),
-            shape=Box((20, 4, 1)),
-            motion="kinematic",
-            velocity=(1.0, 0, 0),
-            material=material,
-        ),
-        RigidBody(name="load", position=(0, 0, 0.5), mass=3.0, shape=Box((1, 1, 1)), material=material),
-    )
-    result = simulate(
-        Scene(bodies=bodies, gravity=(0, 0, -GRAVITY)),
-        time_step=TIME_STEP,
-        duration=2.0,
-        observe={"v": Trace(quantity=Velocity("load"))},
-    )
-
-    assert result["v"][12, 0] == pytest.approx(0.25 * GRAVITY * 12 * TIME_STEP, abs=1e-9)
-    np.testing.assert_allclose(result["v"][-1], (1.0, 0, 0), rtol=0, atol=1e-9)
-
-
 def test_each_contact_in_a_heap_of_balls_obeys_the_law() -> None:
     """Every pair has one contact, so its force and slip can be read from outside: Signorini and Coulomb hold at
     each, and forces explain the motion of every ball.

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
-import pytest
 
 from spook_tracker.engine import (
     Box,
@@ -13,61 +12,16 @@ from spook_tracker.engine import (
     Energy,
     Final,
     Material,
-    Method,
     Position,
     RigidBody,
     Scene,
     Sphere,
     Trace,
     Velocity,
-    compile,
     simulate,
-    start,
 )
 from spook_tracker.scalar_tests import masonry_arch
 from tests.scenes.contact import DOWN, TIME_STEP, cube, ground
-from tests.scenes.corpus import heap
-
-
-@pytest.mark.parametrize("solver", ["direct", "iterative"])
-def test_equal_input_gives_equal_bits(solver: str) -> None:
-    """A program runs again as at first, and as one that is compiled anew."""
-    method = Method(solver=solver)  # type: ignore[arg-type]
-    program = compile(heap(12), time_step=TIME_STEP, method=method)
-    first, *others = (
-        program.run(90),
-        program.run(90),
-        simulate(heap(12), time_step=TIME_STEP, steps=90, method=method),
-    )
-
-    assert first.completed and first.counters["contacts"] > 100
-    assert all((run.state_hash, run.counters) == (first.state_hash, first.counters) for run in others)
-
-
-@pytest.mark.parametrize(
-    "method", [Method(), Method(solver="iterative", iterations=10)], ids=["direct", "sweeps"]
-)
-def test_a_heap_that_goes_back_goes_on_with_the_same_bits(method: Method) -> None:
-    """What earlier solves left in the solvers must not be seen by later ones, or must go back too."""
-    rough = Material(friction=0.5)
-    rng = np.random.default_rng(1)
-    balls = [
-        RigidBody(
-            name=f"ball{k}", mass=1.0, shape=Sphere(0.25), material=rough,
-            position=(0.55 * (k % 3) + rng.uniform(-0.02, 0.02), 0.55 * (k // 3 % 3), 0.5 + 0.55 * (k // 9)),
-        )
-        for k in range(64)
-    ]  # fmt: skip
-    scene = Scene(bodies=(ground(rough), *balls), gravity=DOWN)
-    whole = simulate(scene, time_step=TIME_STEP, steps=50, method=method).state_hash
-    with start(scene, time_step=TIME_STEP, method=method) as run:
-        run.step(25)
-        saved = run.save()
-        run.step(25)
-        assert run.result().state_hash == whole
-        run.restore(saved)
-        run.step(25)
-        assert run.result().state_hash == whole
 
 
 def test_a_tall_stack_at_rest_factors_no_matrix() -> None:
@@ -78,7 +32,7 @@ def test_a_tall_stack_at_rest_factors_no_matrix() -> None:
 
     result = simulate(scene, time_step=TIME_STEP, steps=60)
 
-    assert result.counters["factorisations"] <= 4
+    assert result.completed and result.counters["factorisations"] <= 4
 
 
 def test_loads_that_nothing_decides_send_no_pivoting_in_circles() -> None:

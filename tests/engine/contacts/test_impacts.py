@@ -9,7 +9,6 @@ import pytest
 
 from spook_tracker.engine import (
     WORLD,
-    AngularMomentum,
     AngularVelocity,
     Ball,
     Box,
@@ -95,21 +94,6 @@ def test_an_oblique_hit_without_rebound_comes_along_the_line_of_centres_of_its_m
         )["v"]
 
         assert v == pytest.approx(0.5 * speed * line[0] * line, abs=1e-14 * speed)
-
-
-def test_t12_an_oblique_hit_without_friction_leaves_the_tangent_alone() -> None:
-    offset = 0.1
-    first, second = ball("first", -0.5, 2.0, 1.0, 1.0, y=offset), ball("second", 0.0, 0.0, 1.0, 1.0)
-    observe = {"v": Trace(quantity=Velocity()), "l": Trace(quantity=AngularMomentum())}
-    result = simulate(Scene(bodies=(first, second)), time_step=1e-4, steps=5000, observe=observe)
-    v = result["v"][-1]
-    before = np.array([2.0, 0.0, 0.0])
-    normal = -v[1] / np.linalg.norm(v[1])  # the second ball leaves along the line of centres
-
-    assert normal[1] == pytest.approx(offset / 0.2, abs=1e-3)
-    np.testing.assert_allclose(v[1], (before @ normal) * normal, atol=1e-9)
-    np.testing.assert_allclose(v[0], before - (before @ normal) * normal, atol=1e-9)
-    assert np.abs(result["l"] - result["l"][0]).max() < 1e-12
 
 
 @pytest.mark.parametrize("psi", [0.05, 0.6, 1.0])

@@ -23,6 +23,7 @@ from spook_tracker.engine import (
     RigidBody,
     Scene,
     Sphere,
+    Trace,
     simulate,
     start,
 )
@@ -72,10 +73,10 @@ def test_tall_stacks_on_iterations_are_no_answer(count: int, sweeps: int, sunk: 
         time_step=TIME_STEP,
         steps=60,
         method=Method(solver="iterative", iterations=sweeps),
-        observe={"deep": deep},
+        observe={"deep": deep, "all": Trace(quantity=Penetration())},
     )
 
-    assert result.status == "unsettled"
+    assert result.status == "unsettled" and result["all"].shape == (61,)
     assert result.failed_step is not None and result.failed_step <= 60
     assert result.failed_body is not None and result.failed_body.startswith("box")
     assert result.residual > 0.1 if not sunk else float(result["deep"]) > 0.02 * size / 2

@@ -146,17 +146,6 @@ def test_going_back_in_time_comes_back_to_the_start() -> None:
         assert back[f"{i}"][:3] == pytest.approx([i + 1.0, 0.0, 0.0], abs=1e-10)
 
 
-def test_reading_samples_changes_no_bit() -> None:
-    for scene in (line(4), planet()):
-        method = Method(composition="order4")
-        silent = simulate(scene, time_step=0.01, steps=200, method=method)
-        read = simulate(
-            scene, time_step=0.01, steps=200, method=method, observe={"e": Trace(quantity=Energy())}
-        )
-
-        assert silent.state_hash == read.state_hash
-
-
 def test_a_whip_is_halved_not_lost() -> None:
     """At this step the chain's whip crack has no solution within a stage; the step is done in parts."""
     result = simulate(line(26), time_step=1 / 60, duration=10.0, method=Method(composition="order4"))

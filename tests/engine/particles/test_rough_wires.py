@@ -30,7 +30,6 @@ from spook_tracker.engine import (
     Velocity,
     Wire,
     simulate,
-    start,
 )
 from tests.scenes.coupling import H, Y, masses
 
@@ -196,19 +195,6 @@ def test_a_winch_lifts_with_radius_times_speed_and_stalls_where_its_torque_ends(
     # (m g r − τ)/(m r + I/r) downwards
     sinks = (10.0 * GRAVITY * 0.2 - 15.0) / (10.0 * 0.2 + 0.08 / 0.2)
     assert float(weak["v"][2]) == pytest.approx(-sinks * 1.0, rel=1e-8)
-
-
-def test_a_rough_wire_held_in_pieces_keeps_its_bits() -> None:
-    scene = hung(5.0, 1.0, 2, (0.3, 0.1))
-    whole = simulate(scene, time_step=H, steps=30)
-    with start(scene, time_step=H) as run:
-        run.step(7)
-        kept = run.save()
-        run.step(11)
-        run.restore(kept)
-        run.step(23)
-
-        assert run.result().state_hash == whole.state_hash
 
 
 def test_what_a_scene_or_a_method_cannot_do_with_it_is_refused() -> None:

@@ -244,18 +244,6 @@ def test_compositions_take_it_and_a_spring_of_the_coordinate(
     assert np.log2(np.abs(errors[0] / errors[1])) == pytest.approx(order, abs=0.25)
 
 
-@pytest.mark.parametrize("method", [Method(), HALF, Method(composition="order6")])
-def test_it_goes_on_from_a_snapshot_to_the_bit(method: Method) -> None:
-    with start(pendulum(armature=ROTOR), time_step=0.01, method=method) as run:
-        run.step(20)
-        kept = run.save()
-        run.step(30)
-        there = run.state
-        run.restore(kept)
-        run.step(30)
-        assert all(np.array_equal(run.state[name], there[name]) for name in there)
-
-
 @pytest.mark.parametrize("method", [HALF, Method(composition="order4")])
 def test_a_spring_that_is_set_while_it_runs_pulls_to_where_it_is_set(method: Method) -> None:
     scene = replace(

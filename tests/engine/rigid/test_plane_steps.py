@@ -19,7 +19,6 @@ from spook_tracker.engine import (
     Energy,
     Final,
     Hinge,
-    JointCoordinate,
     Load,
     Lock,
     Method,
@@ -35,7 +34,7 @@ from spook_tracker.engine import (
     Violation,
     simulate,
 )
-from spook_tracker.engine.observe import Observable, Quantity
+from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.multibody import four_bars
 from tests.oracles.rigid import RigidOracle
 from tests.scenes.plane import mechanism
@@ -197,37 +196,6 @@ def test_a_rod_whose_swing_pulls_more_than_a_step_can_follow_is_named() -> None:
 
     assert plane.failure == space.failure and "tension" in plane.failure
     assert (plane.failed_step, plane.failed_body) == (space.failed_step, space.failed_body)
-
-
-@pytest.mark.parametrize("method", [*METHODS.values(), Method(substeps=3)], ids=[*METHODS, "substeps"])
-@pytest.mark.parametrize("make", [lambda: rods(3), four_bar], ids=["rods", "four-bars"])
-def test_observation_changes_no_bit(make: Callable[[], Scene], method: Method) -> None:
-    """Samples of all kinds, stage times, and a run that is held, kept and taken back."""
-    scene = make()
-    first = scene.constraints[0].name
-    seen_now: dict[str, Quantity] = {
-        "energy": Energy(),
-        "v": Velocity(),
-        "force": ConstraintForce(first),
-        "angle": JointCoordinate(first),
-    }
-    observe: dict[str, Observable] = {
-        name: Trace(quantity=what, every=3 if name == "force" else 1) for name, what in seen_now.items()
-    }
-    alone = simulate(scene, time_step=0.01, steps=90, method=method)
-    seen = simulate(scene, time_step=0.01, steps=90, method=method, observe=observe)
-    timed = engine.compile(scene, time_step=0.01, method=method).run(90, time_stages=True)
-    with engine.start(scene, time_step=0.01, method=method, observe=seen_now) as held:
-        held.step(41)
-        snapshot = held.save()
-        held.step(7)
-        held.restore(snapshot)
-        held.step(49)
-        assert np.array_equal(held["v"], seen["v"][-1])
-        assert np.array_equal(held["force"], seen["force"][-1])
-        states = [held.result().state_hash, seen.state_hash, timed.state_hash]
-
-    assert states == [alone.state_hash] * 3
 
 
 def test_joint_forces_and_energy_are_those_of_space() -> None:

@@ -12,7 +12,9 @@ from spook_tracker.engine import (
     Box,
     Fluid,
     Hinge,
+    Limit,
     Load,
+    Lock,
     Material,
     Motor,
     Particle,
@@ -74,6 +76,14 @@ def grained(across: float) -> Material:
 
 
 PLAIN = joined(AXLE, DRUM)
+CONTACT = ("collision", "impact", "pivot", "friction", "tangents")
+APART = (
+    joined(bodies=(body(shape=Sphere(1.0)),)),
+    joined(bodies=(*on_floor().bodies[:1], body())),
+    replace(on_floor(), contacts=False),
+    replace(on_floor(), no_contact=(("body", "floor"),)),
+    replace(on_floor(), constraints=(Lock(name="lock", between=("floor", "body")),)),
+)
 STAGES: list[tuple[str, Scene, bool, str]] = [
     ("couple_joints", PLAIN, False, "there are no relations between joints"),
     ("couple_joints", joined(AXLE, DRUM, Relation(name="gear", terms=(("axle", 1.0), ("drum axle", 2.0)))), True, ""),
@@ -92,6 +102,16 @@ STAGES: list[tuple[str, Scene, bool, str]] = [
     ("pivot", joined(replace(AXLE, friction=1.0)), True, ""),
     ("solve_block", joined(replace(AXLE, friction=1.0)), False, ""),
     ("solve_block", PLAIN, True, ""),
+    *((stage, scene, False, "") for stage in CONTACT for scene in APART),
+    *((stage, on_floor(), True, "") for stage in CONTACT),
+    *((stage, on_floor(Material(), Material()), stage in CONTACT[:3], "") for stage in CONTACT),
+    *(
+        (stage, joined(replace(AXLE, **drive)), (stage == "pivot") == bounded, "") for stage in ("pivot", "solve_block")
+        for drive, bounded in (
+            ({"motor": Motor(speed=1.0)}, False), ({"motor": Motor(speed=1.0, max_force=2.0)}, True),
+            ({"limit": Limit(lower=-1.0, upper=1.0)}, True),
+        )
+    ),
     ("roll_tyres", PLAIN, False, "there are no tyres"),
     ("roll_tyres", joined(TYRE), True, ""),
     ("follow_time", joined(replace(AXLE, motor=Motor(speed=1.0))), False, ""),

@@ -7,24 +7,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spook_tracker import engine
 from spook_tracker.engine import (
     PLAIN,
     WORLD,
     Distance,
     Final,
     Hinge,
-    Limit,
-    Lock,
-    Material,
     Method,
-    Motor,
     Particle,
-    Plane,
     Position,
     RigidBody,
     Scene,
-    Sphere,
     simulate,
 )
 from spook_tracker.scalar_tests import cornering
@@ -41,52 +34,6 @@ def body(name: str = "body", **changes: object) -> RigidBody:
 
 def hinge(name: str, **changes: object) -> Hinge:
     return Hinge(name=name, between=(WORLD, "body"), compliance=0.0, **changes)  # type: ignore[arg-type]
-
-
-def kept(scene: Scene, **options: object) -> tuple[str, ...]:
-    return engine.compile(scene, time_step=TIME_STEP, method=Method(**options)).stages  # type: ignore[arg-type]
-
-
-def test_a_free_body_only_moves_and_turns() -> None:
-    assert kept(Scene(bodies=(body(),))) == ("integrate_positions", "integrate_rotations")
-
-
-def test_bilateral_joints_need_one_factorisation_and_no_pivoting() -> None:
-    scene = Scene(bodies=(body(),), constraints=(hinge("hinge", motor=Motor(speed=1.0)),))
-
-    assert kept(scene) == ("assemble_rows", "solve_block", "integrate_positions", "integrate_rotations")
-
-
-@pytest.mark.parametrize(
-    "bound", [{"motor": Motor(speed=1.0, max_force=2.0)}, {"limit": Limit(lower=-1.0, upper=1.0)}]
-)
-def test_a_bound_on_a_joint_needs_pivoting(bound: dict[str, object]) -> None:
-    scene = Scene(bodies=(body(),), constraints=(hinge("hinge", **bound),))
-
-    assert "pivot" in kept(scene)
-    assert "solve_block" not in kept(scene)
-
-
-def test_surfaces_that_may_touch_bring_collision_impact_and_pivoting_and_friction_only_if_they_rub() -> None:
-    def scene(mu: float) -> Scene:
-        material = Material(friction=mu)
-        ground = RigidBody(
-            name="ground", motion="static", shape=Plane(), position=(0, 0, -2), material=material
-        )
-        return Scene(bodies=(ground, body(shape=Sphere(1.0), material=material)), gravity=GRAVITY)
-
-    assert {"collision", "impact", "pivot"} <= set(kept(scene(0.0)))
-    assert {"tangents", "friction"}.isdisjoint(kept(scene(0.0)))
-    assert {"tangents", "friction"} <= set(kept(scene(0.5)))
-
-
-def test_every_stage_has_its_reason() -> None:
-    scene = Scene(bodies=(body(),), constraints=(Lock(name="lock", between=(WORLD, "body")),))
-
-    choices = engine.explain(scene, time_step=TIME_STEP)
-
-    assert len(choices) == 34
-    assert all(choice.reason for choice in choices)
 
 
 @pytest.mark.parametrize("stages", [("collision",), ("rotation",), ("collision", "rotation")])

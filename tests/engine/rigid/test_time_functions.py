@@ -143,21 +143,6 @@ def test_a_kinematic_body_goes_as_the_middle_of_each_step_says(name: str) -> Non
     np.testing.assert_allclose(seen[:, 1], right, rtol=0, atol=1e-12)
 
 
-def test_a_shaken_floor_carries_what_hangs_on_it() -> None:
-    """x'' = −(k/m)(x − s(t)): steady amplitude s0 w0²/(w0² − w²) of the driven oscillator, by the plain force."""
-    scene = slider(motor=Motor(speed=Sinusoid(amplitude=1.0, frequency=1.0)))
-    with start(scene, time_step=H) as run:
-        run.step(37)
-        saved = run.save()
-        run.step(40)
-        hash_of_once = run.result().state_hash
-        run.restore(saved)
-        run.step(40)
-
-        assert run.result().state_hash == hash_of_once
-    assert simulate(scene, time_step=H, steps=77).state_hash == hash_of_once
-
-
 def test_compositions_and_settings_from_outside_do_not_follow_the_time() -> None:
     push = Load(name="push", body="block", force=(1, 0, 0), factor=WAVE)
     with pytest.raises(MethodError, match="'push' does not follow"):

@@ -34,7 +34,6 @@ from spook_tracker.engine import (
     Tyre,
     Velocity,
     simulate,
-    start,
 )
 from spook_tracker.engine.protocol import Capabilities, unsupported
 from spook_tracker.engine.theory import one_row_matrix
@@ -209,19 +208,6 @@ def test_a_road_that_moves_takes_the_wheel_along() -> None:
     share = SPIN / RADIUS**2
     assert float(result["v"][0]) == pytest.approx((MASS * 2.0 + share * 5.0) / (MASS + share), rel=1e-9)
     assert RADIUS * float(result["w"][1]) == pytest.approx(float(result["v"][0]) - 5.0, rel=1e-9)
-
-
-def test_a_wheel_held_in_pieces_keeps_its_bits() -> None:
-    scene = wheel((10.0, 1.0, 0.0), friction=(0.9, 0.5))
-    whole = simulate(scene, time_step=H, steps=30)
-    with start(scene, time_step=H) as run:
-        run.step(7)
-        kept = run.save()
-        run.step(11)
-        run.restore(kept)
-        run.step(23)
-
-        assert run.result().state_hash == whole.state_hash
 
 
 def test_it_is_named_where_an_engine_lacks_it() -> None:
