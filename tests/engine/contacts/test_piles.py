@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from spook_tracker.engine import (
-    Box,
     Final,
-    Maximum,
     Method,
     Penetration,
     Plane,
@@ -25,19 +21,6 @@ from spook_tracker.engine.bodies import Material
 from spook_tracker.scalar_tests import falling_pile, pile
 
 STEP = 1.0 / 60.0
-
-
-def test_a_pile_whose_iterations_converge_does_not_overlap() -> None:
-    """Every pair that is pushed together has its rows in the same solve: none sinks in, from the drop to rest."""
-    result = simulate(
-        pile.scene(40),
-        time_step=STEP,
-        steps=120,
-        method=Method(solver="iterative", iterations=20_000, residual_tolerance=1e-9),
-        observe={"depth": Maximum(quantity=Penetration())},
-    )
-    assert result.completed
-    assert result["depth"] < 1e-8
 
 
 @pytest.mark.parametrize("sweeps", [1, 5])
@@ -59,21 +42,6 @@ def test_every_step_of_the_nightly_pile_settles() -> None:
     )
     assert result.completed, result.failure
     assert result["depth"] < 1e-3
-
-
-def test_a_heap_of_boxes_by_few_iterations_sinks_in_no_further_than_a_residual_leads() -> None:
-    """Ten layers: sweeps leave up to .1 m/s of a speed, and that leads so far in a step. Parted once they sank by .2 m."""
-    heap = pile.scene(300)
-    boxes = tuple(replace(body, shape=Box((0.5, 0.5, 0.5))) for body in heap.bodies[1:])
-    result = simulate(
-        replace(heap, bodies=(heap.bodies[0], *boxes)),
-        time_step=STEP,
-        steps=240,
-        method=Method(solver="iterative", iterations=20),
-        observe={"depth": Maximum(quantity=Penetration())},
-    )
-    assert result.completed, result.failure
-    assert result["depth"] < 0.1 * STEP
 
 
 def test_a_ball_that_passes_a_pile_keeps_every_bit_of_its_velocity() -> None:
