@@ -113,18 +113,15 @@ class ComposedOracle(RigidOracle):
 
 
 class TreeOracle(ComposedOracle):
-    """With the turn φ whose discrete momentum is that of the body, by Newton from the free one's."""
+    """With the turn φ whose discrete momentum is that of the body, by Newton from a turn at the rate it has."""
 
     def _turn(self, body: int) -> None:
         h, moments = self.h, self.inertia[body]
         p = rotation(self.q[body]).T @ self.ell[body]
-        turn = free_turn(moments, h, p)
-        for _ in range(30):
-            wrong = p - momentum_of_turn(moments, h, turn)
-            if np.abs(wrong).max() <= 4e-16 * np.abs(p).max():
-                break
-            change = h * wrong / moments
-            turn = product(turn, np.concatenate([[1.0], 0.5 * change]))
+        turn, left = np.array([1.0, *(0.5 * h * p / moments)]), np.inf
+        turn /= np.linalg.norm(turn)
+        while (off := np.abs(wrong := p - momentum_of_turn(moments, h, turn)).max()) < 0.5 * left:
+            turn, left = product(turn, np.array([1.0, *(0.5 * h * wrong / moments)])), off
             turn /= np.linalg.norm(turn)
         q = product(self.q[body], turn)
         self.q[body] = q / np.linalg.norm(q)

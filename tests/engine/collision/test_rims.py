@@ -1,8 +1,7 @@
-"""Cylinders and cones against all that is bounded: depths against a search over directions, rest, tipping, and cones."""
+"""Cylinders and cones against all that is bounded: rest, tipping, and cones; a search over directions for all shapes."""
 
 from __future__ import annotations
 
-import itertools
 import math
 from typing import Any
 
@@ -51,8 +50,6 @@ SHAPES: dict[str, Shape] = {
     "cone": Cone(0.4, 0.9),
     "hat": Cone(0.8, 0.2),
 }
-RIMMED = ("can", "coin", "cone", "hat")
-PAIRS = [(a, b) for a, b in itertools.product(SHAPES, RIMMED) if a not in RIMMED or a <= b]
 
 
 def fixed(shape: Shape, **fields: Any) -> RigidBody:
@@ -142,41 +139,6 @@ def gap(first: Shape, turn: Any, place: Any, second: Shape | Any, other: Any) ->
     # Whatever may still become the best is climbed to the end, from a small simplex again.
     near = [climb(normal, 1e-3, 1e-7) for value, normal in rough if value > best - 5e-3]
     return max(near, key=lambda found: found[0])
-
-
-@pytest.mark.parametrize(("first", "second"), PAIRS)
-def test_its_depth_is_that_of_a_search_over_all_directions(first: str, second: str) -> None:
-    """At two random poses: apart, moved together along the connection until they overlap by 1 mm; and deep in each other.
-
-    A face is preferred where it is within 1e-5 of the thickness, .8 m at most.
-    """
-    rng = np.random.default_rng(hash_of(first, second))
-    one, two = SHAPES[first], SHAPES[second]
-    for deep in (False, True):
-        turn, other = Rotation.random(rng=rng), Rotation.random(rng=rng)
-        away = rng.standard_normal(3)
-        away /= np.linalg.norm(away)
-        reach = farthest(one, -away @ turn.as_matrix()) + farthest(two, away @ other.as_matrix())
-        place = (0.5 if deep else 1.2) * reach * away
-        expected, normal = gap(one, turn.as_matrix(), place, two, other.as_matrix())
-        if not deep:
-            place = place - (expected + 1e-3) * normal
-            expected, _ = gap(one, turn.as_matrix(), place, two, other.as_matrix())
-            assert -1.000001e-3 < expected < -5e-4  # or less along another direction
-        moving = body(one, position=tuple(place), orientation=quaternion(turn))
-        found = run(
-            fixed(two, orientation=quaternion(other)),
-            moving,
-            steps=1,
-            gravity=(0, 0, 0),
-            depth=Maximum(quantity=Penetration()),
-        )
-
-        assert float(found["depth"]) == pytest.approx(max(0.0, -expected), abs=1e-5)
-
-
-def hash_of(first: str, second: str) -> int:
-    return 8 * list(SHAPES).index(first) + list(SHAPES).index(second)
 
 
 # --- rest -----------------------------------------------------------------------------------------------
@@ -329,11 +291,11 @@ def test_a_can_set_down_leaning_comes_to_rest_without_trembling(lean: float) -> 
 
 
 @pytest.mark.parametrize("speed", [20.0, 300.0])
-@pytest.mark.parametrize("second", RIMMED)
+@pytest.mark.parametrize("second", ["can", "coin", "cone", "hat"])
 @pytest.mark.parametrize("first", ["ball", "box", "coin"])
 def test_nothing_flies_through_it(first: str, second: str, speed: float) -> None:
     """Towards its middle at up to 5 m a step, from any side."""
-    rng = np.random.default_rng(hash_of(first, second))
+    rng = np.random.default_rng(8 * list(SHAPES).index(first) + list(SHAPES).index(second))
     away = rng.standard_normal(3)
     away /= np.linalg.norm(away)
     moving = body(

@@ -23,6 +23,13 @@ from spook_tracker.engine import (
 from spook_tracker.engine.result import Array
 from spook_tracker.scalar_tests import falling_pile
 
+TURNED = np.array(
+    [
+        [[0, 0, 0], [0, 0, 1], [0, -1, 0]],
+        [[0, 0, -1], [0, 0, 0], [1, 0, 0]],
+        [[0, 1, 0], [-1, 0, 0], [0, 0, 0]],
+    ]
+)
 CORNERS = np.array(list(product((-0.5, 0.5), repeat=3)))
 LEFT_BY_SWEEPS = 1e-3  # of a body's radius: a residual of 20 mm/s over a step
 
@@ -41,8 +48,10 @@ def axes_of(turn: Array) -> Array:
 
 def boxes_overlap(place: Array, axes: Array, other_place: Array, other_axes: Array) -> float:
     """The least overlap of two boxes' shadows on the normals of faces and pairs of edges [m]; negative if apart."""
-    edges = np.cross(axes.T[:, None], other_axes.T[None]).reshape(-1, 3)
-    lengths = np.linalg.norm(edges, axis=1)
+    edges = (
+        (axes.T @ TURNED @ other_axes).transpose(1, 2, 0).reshape(-1, 3)
+    )  # of each pair, the cross product
+    lengths = np.sqrt((edges * edges).sum(axis=1))
     normals = np.vstack([axes.T, other_axes.T, edges[lengths > 1e-6] / lengths[lengths > 1e-6, None]])
     size = np.array(falling_pile.EDGES)
     one = normals @ (place[:, None] + axes @ (CORNERS * size).T)
@@ -96,8 +105,9 @@ def overlaps(
             k: 0.5 * falling_pile.REACH * turned[k] ** 2 * isinstance(shape, Box)
             for k, shape in shapes.items()
         }
+        apart = np.linalg.norm(x[:, None] - x, axis=2)
         for i, j in combinations(at, 2):
-            if np.linalg.norm(x[i] - x[j]) > 2.0 * falling_pile.REACH:
+            if apart[i, j] > 2.0 * falling_pile.REACH:
                 continue
             depth = overlap(at[i], at[j])
             deepest, unexplained = max(deepest, depth), max(unexplained, depth - aside[i] - aside[j])

@@ -14,7 +14,6 @@ from spook_tracker.engine import (
     ConstraintForce,
     ContactCount,
     ContactForce,
-    Cylinder,
     Final,
     Hinge,
     Material,
@@ -31,7 +30,6 @@ from spook_tracker.engine import (
     Velocity,
 )
 from spook_tracker.engine.find import EngineMissing, find
-from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.scalar_tests import resting_stack
 from spook_tracker.scalar_tests.inclined_plane.scene import scene as inclined
 
@@ -116,12 +114,6 @@ def test_a_motor_that_lifts_shows_what_it_gives(kind: Any, place: int) -> None:
     expected = np.zeros(6)
     expected[place] = 4.0
     assert run["f"] == pytest.approx(expected, abs=1e-3)
-
-
-def test_what_it_has_not_is_not_supported_by_name() -> None:
-    log = RigidBody(name="log", mass=1.0, shape=Cylinder(0.5, 1.0), position=(0.0, 0.0, 0.5))
-    with pytest.raises(NotSupported, match=r"^box3d \(many-substeps\) does not support the shape cylinder$"):
-        BOX3D.simulate(Scene(bodies=(GROUND, log)), time_step=STEP, duration=1.0)
 
 
 def test_particles_fly_and_the_same_run_twice_is_the_same() -> None:

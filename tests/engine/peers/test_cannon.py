@@ -8,22 +8,17 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import (
-    Box,
     ConstraintForce,
     Distance,
-    Material,
     MaximumAbsolute,
     Particle,
-    Plane,
     Position,
-    RigidBody,
     Scene,
     Trace,
     Violation,
     simulate,
 )
 from spook_tracker.engine.find import EngineMissing, find
-from spook_tracker.engine.protocol import NotSupported
 
 try:
     CANNON = find("cannon")
@@ -78,21 +73,3 @@ def test_the_tension_of_a_rod_is_that_of_the_method() -> None:
 
     assert ours.max() > 2.9 * 9.81, "three times the weight at the bottom, less what the method loses"
     assert np.abs(ours - theirs).max() < 1e-8
-
-
-def test_what_it_lacks_is_not_supported_by_name_before_anything_runs() -> None:
-    box = RigidBody(
-        name="box",
-        mass=1.0,
-        shape=Box((1.0, 1.0, 1.0)),
-        material=Material(restitution=0.5),
-        position=(0, 0, 2),
-    )
-    ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
-    with pytest.raises(NotSupported, match="restitution"):
-        CANNON.simulate(Scene(bodies=(box, ground), gravity=GRAVITY), time_step=STEP, steps=1)
-    rod = Distance(
-        name="rod", between=((0.0, 0.0, 3.0), "box"), anchors=((0, 0, 0), (0.5, 0.0, 0.0)), compliance=0.0
-    )
-    with pytest.raises(NotSupported, match="beside a centre of mass"):
-        CANNON.simulate(Scene(bodies=(box,), constraints=(rod,), gravity=GRAVITY), time_step=STEP, steps=1)

@@ -11,11 +11,13 @@ import pytest
 from spook_tracker.engine import (
     AngularVelocity,
     Box,
+    CentralGravity,
     Compound,
     Distance,
     Final,
     Hinge,
     JointCoordinate,
+    Load,
     Material,
     Motor,
     Part,
@@ -28,6 +30,7 @@ from spook_tracker.engine import (
     Scene,
     Sphere,
     Spring,
+    Trace,
     Velocity,
 )
 from tests.engine.peers.test_conformance import (
@@ -43,11 +46,13 @@ from tests.engine.peers.test_conformance import (
     MUJOCO,
     MUJOCO_AS_IT_COMES,
     MUJOCO_IMPLICIT,
+    P2,
     P2_AS_IT_COMES,
     RAPIER,
     RAPIER_JS,
     RAPIER_JS_AS_IT_COMES,
     RAPIER_MANY,
+    RK3,
     SAP,
     TGS,
     Asked,
@@ -286,3 +291,46 @@ def test_equal_runs_are_equal(asked: Asked, owed: float) -> None:
 
     assert abs(one["place"][0]) < owed
     assert one.state_hash == two.state_hash
+
+
+@rows(
+    {
+        DART: (1e-3, 1e-6, 1e-3),
+        BULLET: (1e-3, 1e-6, 1e-3),
+        SAP: (1e-3, 1e-6, 1e-3),
+        RK3: (1e-9, 1e-6, 1e-3),
+        MERSON: (1e-8, 1e-9, 1e-8),
+        JOLT: (1e-3, 1e-5, 2e-3),
+        **dict.fromkeys((CANNON, P2), (1e-3, 1e-9, None)),
+        BOX: (2e-3, 1e-5, 2e-3),
+        RAPIER: (2e-3, 1e-5, 2e-3),
+        RAPIER_JS_AS_IT_COMES: (2e-3, 1e-5, 2e-3),
+    }
+)
+def test_forces_act_at_every_step(asked: Asked, owed: tuple[float, float, float | None]) -> None:
+    """A circular orbit stays one, a load of twice the weight lifts, and a spring swings by its cosine."""
+    simulate, (round_, lift, swing) = engine(asked), owed
+    moon = Particle(name="moon", mass=3.0, position=(2.0, 0.0, 0.0), velocity=(0.0, math.sqrt(0.5), 0.0))
+    orbit = Scene(bodies=(moon,), forces=(CentralGravity(name="pull", strength=1.0),))
+    path = {"path": Trace(quantity=Position("moon"))}
+    found = simulate(orbit, time_step=0.001, duration=5.0, observe=path)
+    assert np.abs(np.linalg.norm(found["path"], axis=1) - 2.0).max() < round_
+
+    box = RigidBody(name="box", mass=2.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 0.0, 0.0))
+    lifted = Scene(
+        bodies=(box,),
+        forces=(Load(name="lift", body="box", force=(0.0, 0.0, 4.0 * G)),),
+        gravity=peer_scenes.GRAVITY,
+    )
+    speed = {"speed": Final(quantity=Velocity("box"))}
+    found = simulate(lifted, time_step=0.01, steps=100, observe=speed)
+    assert found["speed"][2] == pytest.approx(G, rel=lift)
+
+    if swing is not None:
+        weight = Particle(name="weight", mass=3.0, position=(2.0, 0.0, 0.0))
+        spring = Spring(name="spring", between=((0.0, 0.0, 0.0), "weight"), stiffness=30.0, rest_length=1.0)
+        end = {"end": Final(quantity=Position("weight"))}
+        found = simulate(
+            Scene(bodies=(weight,), forces=(spring,)), time_step=0.001, duration=1.0, observe=end
+        )
+        assert found["end"][0] == pytest.approx(1.0 + math.cos(math.sqrt(10.0)), abs=swing)

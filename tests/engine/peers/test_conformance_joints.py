@@ -133,3 +133,17 @@ def test_locks_that_are_merged_hold_a_long_beam_and_those_that_are_iterated_let_
     asked: Asked, owed: tuple[float, float]
 ) -> None:
     assert owed[0] < peer_scenes.sag(engine(asked)) < owed[1]
+
+
+@rows({JOLT: (2.0, 1e-4, 20.0), BULLET_LOOSE: (1.0, 1e-6, 15.0)})
+def test_the_hinges_of_a_door_carry_uneven_loads(asked: Asked, owed: tuple[float, float, float]) -> None:
+    """Two hinges bear 149 N each, sideways; of ten the first bears far more than the last: all of the weight together."""
+    seconds, close, apart = owed
+    for hinges in (2, 10):
+        forces = {f"{k}": Final(quantity=ConstraintForce(f"{k}")) for k in range(hinges)}
+        found = engine(asked)(peer_scenes.door(hinges), time_step=1 / 60, duration=seconds, observe=forces)
+        loads = np.array([found[f"{k}"][:3] for k in range(hinges)])
+
+        assert loads[:, 2].sum() == pytest.approx(45.0 * 9.81, rel=close)
+        if hinges == 10:
+            assert abs(abs(loads[0, 0]) - abs(loads[9, 0])) > apart

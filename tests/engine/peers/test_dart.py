@@ -8,9 +8,6 @@ from typing import Any
 import pytest
 
 from spook_tracker.engine import (
-    Ball,
-    ConstraintForce,
-    Final,
     Scene,
 )
 from spook_tracker.engine.find import find
@@ -40,12 +37,6 @@ def test_semi_implicit_euler_blows_up_on_a_chain_and_says_so(time_step: float) -
 def test_a_long_beam_holds_better_than_in_engines_of_impulses() -> None:
     """Half a second of thirty boxes: free fall is 1.2 m, a direct method leaves millimetres."""
     assert 1e-9 < peer_scenes.sag(run("constraints"), count=30) < 0.02
-
-
-def test_forces_of_joints_that_rows_hold_are_not_told() -> None:
-    force = {"force": Final(quantity=ConstraintForce("joint"))}
-    with pytest.raises(NotSupported, match="where contacts or loops act"):
-        run("constraints")(peer_scenes.hung(Ball), time_step=STEP, steps=1, observe=force)
 
 
 def test_more_contacts_than_it_takes_in_a_step_are_not_supported() -> None:

@@ -8,16 +8,13 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import (
-    ConstraintForce,
     Distance,
-    Final,
     Particle,
     Position,
     Scene,
     Trace,
 )
 from spook_tracker.engine.find import find
-from spook_tracker.engine.protocol import NotSupported
 from tests.scenes import peer as peer_scenes
 
 pytest.importorskip("pydrake", reason="the extra drake is not installed: pip install 'spook-tracker[drake]'")
@@ -47,12 +44,6 @@ def test_a_rod_is_a_hinge_in_joint_coordinates_and_yields_as_a_constraint() -> N
     held = run("constraints")(short, time_step=STEP, duration=3.0, observe=end)
     stretch = np.abs(np.linalg.norm(held["path"], axis=1) - 1.0).max()
     assert 0.004 < stretch < 0.006
-
-
-def test_the_tension_of_a_rod_that_rows_hold_is_not_told() -> None:
-    pull = {"pull": Final(quantity=ConstraintForce("rod"))}
-    with pytest.raises(NotSupported, match="only those of joints"):
-        run("constraints")(peer_scenes.pendulum(), time_step=STEP, steps=1, observe=pull)
 
 
 def test_speeds_at_the_start_are_those_of_the_scene() -> None:

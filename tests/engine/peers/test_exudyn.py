@@ -4,30 +4,21 @@ from __future__ import annotations
 
 import time
 import warnings
-from dataclasses import replace
 from typing import Any
 
-import numpy as np
 import pytest
 
 from spook_tracker.engine import (
-    ConstraintForce,
     Distance,
-    Final,
     Hinge,
-    Lock,
     MaximumAbsolute,
     Particle,
-    Position,
     RigidBody,
     Scene,
     SimulationFailed,
-    Trace,
     Violation,
 )
-from spook_tracker.engine import simulate as ours
 from spook_tracker.engine.find import find
-from tests.scenes import rigid as rigid_scenes
 
 with warnings.catch_warnings():
     warnings.simplefilter("ignore")  # it warns when it is imported, and warnings are errors here
@@ -54,17 +45,6 @@ def test_a_rod_is_kept_on_position_level_and_drifts_on_velocity_level() -> None:
     assert float(loose["length"]) == pytest.approx(6.8e-4, rel=0.05)
 
 
-def test_the_tension_of_a_rod_at_rest_is_the_weight() -> None:
-    weight = Particle(name="weight", mass=2.0, position=(0.0, 0.0, -1.0))
-    rod = Distance(name="rod", between=((0.0, 0.0, 0.0), "weight"), compliance=0.0)
-    scene = Scene(bodies=(weight,), constraints=(rod,), gravity=GRAVITY)
-    observe = {"pull": Final(quantity=ConstraintForce("rod"))}
-
-    result = simulate(scene, "trapezoidal", time_step=0.01, duration=1.0, observe=observe)
-
-    assert float(result["pull"]) == pytest.approx(19.62, rel=1e-6)
-
-
 def test_its_time_limit_ends_it_within_its_own_loop(capfd: pytest.CaptureFixture[str]) -> None:
     weight = Particle(name="weight", mass=1.0, position=(1.0, 0.0, 0.0))
     rod = Distance(name="rod", between=((0.0, 0.0, 0.0), "weight"), compliance=0.0)
@@ -77,29 +57,6 @@ def test_its_time_limit_ends_it_within_its_own_loop(capfd: pytest.CaptureFixture
     assert failed.value.result.status == "timed_out"
     assert time.monotonic() - began < 20.0  # the whole takes minutes
     assert "FAILED" not in "".join(capfd.readouterr())
-
-
-@pytest.mark.parametrize("kind", ["ball", "hinge", "lock", "prismatic"])
-def test_joints_move_as_in_our_engine(kind: str) -> None:
-    """One body on a joint of the world, from rest: both converge to one motion."""
-    drawn = rigid_scenes.one_joint(np.random.default_rng(7), kind, bodies=1)
-    joint = drawn.constraints[0]
-    names = [name for name in ("name", "between", "at", "axis") if hasattr(joint, name)]
-    rigid = type(joint)(**{name: getattr(joint, name) for name in names}, compliance=0.0)
-    still = tuple(
-        replace(b, velocity=(0.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, 0.0))
-        for b in drawn.bodies
-        if isinstance(b, RigidBody)
-    )
-    scene = Scene(bodies=still, constraints=(rigid,), gravity=rigid_scenes.GRAVITY)
-    observe = {"path": Trace(quantity=Position(), every=500)}
-
-    theirs = simulate(scene, "generalised-alpha", time_step=1e-3, duration=0.5, observe=observe)
-    mine = ours(scene, time_step=1e-3, duration=0.5, observe=observe)
-
-    moved = float(np.abs(mine["path"][-1] - mine["path"][0]).max())
-    assert theirs["path"][-1] == pytest.approx(mine["path"][-1], abs=0.01 * moved + 1e-12)
-    assert moved > 5e-4 or isinstance(rigid, Lock)
 
 
 def test_redundant_hinges_are_an_outcome_with_its_reason() -> None:

@@ -5,14 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from spook_tracker.engine import (
     Ball,
-    ConstraintForce,
-    ContactForce,
-    Final,
     Hinge,
     Penetration,
     RigidBody,
@@ -20,7 +16,6 @@ from spook_tracker.engine import (
     Trace,
 )
 from spook_tracker.engine.find import EngineMissing, find
-from spook_tracker.engine.protocol import NotSupported
 from tests.scenes import peer as peer_scenes
 
 try:
@@ -63,22 +58,6 @@ def test_the_depth_is_that_of_the_deepest_contact() -> None:
 
     assert run["depth"][1] == pytest.approx(0.04, abs=1e-6)
     assert run["depth"][5] < run["depth"][1]
-
-
-def test_the_hinges_of_a_door_carry_uneven_loads() -> None:
-    """Ten hinges: all of the weight together, but the top one bears far more than the last, sideways."""
-    forces = {f"{k}": Final(quantity=ConstraintForce(f"{k}")) for k in range(10)}
-    run = JOLT.simulate(peer_scenes.door(10), time_step=STEP, duration=2.0, observe=forces)
-    loads = np.array([run[f"{k}"][:3] for k in range(10)])
-
-    assert loads[:, 2].sum() == pytest.approx(45.0 * 9.81, rel=1e-4)
-    assert abs(abs(loads[0, 0]) - abs(loads[9, 0])) > 20.0
-
-
-def test_what_it_lacks_is_not_supported_by_name() -> None:
-    force = {"force": Final(quantity=ContactForce("box"))}
-    with pytest.raises(NotSupported, match="the observable contact force"):
-        JOLT.simulate(peer_scenes.box_on_ground(0.0), time_step=STEP, steps=1, observe=force)
 
 
 def test_where_the_package_shows_no_fixed_body_one_of_ours_holds_the_same(

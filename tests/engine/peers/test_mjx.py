@@ -6,9 +6,8 @@ from functools import partial
 
 import pytest
 
-from spook_tracker.engine import CentralGravity, Final, Particle, Plane, Position, RigidBody, Scene, Sphere
+from spook_tracker.engine import Final, Plane, Position, RigidBody, Scene, Sphere
 from spook_tracker.engine.find import find
-from spook_tracker.engine.protocol import NotSupported
 from tests.scenes import peer as peer_scenes
 
 pytest.importorskip("mujoco.mjx", reason="the extra mjx is not installed: pip install 'spook-tracker[mjx]'")
@@ -22,13 +21,6 @@ def test_a_pendulum_gains_what_mujoco_s_gains_and_keeps_its_length(configuration
 
     assert length < 1e-12
     assert energy == pytest.approx(theirs[1], rel=1e-6, abs=1e-13)
-
-
-def test_what_our_adapter_cannot_ask_is_refused_before_anything_compiles() -> None:
-    ball = Particle(name="ball", mass=1.0, position=(1.0, 0.0, 0.0))
-    pulled = Scene(bodies=(ball,), forces=(CentralGravity(name="sun", centre=(0.0, 0.0, 0.0), strength=1.0),))
-    with pytest.raises(NotSupported, match="our adapter cannot ask mjx for the force central gravity"):
-        find("mjx").simulate(pulled, time_step=0.01, steps=1)
 
 
 def test_a_box_slides_as_mujoco_s_but_for_its_own_points_of_contact() -> None:

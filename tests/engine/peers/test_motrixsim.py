@@ -12,18 +12,15 @@ from spook_tracker.engine import (
     AngularVelocity,
     Ball,
     ContactCount,
-    Distance,
     Final,
     Hinge,
     Load,
     Lock,
-    Particle,
     Position,
     RigidBody,
     Scene,
 )
 from spook_tracker.engine.find import find
-from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.scalar_tests import rolling_friction
 from tests.scenes import peer as peer_scenes
 
@@ -89,18 +86,3 @@ def test_a_load_pushes_and_turns() -> None:
 
     np.testing.assert_allclose(found["x"], (1.5, 2.0, 3.0), atol=1e-3)  # half a time step late
     np.testing.assert_allclose(found["w"], (0.0, 0.0, 2.0), atol=1e-3)
-
-
-def test_what_it_passes_over_in_a_file_refuses_the_scene() -> None:
-    """A rod that closes a loop is a tendon in MuJoCo's format: it would be left out, with a line in a log."""
-    ball = Particle(name="ball", mass=1.0, position=(1.0, 0.0, 0.0))
-    rods = tuple(
-        Distance(name=name, between=(point, "ball"), compliance=0.0)
-        for name, point in (("one", (0.0, 0.0, 0.0)), ("two", (0.0, 1.0, 0.0)))
-    )
-    with pytest.raises(NotSupported, match="motrixsim does not know site, spatial, tendon of MJCF"):
-        run("defaults")(Scene(bodies=(ball,), constraints=rods), time_step=0.01, steps=1)
-    bouncing = peer_scenes.box_on_ground(0.0).bodies[1]
-    assert isinstance(bouncing, RigidBody)
-    with pytest.raises(NotSupported, match="restitution"):
-        peer_scenes.bounced(run("defaults"), 0.5, 1 / 240)

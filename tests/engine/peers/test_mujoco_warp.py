@@ -10,17 +10,14 @@ import pytest
 
 from spook_tracker.engine import (
     Ball,
-    CentralGravity,
     Cylinder,
     Final,
     Hinge,
     Lock,
-    Particle,
     Penetration,
     Scene,
 )
 from spook_tracker.engine.find import find
-from spook_tracker.engine.protocol import NotSupported
 from tests.scenes import peer as peer_scenes
 
 pytest.importorskip(
@@ -59,15 +56,6 @@ def test_a_box_shows_how_deep_it_lies() -> None:
     deep = {"d": Final(quantity=Penetration())}
     found = run("defaults")(peer_scenes.box_on_ground(0.0), time_step=1 / 60, duration=1.0, observe=deep)
     assert 1e-5 < found["d"] < 1e-3
-
-
-def test_what_our_adapter_cannot_ask_is_refused_before_anything_compiles() -> None:
-    ball = Particle(name="ball", mass=1.0, position=(1.0, 0.0, 0.0))
-    pulled = Scene(bodies=(ball,), forces=(CentralGravity(name="sun", centre=(0.0, 0.0, 0.0), strength=1.0),))
-    with pytest.raises(
-        NotSupported, match="our adapter cannot ask mujoco_warp for the force central gravity"
-    ):
-        run("rk4")(pulled, time_step=0.01, steps=1)
 
 
 def test_more_contacts_than_there_is_room_for_are_an_outcome(monkeypatch: pytest.MonkeyPatch) -> None:

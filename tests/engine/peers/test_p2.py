@@ -17,8 +17,6 @@ from spook_tracker.engine import (
     simulate,
 )
 from spook_tracker.engine.find import EngineMissing, find
-from spook_tracker.engine.protocol import NotSupported
-from tests.scenes import peer as peer_scenes
 
 try:
     P2 = find("p2")
@@ -62,12 +60,3 @@ def test_a_chain_is_the_same_in_two_implementations_of_the_method(
 
     assert np.abs(ours["path"] - theirs["path"]).max() < apart
     assert np.abs(ours["pull"] - theirs["pull"]).max() < 1e3 * apart
-
-
-def test_what_leaves_a_plane_is_not_supported_by_name() -> None:
-    thrown = Particle(name="thrown", mass=1.0, position=(0.0, 0.0, 0.0), velocity=(1.0, 0.0, 0.0))
-    line = Particle(name="line", mass=1.0, position=(0.0, 1.0, 0.0))
-    with pytest.raises(NotSupported, match="leave a plane"):
-        P2.simulate(Scene(bodies=(thrown, line), gravity=peer_scenes.GRAVITY), time_step=STEP, steps=1)
-    with pytest.raises(NotSupported, match="the shape plane"):
-        P2.simulate(peer_scenes.box_on_ground(0.0), time_step=STEP, steps=1)

@@ -7,9 +7,7 @@ from typing import Any
 import pytest
 
 from spook_tracker.engine import (
-    Cone,
     ContactForce,
-    Distance,
     Final,
     Material,
     Particle,
@@ -30,13 +28,6 @@ except EngineMissing as reason:
 
 STEP = 1.0 / 60.0  # s
 GRAVITY = (0.0, 0.0, -9.81)
-
-
-def test_what_it_lacks_is_not_supported_by_name() -> None:
-    ball = Particle(name="ball", mass=1.0, position=(1.0, 0.0, 0.0))
-    rod = Distance(name="rod", between=((0.0, 0.0, 0.0), "ball"), compliance=0.0)
-    with pytest.raises(NotSupported, match=r"many-iterations. does not support the joint distance"):
-        RAPIER.simulate(Scene(bodies=(ball,), constraints=(rod,), gravity=GRAVITY), time_step=STEP, steps=1)
 
 
 def lying(friction: float) -> Scene:
@@ -68,18 +59,6 @@ def test_the_force_of_a_contact_is_told_of_either_body_and_of_every_step() -> No
     assert run["down"] == pytest.approx(-run["up"][-1])
     assert run["light"] == pytest.approx([0.0, 0.0, 9.81], rel=1e-4)
     assert run["between"] == pytest.approx([0.0, 0.0, 0.0])
-
-
-def test_what_only_its_adapter_cannot_ask_is_said_so() -> None:
-    """Rapier has cones, and its package tells nothing of a contact's friction."""
-    log = RigidBody(name="log", mass=1.0, shape=Cone(0.5, 1.0), position=(0.0, 0.0, 0.5))
-    plane = RigidBody(name="plane", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
-    asked = {"f": Final(quantity=ContactForce("ball 0"))}
-
-    with pytest.raises(NotSupported, match=r"^our adapter cannot ask rapier for the shape cone$"):
-        RAPIER.simulate(Scene(bodies=(log, plane), gravity=GRAVITY), time_step=STEP, steps=1)
-    with pytest.raises(NotSupported, match="rapier does not support a contact force with friction"):
-        RAPIER.simulate(lying(0.5), time_step=STEP, steps=1, observe=asked)
 
 
 def test_what_is_faster_than_its_bound_is_not_supported() -> None:

@@ -10,7 +10,6 @@ import pytest
 
 from spook_tracker.engine import (
     Box,
-    Cone,
     ContactForce,
     Final,
     Material,
@@ -21,7 +20,6 @@ from spook_tracker.engine import (
     Velocity,
 )
 from spook_tracker.engine.find import find
-from spook_tracker.engine.protocol import NotSupported
 from tests.scenes import peer as peer_scenes
 
 rapier = pytest.importorskip(
@@ -32,26 +30,6 @@ DEFAULTS, MANY = "defaults", "many-iterations"
 
 def run(configuration: str) -> Any:
     return partial(find("rapier3d").simulate, configuration=configuration)
-
-
-def test_what_it_cannot_be_asked_is_said_to_be_our_adapter_s_lack_where_it_is() -> None:
-    cone = RigidBody(name="cone", mass=1.0, shape=Cone(0.5, 1.0), position=(0.0, 0.0, 0.5))
-    ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
-    with pytest.raises(NotSupported, match=r"^our adapter cannot ask rapier3d for the shape cone$"):
-        run(DEFAULTS)(Scene(bodies=(cone, ground)), time_step=0.01, steps=1)
-    with pytest.raises(NotSupported, match="does not support the joint distance"):
-        run(DEFAULTS)(peer_scenes.pendulum(), time_step=0.01, steps=1)
-    force = {"f": Final(quantity=ContactForce("box"))}
-    with pytest.raises(
-        NotSupported, match=r"rapier3d \(defaults\) does not support a contact force with friction"
-    ):
-        run(DEFAULTS)(peer_scenes.box_on_ground(0.0), time_step=0.01, steps=1, observe=force)
-
-
-def test_a_contact_without_friction_shows_the_weight_it_carries() -> None:
-    force = {"f": Final(quantity=ContactForce("box"))}
-    found = run(MANY)(peer_scenes.box_on_ground(0.0, 0.0), time_step=1 / 60, duration=1.0, observe=force)
-    assert found["f"] == pytest.approx([0.0, 0.0, 9.81], abs=1e-3)
 
 
 @pytest.mark.parametrize("up", [(0.0, 0.0, 1.0), (0.48, 0.64, 0.6), (-0.48, 0.64, -0.6), (0.0, 1.0, 0.0)])
