@@ -112,7 +112,7 @@ def balls() -> Scene:
     bodies = [corpus.floor(corpus.ROUGH)]
     for k in range(64):
         place = (0.55 * (k % 3) + 0.02 * np.sin(3.0 * k), 0.55 * (k // 3 % 3), 0.5 + 0.55 * (k // 9))
-        bodies.append(corpus.body(f"ball{k}", Sphere(0.25), place, material=corpus.ROUGH))
+        bodies.append(corpus.solid(f"ball{k}", Sphere(0.25), place, material=corpus.ROUGH))
     return Scene(bodies=tuple(bodies), gravity=corpus.DOWN)
 
 

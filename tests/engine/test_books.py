@@ -29,6 +29,7 @@ from spook_tracker.engine import (
     Trace,
     simulate,
 )
+from tests.scenes.corpus import solid
 
 H = 1 / 240  # s
 DOWN = (0.0, 0.0, -9.81)  # m/s²
@@ -84,13 +85,7 @@ def test_what_spins_off_its_joint_loses_energy_that_nothing_took() -> None:
 def test_a_motor_gives_what_its_flywheel_has(axis: tuple[float, float, float], ground: str) -> None:
     """4 N m for a second on half a kilogram metre squared: 16 J; against a spin, 4 of them are taken first."""
     for spin, given, taken in ((0.0, 16.0, 0.0), (-4.0 * math.copysign(1.0, axis[2]), 4.0, 4.0)):
-        body = RigidBody(
-            name="disc",
-            mass=2.0,
-            inertia=(0.5,) * 3,
-            position=(0.0, 0.0, 0.0),
-            angular_velocity=(0.0, 0.0, spin),
-        )
+        body = solid("disc", None, (0.0, 0.0, 0.0), 2.0, spin=(0.0, 0.0, spin), inertia=(0.5,) * 3)
         floor = RigidBody(name="floor", motion="kinematic", position=(0.0, 0.0, 0.0))
         first = WORLD if ground == "world" else "floor"
         joint = Hinge(name="axle", between=(first, "disc"), axis=axis, motor=Motor(speed=1e3, max_force=4.0))
@@ -161,9 +156,7 @@ def test_a_conveyor_gives_and_takes() -> None:
     belt = RigidBody(
         name="belt", motion="static", position=(0.0, 0.0, 0.0), shape=Plane(), material=rough, surface_velocity=(2.0, 0.0, 0.0)
     )  # fmt: skip
-    box = RigidBody(
-        name="box", mass=5.0, position=(0.0, 0.0, 0.1), shape=Box((0.4, 0.4, 0.2)), material=rough
-    )
+    box = solid("box", Box((0.4, 0.4, 0.2)), (0.0, 0.0, 0.1), 5.0, material=rough)
     books = asked(Scene(bodies=(belt, box), gravity=DOWN)).books
 
     assert books.energy_in == pytest.approx(10.0, rel=1e-9)
@@ -172,9 +165,7 @@ def test_a_conveyor_gives_and_takes() -> None:
 
 def test_impacts_that_end_without_a_rebound_are_counted() -> None:
     """A slide between elastic stops beside something that touches."""
-    slide = RigidBody(
-        name="slide", mass=1.0, inertia=(0.1,) * 3, position=(0.0, 0.0, 5.0), velocity=(3.0, 0.0, 0.0)
-    )
+    slide = solid("slide", None, (0.0, 0.0, 5.0), velocity=(3.0, 0.0, 0.0), inertia=(0.1,) * 3)
     stops = Prismatic(
         name="stops", between=(WORLD, "slide"), axis=(1.0, 0.0, 0.0), limit=Limit(lower=-0.004, upper=0.004, restitution=1.0)
     )  # fmt: skip

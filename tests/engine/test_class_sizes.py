@@ -13,7 +13,7 @@ from tests.places import ROOT
 SOURCES = ROOT / "engine/native/src"
 MOST_MEMBERS, MOST_METHODS = 30, 40
 LARGER = {  # members and methods of those that are over: lower a number that has become smaller
-    "contacts/ConeFour": (37, 4),
+    "contacts/ConeFour": (37, 4)
 }
 MOST_BRANCHES = 25
 OPENS = re.compile(r"\b(class|struct)\s+(?:alignas\([^)]*\)\s*)?([\w:]+)(?:\s+final)?(?:\s*:\s*[^{;]*)?\s*$")

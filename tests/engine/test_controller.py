@@ -9,15 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spook_tracker.engine import (
-    AngularVelocity,
-    Hinge,
-    JointCoordinate,
-    Load,
-    Method,
-    Scene,
-    start,
-)
+from spook_tracker.engine import AngularVelocity, Hinge, JointCoordinate, Load, Method, Scene, start
 from spook_tracker.engine.observe import Quantity
 from spook_tracker.scalar_tests import robot_arm
 

@@ -41,6 +41,7 @@ from spook_tracker.engine.protocol import (
     unsupported,
 )
 from spook_tracker.engine.stepped import Stepped
+from tests.scenes.corpus import solid
 from tests.toys.stepping_engine import ENGINE
 
 WEIGHT = Particle(name="weight", mass=2.0, position=(1.0, 0.0, 0.0))
@@ -80,13 +81,7 @@ def test_an_unknown_configuration_is_answered_with_those_there_are() -> None:
         ),
         (replace(PENDULUM, constraints=(replace(ROD, compliance=1e-3),)), "compliance of a joint"),
         (
-            Scene(
-                bodies=(
-                    RigidBody(
-                        name="a", mass=1.0, inertia=((2, 0.5, 0), (0.5, 2, 0), (0, 0, 2)), position=(0, 0, 0)
-                    ),
-                )
-            ),
+            Scene(bodies=(solid("a", None, (0, 0, 0), inertia=((2, 0.5, 0), (0.5, 2, 0), (0, 0, 2))),)),
             "principal axes of inertia beside those of the body",
         ),
         (

@@ -9,13 +9,7 @@ from typing import Any
 import pytest
 
 from spook_tracker import engine
-from spook_tracker.engine import (
-    WORLD,
-    Material,
-    Plane,
-    SceneError,
-    Sinusoid,
-)
+from spook_tracker.engine import WORLD, Material, Plane, SceneError, Sinusoid
 from tests.engine.test_hostile_values import WHOLE
 
 ORIGIN, X, Y, Z = (0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)

@@ -14,13 +14,13 @@ from spook_tracker.engine import (
     Particle,
     Plane,
     Result,
-    RigidBody,
     Scene,
     Sphere,
     Spring,
 )
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.measure.step_cost import step_cost
+from tests.scenes.corpus import fixed, solid
 
 STEPS = 120
 BESIDE_SHARE = 0.05  # of the step: keeping a state to go back to, checks of it, and the clock
@@ -62,19 +62,12 @@ def test_the_times_of_stages_are_the_step(name: str) -> None:
 
 
 def heap(bodies: int = 12) -> Scene:
-    ground = RigidBody(
-        name="ground",
-        motion="static",
-        position=(0.0, 0.0, 0.0),
-        shape=Plane(),
-        material=Material(friction=0.5),
-    )
+    ground = fixed("ground", Plane(), (0.0, 0.0, 0.0), material=Material(friction=0.5))
     balls = tuple(
-        RigidBody(
-            name=f"ball {i}",
-            mass=1.0,
-            shape=Sphere(0.5),
-            position=(0.3 * (i % 3), 0.2 * (i % 2), 0.5 + 1.05 * i),
+        solid(
+            f"ball {i}",
+            Sphere(0.5),
+            (0.3 * (i % 3), 0.2 * (i % 2), 0.5 + 1.05 * i),
             material=Material(friction=0.5),
         )
         for i in range(bodies)

@@ -44,6 +44,7 @@ from tests.oracles.particles import Array
 from tests.oracles.rigid import product, rotation
 from tests.scenes import particle as particle_scenes
 from tests.scenes import rigid as rigid_scenes
+from tests.scenes.corpus import solid
 
 TIME_STEP = 0.01  # s
 
@@ -56,12 +57,12 @@ def heap(rng: np.random.Generator, spread: float = 0.0) -> Scene:
         RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
     ]
     bodies += [
-        RigidBody(
-            name=f"b{i}",
-            mass=1.0 + i,
-            shape=shape,
-            position=(0.35 * i, 0.1 * i, 0.35 + 0.1 * i),
-            velocity=tuple(np.array([1.0 - i, 0.2 * i, -1.0]) + spread * rng.normal(size=3)),
+        solid(
+            f"b{i}",
+            shape,
+            (0.35 * i, 0.1 * i, 0.35 + 0.1 * i),
+            1.0 + i,
+            tuple(np.array([1.0 - i, 0.2 * i, -1.0]) + spread * rng.normal(size=3)),
             material=rough,
         )
         for i, shape in enumerate(shapes)
@@ -347,13 +348,7 @@ def test_uniform_motion_cannot_be_noticed(seed: int) -> None:
     assert np.abs(there[:, 7:10] - here[:, 7:10] - boost).max() < 1e-10
 
 
-FAR = RigidBody(
-    name="far",
-    mass=1.0,
-    shape=Sphere(0.2),
-    position=(100.0, 0.0, 0.2),
-    material=Material(restitution=0.5),
-)
+FAR = solid("far", Sphere(0.2), (100.0, 0.0, 0.2), material=Material(restitution=0.5))
 
 
 @pytest.mark.parametrize("method", [Method(), Method(solver="iterative", iterations=1000)])
@@ -364,13 +359,13 @@ def test_a_blow_far_away_is_nothing_to_what_lies_here(method: Method) -> None:
     for seed in range(8):
         rng = np.random.default_rng(seed)
         pair = tuple(
-            RigidBody(
-                name=name,
-                mass=mass,
-                shape=Capsule(0.1, 0.3),
-                position=(x, 0.0, 0.12),
+            solid(
+                name,
+                Capsule(0.1, 0.3),
+                (x, 0.0, 0.12),
+                mass,
+                tuple(rng.normal(size=3)),
                 orientation=(0.7, 0.1, 0.7, 0.0),
-                velocity=tuple(rng.normal(size=3)),
                 material=soft,
             )
             for name, mass, x in (("first", 1.0, 0.0), ("second", 2.0, 0.6))

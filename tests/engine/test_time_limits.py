@@ -34,6 +34,7 @@ from spook_tracker.engine import (
     start,
 )
 from tests.scenes.contact import DOWN, TIME_STEP
+from tests.scenes.corpus import solid
 
 LIMIT = 0.1  # s
 LATE = 0.1  # s of processor time: what is left of it cannot be told from a busy machine
@@ -59,13 +60,10 @@ def wedged(count: int, method: Method) -> Made:
     """Spheres that overlap their neighbours: hundreds of rounds."""
     rng = np.random.default_rng(1)
     balls = tuple(
-        RigidBody(
-            name=f"ball {k}",
-            mass=1.0,
-            shape=Sphere(0.25),
-            position=tuple(
-                0.45 * np.array([k % 10, k // 10 % 10, k // 100 + 0.45]) + rng.uniform(-0.02, 0.02, 3)
-            ),
+        solid(
+            f"ball {k}",
+            Sphere(0.25),
+            tuple(0.45 * np.array([k % 10, k // 10 % 10, k // 100 + 0.45]) + rng.uniform(-0.02, 0.02, 3)),
             material=ROUGH,
         )
         for k in range(count)
@@ -112,14 +110,7 @@ def landscape(side: int) -> Made:
     mesh = TriangleMesh(tuple(map(tuple, corners)), tuple(triangles))
     land = RigidBody(name="land", motion="static", shape=mesh, position=(0, 0, 0), material=ROUGH)
     plates = tuple(
-        RigidBody(
-            name=f"plate {k}",
-            mass=1.0,
-            shape=Box((7, 7, 0.5)),
-            position=(0, 0, 0.3 + 0.52 * k),
-            material=ROUGH,
-        )
-        for k in range(3)
+        solid(f"plate {k}", Box((7, 7, 0.5)), (0, 0, 0.3 + 0.52 * k), material=ROUGH) for k in range(3)
     )
     return Scene(bodies=(land, *plates), gravity=DOWN), Method()
 
@@ -307,11 +298,10 @@ def falls_and_fails() -> Made:
     """
     rng, gap = np.random.default_rng(1), 0.52  # m
     balls = tuple(
-        RigidBody(
-            name=f"ball {k}",
-            mass=1.0,
-            shape=Sphere(0.25),
-            position=(
+        solid(
+            f"ball {k}",
+            Sphere(0.25),
+            (
                 gap * (k % 5) + rng.uniform(-0.009, 0.009),
                 gap * (k // 5 % 5) + rng.uniform(-0.009, 0.009),
                 2.02 + 0.501 * (k // 25),
@@ -321,13 +311,7 @@ def falls_and_fails() -> Made:
         for k in range(200)
     )
     inertia = 1e308  # kg m²: at 1.8 rad/s its angular momentum is none of the numbers there are
-    spun = RigidBody(
-        name="spun",
-        mass=1.0,
-        inertia=(inertia,) * 3,
-        position=(100.0, 0.0, 50.0),
-        angular_velocity=(0.0, 0.0, 1.0),
-    )
+    spun = solid("spun", None, (100.0, 0.0, 50.0), spin=(0.0, 0.0, 1.0), inertia=(inertia,) * 3)
     torque = (sys.float_info.max - inertia) / (TIME_STEP * (FAILS - 0.5))  # N m
     spin = Load(name="spin", body="spun", torque=(0.0, 0.0, torque))
     scene = Scene(bodies=(ground(), *balls, spun), forces=(spin,), gravity=DOWN)

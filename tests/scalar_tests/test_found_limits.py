@@ -56,10 +56,7 @@ def metric(test: str, name: str, index: int = 0) -> Metric:
 
 
 def test_the_rigid_prototype_gives_the_first_step_of_the_door() -> None:
-    for test, index, name in (
-        ("door", 0, "weight_error"),
-        ("door", 3, "sideways_sum"),
-    ):
+    for test, index, name in (("door", 0, "weight_error"), ("door", 3, "sideways_sum")):
         asked = CATALOGUE[test].measurements[index]
         values = asked.measure(oracle_rigid_simulate.simulate)
 

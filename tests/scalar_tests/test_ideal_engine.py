@@ -169,11 +169,7 @@ def particle(task: Task, scene: Scene) -> dict[str, Any]:
         tension[rod.name] = scene.bodies[0].mass * (
             np.square(velocities).sum(axis=1) / length + reach @ np.array(scene.gravity) / length
         )
-    return {
-        "positions": places[:, None],
-        "velocities": velocities[:, None],
-        "constraint_forces": tension,
-    }
+    return {"positions": places[:, None], "velocities": velocities[:, None], "constraint_forces": tension}
 
 
 def form_of(scene: Scene) -> Callable[[Task, Scene], dict[str, Any]]:

@@ -13,9 +13,7 @@ import pytest
 
 from spook_tracker.engine import simulate, theory
 from spook_tracker.engine.theory import one_row_matrix
-from spook_tracker.scalar_tests import (
-    double_pendulum,
-)
+from spook_tracker.scalar_tests import double_pendulum
 from spook_tracker.scalar_tests.beam import scene as beam
 from spook_tracker.scalar_tests.cantilever import statics
 from spook_tracker.scalar_tests.case import Measurement, Simulate

@@ -161,10 +161,7 @@ def test_a_bend_passes_on_what_a_tyre_takes_its_speed_too_large_by() -> None:
             balance = np.array(
                 (
                     ((f + r) / c.SPEED, (f * c.AHEAD - r * c.BACK) / c.SPEED + c.MASS * c.SPEED / share),
-                    (
-                        (f * c.AHEAD - r * c.BACK) / c.SPEED,
-                        (f * c.AHEAD**2 + r * c.BACK**2) / c.SPEED,
-                    ),
+                    ((f * c.AHEAD - r * c.BACK) / c.SPEED, (f * c.AHEAD**2 + r * c.BACK**2) / c.SPEED),
                 )
             )
             rates.append(float(np.linalg.solve(balance, c.STEER * f * np.array((1.0, c.AHEAD)))[1]))

@@ -19,7 +19,7 @@ ELASTIC = corpus.ELASTIC
 
 
 def ball(name: str, place: Any, velocity: Any, mass: float = 1.0, radius: float = RADIUS) -> RigidBody:
-    return corpus.body(name, Sphere(radius), place, mass, velocity, material=ELASTIC)
+    return corpus.solid(name, Sphere(radius), place, mass, velocity, material=ELASTIC)
 
 
 def wall(name: str, place: Any, size: Any, **more: Any) -> RigidBody:
@@ -141,7 +141,7 @@ def spinning_row(seed: int) -> Scene:
     for k in range(4):
         mass, place = float(rng.uniform(0.5, 2.0)), (k * (0.4 + 5e-3), *rng.uniform(-0.05, 0.05, 2))
         ways = ((2.0, 0, 0) if k == 0 else (0, 0, 0)), rng.uniform(-0.4, 0.4, 3)
-        bodies.append(corpus.body(f"b{k}", Box((0.4, 0.3, 0.3)), place, mass, *ways, material=ELASTIC))
+        bodies.append(corpus.solid(f"b{k}", Box((0.4, 0.3, 0.3)), place, mass, *ways, material=ELASTIC))
     return Scene(bodies=tuple(bodies))
 
 
@@ -154,13 +154,13 @@ def hardly(places: int) -> Scene:
     boxes = []
     for k, (x, y) in enumerate([(-0.3, -0.3), (0.0, 0.15), (0.3, -0.15)]):
         place = (x + rng.uniform(-0.02, 0.02), y + rng.uniform(-0.02, 0.02), 0.6 + 0.75 * k)
-        boxes.append(corpus.body(f"box {k}", Box(HARDLY), place, spin=(0, 0, 0.5), material=rough))
+        boxes.append(corpus.solid(f"box {k}", Box(HARDLY), place, spin=(0, 0, 0.5), material=rough))
     return falling(corpus.floor(rough), *boxes)
 
 
 def thrown_up() -> Scene:
     """At a tenth of h g: the row of its contact asked for a nineteenth of its speed, and pushed to get it."""
-    up = corpus.body(
+    up = corpus.solid(
         "ball", Sphere(0.25), (0, 0, 0.25), velocity=(0, 0, 0.1 * corpus.GRAVITY * H), material=corpus.ROUGH
     )
     return falling(corpus.floor(corpus.ROUGH), up)
@@ -210,6 +210,6 @@ def ring(compliance: float, count: int = 12) -> Scene:
         place = 2.0 * np.array([math.cos(angle), math.sin(angle), 0.0])
         turn = (math.cos(0.5 * angle), 0.0, 0.0, math.sin(0.5 * angle))
         ways, moments = (np.cross(spin, place), spin), {"inertia": (0.1, 0.12, 0.15), "orientation": turn}
-        bodies.append(corpus.body(f"b{i}", None, place, 1.0 + 0.1 * i, *ways, **moments))
+        bodies.append(corpus.solid(f"b{i}", None, place, 1.0 + 0.1 * i, *ways, **moments))
         locks.append(Lock(name=f"lock {i}", between=(f"b{i}", f"b{(i + 1) % count}"), compliance=compliance))
     return Scene(bodies=tuple(bodies), constraints=tuple(locks))

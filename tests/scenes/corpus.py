@@ -51,7 +51,7 @@ def turned(rng: np.random.Generator) -> tuple[float, ...]:
     return tuple(turn / np.linalg.norm(turn))
 
 
-def body(
+def solid(
     name: str, shape: Shape | None, place: Iterable[float], mass: float | None = 1.0,
     velocity: Iterable[float] = (0.0, 0.0, 0.0), spin: Iterable[float] = (0.0, 0.0, 0.0), **more: Any,
 ) -> RigidBody:  # fmt: skip
@@ -60,7 +60,7 @@ def body(
 
 
 def fixed(name: str, shape: Shape, place: Iterable[float] = (0.0, 0.0, 0.0), **more: Any) -> RigidBody:
-    return body(name, shape, place, None, motion="static", **more)
+    return solid(name, shape, place, None, motion="static", **more)
 
 
 def floor(material: Material) -> RigidBody:
@@ -79,7 +79,7 @@ def thrown(rng: np.random.Generator, speed: float) -> dict[str, Any]:
 def ball(name: str, x: float, speed: float, mass: float = 1.0, **more: Any) -> RigidBody:
     """On a line, of .1 m."""
     given = {"shape": Sphere(0.1), "place": (x, 0.0, 0.0), "material": ELASTIC}
-    return body(name, mass=mass, velocity=(speed, 0.0, 0.0), **(given | more))
+    return solid(name, mass=mass, velocity=(speed, 0.0, 0.0), **(given | more))
 
 
 # What floats: nothing outside, so that both momenta stay --------------------------------------------------------------
@@ -93,7 +93,7 @@ def rack(psi: float) -> Scene:
     for i in range(10):
         place = (0.4 * (i % 4), 0.4 * (i // 4) - 0.4, float(rng.uniform(-0.05, 0.05)))
         shape = Sphere(0.15) if i % 2 else Box((0.25, 0.2, 0.3))
-        bodies.append(body(f"b{i}", shape, place, 1.0 + 0.2 * i, material=rough))
+        bodies.append(solid(f"b{i}", shape, place, 1.0 + 0.2 * i, material=rough))
     return Scene(bodies=tuple(bodies))
 
 
@@ -107,7 +107,7 @@ def collision(seed: int) -> Scene:
         rough = Material(friction=float(rng.uniform(0, 2)), restitution=float(rng.uniform(0, 1)))
         mass, ways = float(10 ** rng.uniform(-3, 3)), thrown(rng, 1.0)
         ways["velocity"] = ways["velocity"] - 3.0 * corner
-        bodies.append(body(f"b{k}", shapes[k % 4], 1.1 * corner, mass, material=rough, **ways))
+        bodies.append(solid(f"b{k}", shapes[k % 4], 1.1 * corner, mass, material=rough, **ways))
     return Scene(bodies=tuple(bodies))
 
 
@@ -128,7 +128,7 @@ def overlapping(kind: type | None, seed: int, speed: float = 1.0) -> Scene:
     rng, place, made = np.random.default_rng(seed), np.zeros(3), []
     for k in range(2 + seed % 2 if kind is None else 3):
         shape, mass = LARGE[rng.integers(len(LARGE))], rng.uniform(0.5, 2.0)
-        made.append(body(f"body {k}", shape, place, mass, **thrown(rng, speed)))
+        made.append(solid(f"body {k}", shape, place, mass, **thrown(rng, speed)))
         place = place + 0.25 * rng.normal(size=3)
     bodies = tuple(made)
     return Scene(bodies=bodies, constraints=() if kind is None else tuple(joined(kind, rng, bodies)))
@@ -153,7 +153,7 @@ def all_joints() -> Scene:
     """Six bodies on every kind of joint, some of them compliant."""
     rng = np.random.default_rng(5)
     bodies = tuple(
-        body(f"b{i}", None, (float(i), 0.1 * i * i, 0.0), 1.0 + i, rng.standard_normal(3), rng.standard_normal(3),
+        solid(f"b{i}", None, (float(i), 0.1 * i * i, 0.0), 1.0 + i, rng.standard_normal(3), rng.standard_normal(3),
              inertia=(0.1 + 0.02 * i, 0.12, 0.15)) for i in range(6)
     )  # fmt: skip
     ends = [(f"b{i}", f"b{i + 1}") for i in range(5)]
@@ -202,7 +202,7 @@ def links(heavy: float) -> Scene:
         swings = (0.0, 0.3 * math.sin(k), 0.2 * math.cos(2 * k)), (0.0, -0.2, 0.3 * (k - 2))
         velocity, spin = ((0.0,) * 3, (0.0,) * 3) if still else swings
         place, mass = (k + 0.5, 0.0, 0.0), heavy if still else 1.0
-        bodies.append(body(f"link {k}", None, place, mass, velocity, spin, inertia=(0.01, 1 / 12, 1 / 12)))
+        bodies.append(solid(f"link {k}", None, place, mass, velocity, spin, inertia=(0.01, 1 / 12, 1 / 12)))
     balls = (
         Ball(name=f"b{k}", between=(f"link {k}", f"link {k + 1}"), at=(k + 1.0, 0.0, 0.0)) for k in range(4)
     )
@@ -223,8 +223,8 @@ def square() -> Scene:
 def crossed() -> Scene:
     """Two rods on a universal joint."""
     inertia = (1 / 12, 1 / 12, 1 / 12)
-    first = body("upper", None, (0.5, 0.0, 0.0), spin=(0.4, 1.0, -0.7), inertia=inertia)
-    second = body("lower", None, (1.5, 0.0, 0.0), inertia=inertia)
+    first = solid("upper", None, (0.5, 0.0, 0.0), spin=(0.4, 1.0, -0.7), inertia=inertia)
+    second = solid("lower", None, (1.5, 0.0, 0.0), inertia=inertia)
     axes = {"axis": (0.0, 1.0, 0.0), "cross_axis": (0.0, 0.0, 1.0)}
     cross = Universal(name="cross", between=("upper", "lower"), at=(1.0, 0.0, 0.0), **axes)  # type: ignore[arg-type]
     return Scene(bodies=(first, second), constraints=(cross,))
@@ -234,14 +234,14 @@ def locked(floor_there: bool = False) -> Scene:
     """Three boxes locked in a row that turn at 20 rad/s; far from a floor with a ball on it."""
     spin, inertia = (0.0, 0.0, 20.0), (1 / 6, 1 / 6, 1 / 6)
     bodies = [
-        body(f"box {i}", None, (i - 1.0, 0.0, 0.0), 1.0, (0.0, 20.0 * (i - 1.0), 0.0), spin, inertia=inertia)
+        solid(f"box {i}", None, (i - 1.0, 0.0, 0.0), 1.0, (0.0, 20.0 * (i - 1.0), 0.0), spin, inertia=inertia)
         for i in range(3)
     ]
     locks = (
         Lock(name=f"lock {i}", between=(f"box {i}", f"box {i + 1}"), at=(i - 0.5, 0.0, 0.0)) for i in range(2)
     )
     if floor_there:
-        bodies += [fixed("floor", Plane(), (0.0, 0.0, -9.0)), body("ball", Sphere(0.1), (0.0, 9.0, -8.9))]
+        bodies += [fixed("floor", Plane(), (0.0, 0.0, -9.0)), solid("ball", Sphere(0.1), (0.0, 9.0, -8.9))]
     return Scene(bodies=tuple(bodies), constraints=tuple(locks))
 
 
@@ -281,7 +281,7 @@ def beyond(kind: Any, lower: float, upper: float, speed: float) -> Scene:
     """Two bars, one hung to the other off its centre, that fly and spin about a joint which begins beyond its stop."""
     spin = (0.0, speed if kind is Hinge else 0.0, 0.0)
     bars = (
-        body(name, Box((0.1, 0.2, 1.0)), (0.0, 0.0, 0.0), mass, (0.3 * speed, 0.0, 0.0), spin)
+        solid(name, Box((0.1, 0.2, 1.0)), (0.0, 0.0, 0.0), mass, (0.3 * speed, 0.0, 0.0), spin)
         for name, mass in (("first", 2.0), ("second", 1.0))
     )
     ends = {"between": ("first", "second"), "at": (0.0, 0.0, 0.4), "axis": (0.0, 1.0, 0.0)}
@@ -309,7 +309,7 @@ def heap(count: int) -> Scene:
     for k in range(count):
         i, j, level = k % side, k // side % side, k // side**2
         place = (i + 0.05 * math.sin(7.0 * k), j + 0.05 * math.cos(11.0 * k), 0.6 + 1.1 * level)
-        bodies.append(body(f"b{k}", shapes[k % 3], place, material=rough))
+        bodies.append(solid(f"b{k}", shapes[k % 3], place, material=rough))
     ties = (
         Distance(name=f"tie{k}", between=(f"b{k}", f"b{k + 1}"), compliance=1e-6)
         for k in range(0, count - 1, 10)
@@ -323,13 +323,13 @@ def block(shape: Shape) -> Scene:
     for k in range(1000):
         layer = 1.05 * (k % 10) + 0.01 * math.sin(k), 1.05 * (k // 10 % 10) + 0.01 * math.cos(3 * k)
         place = (*layer, 0.55 + 1.05 * (k // 100))
-        bodies.append(body(f"b{k}", shape, place, material=ROUGH))
+        bodies.append(solid(f"b{k}", shape, place, material=ROUGH))
     return Scene(bodies=tuple(bodies), gravity=DOWN)
 
 
 def stack(count: int) -> Scene:
     """Boxes of a metre and a kilogram, one upon the other."""
-    boxes = (body(f"box {k}", Box((1, 1, 1)), (0, 0, 0.5 + k), material=ROUGH) for k in range(count))
+    boxes = (solid(f"box {k}", Box((1, 1, 1)), (0, 0, 0.5 + k), material=ROUGH) for k in range(count))
     return Scene(bodies=(floor(ROUGH), *boxes), gravity=DOWN)
 
 
@@ -338,7 +338,7 @@ def tumbler(seed: int) -> Scene:
     rng = np.random.default_rng(seed)
     shape = (Box((0.4, 0.3, 0.5)), Cylinder(0.2, 0.5), Cone(0.3, 0.5))[seed % 3]
     turn, mass, spin = turned(rng), float(10.0 ** rng.uniform(-6, 9)), rng.normal(size=3)
-    tumbling = body("body", shape, (0.0, 0.0, 0.6), mass, spin=spin, orientation=turn, material=ROUGH)
+    tumbling = solid("body", shape, (0.0, 0.0, 0.6), mass, spin=spin, orientation=turn, material=ROUGH)
     return Scene(bodies=(floor(ROUGH), tumbling), gravity=DOWN)
 
 
@@ -355,7 +355,7 @@ def rubber(seed: int) -> Scene:
         )  # fmt: skip
         shape, place = shapes[rng.integers(4)], (0.7 * (k % 2), 0.1 * k, 0.5 + 0.7 * (k // 2))
         ways = thrown(rng, 2.5) | {"velocity": rng.uniform((-2, -2, -3), (2, 2, 0))}
-        bodies.append(body(f"b{k}", shape, place, float(rng.uniform(0.5, 2.0)), material=material, **ways))
+        bodies.append(solid(f"b{k}", shape, place, float(rng.uniform(0.5, 2.0)), material=material, **ways))
     return Scene(bodies=tuple(bodies), gravity=DOWN)
 
 
@@ -367,14 +367,14 @@ def grained(seed: int) -> Scene:
     for k, (x, y, z) in enumerate(itertools.product(range(2), range(2), range(3))):
         place = np.array([0.45 * x, 0.45 * y, 0.25 + 0.45 * z]) + rng.uniform(-0.03, 0.03, 3)
         shape, way = Box((0.4, 0.3, 0.35)) if k % 2 else Sphere(0.2), rng.uniform(-1, 1, 3)
-        bodies.append(body(f"b{k}", shape, place, 1.0, way, material=Material(friction=1.0)))
+        bodies.append(solid(f"b{k}", shape, place, 1.0, way, material=Material(friction=1.0)))
     return Scene(bodies=tuple(bodies), gravity=DOWN)
 
 
 def spun() -> Scene:
     """A box set sliding and spinning."""
     rough = Material(friction=0.4)
-    box = body("box", Box((1, 1, 0.5)), (0, 0, 0.25), 1.0, (2, 1, 0), (0, 0, 6), material=rough)
+    box = solid("box", Box((1, 1, 0.5)), (0, 0, 0.25), 1.0, (2, 1, 0), (0, 0, 6), material=rough)
     return Scene(bodies=(floor(rough), box), gravity=DOWN)
 
 
@@ -396,14 +396,14 @@ def tents(seed: int) -> Scene:
     bodies = [fixed("ground", TENTS, (-3.0, -3.0, -0.1))]
     for k, (mass, place, turn, velocity, spin) in enumerate(RESTING):
         at = np.array(place) + 1e-5 * rng.normal(size=3)
-        bodies.append(body(f"b{k}", Box((0.4, 0.3, 0.5)), at, mass, velocity, spin, orientation=turn))
+        bodies.append(solid(f"b{k}", Box((0.4, 0.3, 0.5)), at, mass, velocity, spin, orientation=turn))
     return Scene(bodies=tuple(bodies), gravity=DOWN)
 
 
 def long_cone() -> Scene:
     """Dropped across the edges of a block."""
     lying = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)
-    cone = body("cone", Cone(1, 10), (0, 0, 1.51), orientation=lying, material=ROUGH)
+    cone = solid("cone", Cone(1, 10), (0, 0, 1.51), orientation=lying, material=ROUGH)
     return Scene(bodies=(fixed("block", Box((2, 2, 1))), cone), gravity=DOWN)
 
 
@@ -426,7 +426,7 @@ def gas(seed: int, across: int) -> Scene:
                 np.where(free, rng.normal(size=3) * 3.0, 0.0),
                 float(10.0 ** rng.uniform(-1.0, 1.0)),
             )
-            bodies.append(body(f"ball {len(bodies)}", Sphere(radius), at, mass, velocity, material=ELASTIC))
+            bodies.append(solid(f"ball {len(bodies)}", Sphere(radius), at, mass, velocity, material=ELASTIC))
     return Scene(bodies=tuple(bodies), gravity=DOWN)
 
 
@@ -436,7 +436,7 @@ def weak_chain(masses: tuple[float, ...], depth: float | None) -> Scene:
     for k, (mass, rate) in enumerate(zip(masses, (3.0, -2.0, 2.0, -1.0), strict=False)):
         half, spin = np.array((0.25, 0.0, 0.0)), np.array((0.0, rate, 0.0))
         bodies.append(
-            body(f"link {k}", Box((0.4, 0.1, 0.1)), place + half, mass, speed + np.cross(spin, half), spin)
+            solid(f"link {k}", Box((0.4, 0.1, 0.1)), place + half, mass, speed + np.cross(spin, half), spin)
         )
         ends = (f"link {k - 1}" if k else WORLD, f"link {k}")
         joints.append(
@@ -452,7 +452,7 @@ def weak_chain(masses: tuple[float, ...], depth: float | None) -> Scene:
 
 def rods(count: int = 2) -> Scene:
     """Of 1 kg and 1 m, straight out, on hinges across the swing."""
-    bodies = (body(f"rod {i}", None, (0.5 + i, 0.0, 0.0), inertia=(1 / 12,) * 3) for i in range(count))
+    bodies = (solid(f"rod {i}", None, (0.5 + i, 0.0, 0.0), inertia=(1 / 12,) * 3) for i in range(count))
     hinges = (
         Hinge(name=f"hinge {i}", between=(f"rod {i - 1}" if i else WORLD, f"rod {i}"), at=(float(i), 0.0, 0.0),
               axis=(0.0, 1.0, 0.0), compliance=0.0) for i in range(count)
@@ -467,6 +467,6 @@ def freer(kind: Any) -> Scene:
         PointOnLine: ((0.0, 0.0, 0.3), (0.4, -0.2, 1.0)),
     }  # fmt: skip
     place = (0.3, 0.1, 0.0)
-    free = body("body", None, place, 2.0, *ways[kind], inertia=(1.0, 1.5, 2.0))
+    free = solid("body", None, place, 2.0, *ways[kind], inertia=(1.0, 1.5, 2.0))
     joint = kind(name="joint", between=(WORLD, "body"), at=place, axis=(0.0, 0.0, 1.0), compliance=0.0)
     return Scene(bodies=(free,), constraints=(joint,))

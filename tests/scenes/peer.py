@@ -42,6 +42,7 @@ from spook_tracker.engine import (
 )
 from spook_tracker.engine import simulate as ours
 from tests.scenes import rigid as rigid_scenes
+from tests.scenes.corpus import fixed, solid
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s²
 G = 9.81
@@ -124,11 +125,12 @@ def left_its_place(simulate: Any, kind: Any, backwards: bool = False) -> float:
 def swings(simulate: Any, time_step: float) -> float:
     """Period of small swings of a hinged body, per 2 π √((I + m L²) / (m g L))."""
     mass, inertia, length, angle = 2.0, 0.5, 1.0, 0.02
-    body = RigidBody(
-        name="body",
-        mass=mass,
+    body = solid(
+        "body",
+        None,
+        (length * math.sin(angle), 0.0, -length * math.cos(angle)),
+        mass,
         inertia=(inertia, inertia, inertia),
-        position=(length * math.sin(angle), 0.0, -length * math.cos(angle)),
     )
     hinge = Hinge(
         name="hinge", between=("world", "body"), at=(0.0, 0.0, 0.0), axis=(0.0, 1.0, 0.0), compliance=0.0
@@ -148,13 +150,7 @@ def swings(simulate: Any, time_step: float) -> float:
 
 def momentum_lost(simulate: Any, time_step: float) -> float:
     """How far the momentum of a free body spinning near its middle axis strays in 2 s, per its size."""
-    body = RigidBody(
-        name="body",
-        mass=1.0,
-        inertia=(1.0, 2.0, 2.5),
-        position=(0.0, 0.0, 0.0),
-        angular_velocity=(0.1, 3.0, 0.1),
-    )
+    body = solid("body", None, (0.0, 0.0, 0.0), spin=(0.1, 3.0, 0.1), inertia=(1.0, 2.0, 2.5))
     spin = {"spin": Trace(quantity=AngularMomentum())}
     run = simulate(
         Scene(bodies=(body,), gravity=(0.0, 0.0, 0.0)), time_step=time_step, duration=2.0, observe=spin
@@ -165,12 +161,8 @@ def momentum_lost(simulate: Any, time_step: float) -> float:
 def box_on_ground(pull: float, friction: float = 0.5) -> Scene:
     """A cube of 1 m and 1 kg on a plane, with `pull` of its weight sideways."""
     rough = Material(friction=friction)
-    ground = RigidBody(
-        name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough
-    )
-    box = RigidBody(
-        name="box", mass=1.0, shape=Box((1.0, 1.0, 1.0)), position=(0.0, 0.0, 0.5), material=rough
-    )
+    ground = fixed("ground", Plane(), (0.0, 0.0, 0.0), material=rough)
+    box = solid("box", Box((1.0, 1.0, 1.0)), (0.0, 0.0, 0.5), material=rough)
     return Scene(bodies=(ground, box), gravity=(pull * G, 0.0, -G))
 
 
@@ -207,13 +199,7 @@ def sunk(simulate: Any, shape: Any = None, height: float = 0.5, under: Any = Non
 
 def bounced(simulate: Any, restitution: float, time_step: float) -> float:
     """Height [m] to which a ball dropped by 1 m comes back; restitution² of it."""
-    ball = RigidBody(
-        name="ball",
-        mass=1.0,
-        shape=Sphere(0.5),
-        position=(0.0, 0.0, 1.5),
-        material=Material(restitution=restitution),
-    )
+    ball = solid("ball", Sphere(0.5), (0.0, 0.0, 1.5), material=Material(restitution=restitution))
     ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
     path = {"path": Trace(quantity=Position("ball"))}
     run = simulate(
@@ -266,14 +252,14 @@ def nodding() -> Scene:
     for k, (spin, turn) in enumerate(zip(spins, turns, strict=True)):
         place = 0.5 * (points[k] + points[k + 1])
         bodies.append(
-            RigidBody(
-                name=f"{k}",
-                mass=1.0,
-                inertia=(0.3, 0.2, 0.25),
-                position=tuple(float(x) for x in place),
-                orientation=turn,
+            solid(
+                f"{k}",
+                None,
+                tuple(float(x) for x in place),
                 velocity=tuple(float(x) for x in speed + np.cross(spin, place - points[k])),
-                angular_velocity=tuple(float(x) for x in spin),
+                spin=tuple(float(x) for x in spin),
+                inertia=(0.3, 0.2, 0.25),
+                orientation=turn,
             )
         )
         speed = speed + np.cross(spin, points[k + 1] - points[k])
@@ -323,17 +309,15 @@ def set_going(
     simulate: Any, *, slides: bool = True, bodies: Sequence[Particle] = (), joints: Sequence[Distance] = ()
 ) -> Any:
     """Speeds (2, n, 3) m/s before and after one step of a hinged body, one on a slide (or free) and those given."""
-    turning = RigidBody(
-        name="turning",
-        mass=1.0,
-        inertia=(1.0, 1.0, 1.0),
-        position=(1.0, 0.0, 0.0),
+    turning = solid(
+        "turning",
+        None,
+        (1.0, 0.0, 0.0),
         velocity=(0.0, 2.0, 0.0),
-        angular_velocity=(0.0, 0.0, 2.0),
+        spin=(0.0, 0.0, 2.0),
+        inertia=(1.0, 1.0, 1.0),
     )
-    sliding = RigidBody(
-        name="sliding", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0, 0, 2.0), velocity=(3.0, 0.0, 0.0)
-    )
+    sliding = solid("sliding", None, (0, 0, 2.0), velocity=(3.0, 0.0, 0.0), inertia=(1.0, 1.0, 1.0))
     hinge = Hinge(name="hinge", between=("world", "turning"), at=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0))
     slide = Prismatic(name="slide", between=("world", "sliding"), axis=(1.0, 0.0, 0.0))
     held = (hinge, slide) if slides else (hinge,)

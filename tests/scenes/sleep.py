@@ -6,16 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import (
-    Box,
-    Material,
-    Method,
-    Plane,
-    RigidBody,
-    Run,
-    Scene,
-    start,
-)
+from spook_tracker.engine import Box, Material, Method, Plane, RigidBody, Run, Scene, start
 
 GRAVITY = 9.81  # m/s²
 TIME_STEP = 1.0 / 60.0  # s

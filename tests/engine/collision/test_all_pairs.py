@@ -14,16 +14,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from spook_tracker.engine import HeightField, Maximum, Penetration, Plane, Shape, TriangleMesh
-from tests.engine.collision.test_rims import (
-    DIRECTIONS,
-    SHAPES,
-    body,
-    farthest,
-    fixed,
-    gap,
-    quaternion,
-    run,
-)
+from tests.engine.collision.test_rims import DIRECTIONS, SHAPES, body, farthest, fixed, gap, quaternion, run
 
 RIMMED = {"can", "coin", "cone", "hat"}
 PAIRS = [  # two shapes, a seed, and m before and behind the touch: the search finds what has rims less sharply
@@ -127,8 +118,7 @@ def test_it_touches_triangles_where_the_nearest_of_all_says(name: str, make: Any
     for closer in (-near, near):
         here = place - (distance + closer) * normal
         found = depth(
-            fixed(mesh),
-            body(shape, position=tuple(map(float, here)), orientation=quaternion(turn)),
+            fixed(mesh), body(shape, position=tuple(map(float, here)), orientation=quaternion(turn))
         )
         if closer < 0.0:
             assert found == 0.0

@@ -35,6 +35,7 @@ from spook_tracker.engine import (
     Trace,
     simulate,
 )
+from tests.scenes.corpus import solid
 
 H = 1.0 / 60.0
 CUBE = tuple(itertools.product((-0.5, 0.5), repeat=3))
@@ -192,12 +193,11 @@ def pair(
         turn = Rotation.random(rng=rng)
         w, x, y, z = turn.as_quat(scalar_first=True)
         bodies.append(
-            RigidBody(
-                name=name,
-                mass=1.0,
-                shape=shape,
+            solid(
+                name,
+                shape,
+                tuple(position),
                 inertia=(0.1, 0.1, 0.1),
-                position=tuple(position),
                 orientation=(w, x, y, z),
                 motion="dynamic" if name == "one" else "static",
             )
@@ -219,12 +219,11 @@ def test_a_hull_touches_others_where_least_squares_say(kind: int, seed: int) -> 
     near = 1e-6
     for closer, touching in ((-near, False), (near, True)):
         shift = (distance - core(first)[1] + closer) / distance * way
-        moved = RigidBody(
-            name="one",
-            mass=1.0,
-            shape=first,
+        moved = solid(
+            "one",
+            first,
+            tuple(np.array(one.position) - shift),
             inertia=one.inertia,
-            position=tuple(np.array(one.position) - shift),
             orientation=one.orientation,
         )
         found = overlap(moved, two)
@@ -241,17 +240,8 @@ def test_a_hull_is_parted_along_the_shortest_way_out(kind: int, seed: int) -> No
     if isinstance(first, Sphere | Capsule):
         one, two = two, one
     reference = depth_of(points, other_points) + core(first)[1]
-    movable = RigidBody(
-        name="m",
-        mass=1.0,
-        shape=one.shape,
-        inertia=(0.1,) * 3,
-        position=one.position,
-        orientation=one.orientation,
-    )
-    fixed = RigidBody(
-        name="f", motion="static", shape=two.shape, position=two.position, orientation=two.orientation
-    )
+    movable = solid("m", one.shape, one.position, inertia=(0.1,) * 3, orientation=one.orientation)
+    fixed = solid("f", two.shape, two.position, None, motion="static", orientation=two.orientation)
 
     # Near ties go to faces: a ten-thousandth of the thickness.
     assert overlap(movable, fixed) == pytest.approx(reference, abs=1e-4)
@@ -294,12 +284,12 @@ def test_a_hull_in_a_compound_and_in_water_is_the_box_it_looks_like() -> None:
     half = tuple((0.5 * x, 0.3 * y, 0.4 * z) for x, y, z in CUBE)
     found = []
     for shape in (Box((0.5, 0.3, 0.4)), ConvexHull(half)):
-        body = RigidBody(
-            name="b",
-            mass=30.0,
-            shape=Compound((Part(shape=shape, position=(0.0, 0.0, -0.1)),)),
+        body = solid(
+            "b",
+            Compound((Part(shape=shape, position=(0.0, 0.0, -0.1)),)),
+            (0, 0, 0.1),
+            30.0,
             inertia=(0.6, 0.8, 0.7),
-            position=(0, 0, 0.1),
             orientation=(math.cos(0.1), math.sin(0.1), 0.0, 0.0),
         )
         water = Fluid(name="water", density=1000.0, level=0.0, drag_coefficient=1.0)

@@ -36,6 +36,7 @@ from spook_tracker.engine import (
     start,
 )
 from tests.places import ROOT
+from tests.scenes.corpus import fixed, solid
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s²
 PYRAMID = ConvexHull.placed(
@@ -62,11 +63,10 @@ SLIDERS: dict[
 def floor(raised: float = 0.0, restitution: float = 0.0, size: float = 1.0) -> tuple[RigidBody, ...]:
     """8 × 8 tiles of `size` [m], their tops at z = 0; those of the third row `raised` [m]."""
     return tuple(
-        RigidBody(
-            name=f"tile {i} {j}",
-            motion="static",
-            shape=Box((size, size, 0.5)),
-            position=((i - 1.0) * size, (j - 4.0) * size, -0.25 + (raised if i == 3 else 0.0)),
+        fixed(
+            f"tile {i} {j}",
+            Box((size, size, 0.5)),
+            ((i - 1.0) * size, (j - 4.0) * size, -0.25 + (raised if i == 3 else 0.0)),
             material=Material(restitution=restitution),
         )
         for i in range(8)
@@ -85,14 +85,8 @@ def slider_at(
 ) -> RigidBody:
     """A slider of 1 kg, `lift` [m] above the floor."""
     shape, z, orientation = SLIDERS[slider]
-    return RigidBody(
-        name="slider",
-        mass=1.0,
-        shape=shape,
-        position=(0.0, y, z + lift),
-        orientation=orientation,
-        velocity=velocity,
-        angular_velocity=(0.0, 0.0, spin),
+    return solid(
+        "slider", shape, (0.0, y, z + lift), velocity=velocity, spin=(0.0, 0.0, spin), orientation=orientation
     )
 
 
@@ -156,14 +150,7 @@ def test_iterations_that_have_not_settled_meet_no_edge(slider: str) -> None:
     ],
 )
 def test_a_body_that_sinks_before_iterations_hold_it_meets_no_edge(
-    slider: str,
-    y: float,
-    speed: float,
-    heading: float,
-    spin: float,
-    size: float,
-    sweeps: int,
-    h: float,
+    slider: str, y: float, speed: float, heading: float, spin: float, size: float, sweeps: int, h: float
 ) -> None:
     """On the way to an answer bodies fall further, and rock, than settled sweeps let them: at the side of a tile that was
     1.9 to 4.7 m/s. What settled sweeps may leave is a tenth."""
@@ -256,19 +243,8 @@ def test_an_edge_that_stands_out_is_met(slider: str, solver: str) -> None:
 @pytest.mark.parametrize("speed", [0.01, 0.05, 0.5])
 def test_a_wall_of_two_parts_holds_what_touches_it(solver: str, speed: float) -> None:
     """A box leans on the floor and on two boxes side by side, and is pushed along: neither is let pass for the other."""
-    walls = [
-        RigidBody(
-            name=f"wall {k}", motion="static", shape=Box((1.0, 1.0, 2.0)), position=(0.75, k - 0.5, 1.0)
-        )
-        for k in range(2)
-    ]
-    body = RigidBody(
-        name="box",
-        mass=1.0,
-        shape=Box((0.5, 0.4, 0.3)),
-        position=(0.0, -0.3, 0.15),
-        velocity=(speed, speed, 0.0),
-    )
+    walls = [fixed(f"wall {k}", Box((1.0, 1.0, 2.0)), (0.75, k - 0.5, 1.0)) for k in range(2)]
+    body = solid("box", Box((0.5, 0.4, 0.3)), (0.0, -0.3, 0.15), velocity=(speed, speed, 0.0))
     seen = {
         "v": Trace(quantity=Velocity("box")),
         "x": Trace(quantity=Position("box")),

@@ -31,6 +31,7 @@ from spook_tracker.engine import (
     Velocity,
     simulate,
 )
+from tests.scenes.corpus import fixed, solid
 
 GRAVITY = 9.81  # m/s²
 HEIGHT = 2.0  # m
@@ -42,12 +43,8 @@ STEPS = [1 / 60, 1 / 97, 1 / 240]
 def dropped(shape: Shape, reach: float, restitution: float, h: float, duration: float, method: Method) -> Any:
     """Gap below a body [m] and energy [J], sampled each step; `reach` is from its middle to its lowest point, m."""
     material = Material(restitution=restitution)
-    floor = RigidBody(
-        name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=material
-    )
-    body = RigidBody(
-        name="body", mass=1.0, shape=shape, position=(0.0, 0.0, reach + HEIGHT), material=material
-    )
+    floor = fixed("floor", Plane(), (0.0, 0.0, 0.0), material=material)
+    body = solid("body", shape, (0.0, 0.0, reach + HEIGHT), material=material)
     run = simulate(
         Scene(bodies=(floor, body), gravity=(0.0, 0.0, -GRAVITY)),
         time_step=h,
@@ -128,27 +125,15 @@ def test_what_bounces_comes_to_rest(restitution: float, method: Method) -> None:
 def test_a_ball_between_closing_walls_is_hit_as_often_as_it_meets_them(method: Method, h: float) -> None:
     """Each meeting with the wall that comes on at .5 m/s makes it faster by 1 m/s; several fall into a step in the end."""
     elastic = Material(restitution=1.0)
-    ball = RigidBody(
-        name="ball",
-        mass=1.0,
-        position=(0.51, 0.0, 0.0),
-        shape=Sphere(0.01),
-        velocity=(1.3, 0.0, 0.0),
-        material=elastic,
-    )
-    still = RigidBody(
-        name="still",
-        motion="static",
-        position=(0.0, 0.0, 0.0),
-        shape=Plane((1.0, 0.0, 0.0)),
-        material=elastic,
-    )
-    comes = RigidBody(
-        name="comes",
+    ball = solid("ball", Sphere(0.01), (0.51, 0.0, 0.0), velocity=(1.3, 0.0, 0.0), material=elastic)
+    still = fixed("still", Plane((1.0, 0.0, 0.0)), (0.0, 0.0, 0.0), material=elastic)
+    comes = solid(
+        "comes",
+        Box((1.0, 2.0, 2.0)),
+        (1.52, 0.0, 0.0),
+        None,
+        (-0.5, 0.0, 0.0),
         motion="kinematic",
-        position=(1.52, 0.0, 0.0),
-        shape=Box((1.0, 2.0, 2.0)),
-        velocity=(-0.5, 0.0, 0.0),
         material=elastic,
     )
     place, speed, wall, left, meetings = 0.51, 1.3, 1.02, 1.9, 0  # of the middle, and how far that may come
@@ -179,18 +164,9 @@ def test_impacts_that_are_stopped_without_a_rebound_are_counted(method: Method) 
     elastic = Material(restitution=1.0)
 
     def plate(name: str, x: float) -> RigidBody:
-        return RigidBody(
-            name=name, motion="static", position=(x, 0.0, 0.0), shape=Box((1.0, 2.0, 2.0)), material=elastic
-        )
+        return fixed(name, Box((1.0, 2.0, 2.0)), (x, 0.0, 0.0), material=elastic)
 
-    box = RigidBody(
-        name="box",
-        mass=1.0,
-        position=(0.0, 0.0, 0.0),
-        shape=Box((0.2, 0.2, 0.2)),
-        velocity=(3.0, 0.0, 0.0),
-        material=elastic,
-    )
+    box = solid("box", Box((0.2, 0.2, 0.2)), (0.0, 0.0, 0.0), velocity=(3.0, 0.0, 0.0), material=elastic)
     run = simulate(
         Scene(bodies=(box, plate("left", -0.602), plate("right", 0.602))),
         time_step=1 / 60,
@@ -205,14 +181,7 @@ def test_impacts_that_are_stopped_without_a_rebound_are_counted(method: Method) 
 
 def test_a_stop_whose_rebound_ends_at_the_other_end_is_counted() -> None:
     """Where surfaces may touch, a slide at 3 m/s between elastic stops 8 mm apart goes no further in a step than from one to the other."""
-    slide = RigidBody(
-        name="slide",
-        mass=1.0,
-        shape=Sphere(0.1),
-        position=(0.0, 0.0, 0.0),
-        inertia=(0.1,) * 3,
-        velocity=(3.0, 0.0, 0.0),
-    )
+    slide = solid("slide", Sphere(0.1), (0.0, 0.0, 0.0), velocity=(3.0, 0.0, 0.0), inertia=(0.1,) * 3)
     guide = Prismatic(
         name="guide",
         between=(WORLD, "slide"),
@@ -241,17 +210,8 @@ def test_a_stop_whose_rebound_ends_at_the_other_end_is_counted() -> None:
 def test_half_steps_may_begin_with_an_impact(restitution: float, gap: float) -> None:
     """Half a step back from the start was half of what the impact of the first step gives: it met the floor twice as fast."""
     material = Material(restitution=restitution)
-    floor = RigidBody(
-        name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=material
-    )
-    ball = RigidBody(
-        name="ball",
-        mass=1.0,
-        shape=Sphere(0.1),
-        position=(0.0, 0.0, 0.1 + gap),
-        velocity=(0.0, 0.0, -1.0),
-        material=material,
-    )
+    floor = fixed("floor", Plane(), (0.0, 0.0, 0.0), material=material)
+    ball = solid("ball", Sphere(0.1), (0.0, 0.0, 0.1 + gap), velocity=(0.0, 0.0, -1.0), material=material)
     run = simulate(
         Scene(bodies=(floor, ball)),
         time_step=0.01,

@@ -25,6 +25,7 @@ from spook_tracker.engine import (
     Velocity,
     simulate,
 )
+from tests.scenes.corpus import solid
 
 TIME_STEP = 1.0 / 60.0  # s
 GRAVITY = 10.0  # m/s²
@@ -45,11 +46,11 @@ def slope(
     pull = (math.sin(theta) * math.cos(direction), math.sin(theta) * math.sin(direction), -math.cos(theta))
     surface = Material(friction=mu, slip_compliance=below)
     plane = RigidBody(name="plane", position=(0, 0, 0), shape=Plane(), motion="static", material=surface)
-    box = RigidBody(
-        name="box",
-        position=(0, 0, 0.5),
-        mass=mass,
-        shape=Box((1, 1, 1)),
+    box = solid(
+        "box",
+        Box((1, 1, 1)),
+        (0, 0, 0.5),
+        mass,
         material=Material(friction=mu, slip_compliance=slip_compliance),
     )
     x, y, z = pull
@@ -148,14 +149,7 @@ def test_the_box_lags_a_step_behind_a_changing_load() -> None:
     material = Material(friction=0.5)
     bodies = (
         RigidBody(name="plane", position=(0, 0, 0), shape=Plane(), motion="static", material=material),
-        RigidBody(
-            name="box",
-            position=(0, 0, 0.52),
-            mass=1.0,
-            shape=Box((1, 1, 1)),
-            velocity=(5.0, 0, -3.0),
-            material=material,
-        ),
+        solid("box", Box((1, 1, 1)), (0, 0, 0.52), velocity=(5.0, 0, -3.0), material=material),
     )
     scene = Scene(bodies=bodies, gravity=(0, 0, -GRAVITY))
     runs = {
@@ -200,14 +194,7 @@ def test_a_sliding_ball_begins_to_roll_and_keeps_five_sevenths() -> None:
     material = Material(friction=mu)
     bodies = (
         RigidBody(name="plane", position=(0, 0, 0), shape=Plane(), motion="static", material=material),
-        RigidBody(
-            name="ball",
-            position=(0, 0, 0.2),
-            mass=1.0,
-            shape=Sphere(0.2),
-            velocity=(start, 0, 0),
-            material=material,
-        ),
+        solid("ball", Sphere(0.2), (0, 0, 0.2), velocity=(start, 0, 0), material=material),
     )
     result = simulate(
         Scene(bodies=bodies, gravity=(0, 0, -GRAVITY)),
@@ -255,14 +242,7 @@ def test_each_contact_in_a_heap_of_balls_obeys_the_law() -> None:
     names = [f"ball{k}" for k in range(len(places))]
     bodies = [RigidBody(name="plane", position=(0, 0, 0), shape=Plane(), motion="static", material=material)]
     bodies += [
-        RigidBody(
-            name=name,
-            position=(x, y, z),
-            mass=1.0 + k,
-            shape=Sphere(radius),
-            velocity=(0.5 - 0.2 * k, 0.1 * k, 0),
-            material=material,
-        )
+        solid(name, Sphere(radius), (x, y, z), 1.0 + k, (0.5 - 0.2 * k, 0.1 * k, 0), material=material)
         for k, (name, (x, y), z) in enumerate(zip(names, places, heights, strict=True))
     ]
     pairs = [*combinations(names, 2), *((name, "plane") for name in names)]

@@ -22,7 +22,6 @@ from spook_tracker.engine import (
     Load,
     Method,
     Position,
-    RigidBody,
     Scene,
     Sphere,
     Trace,
@@ -30,7 +29,7 @@ from spook_tracker.engine import (
     simulate,
 )
 from tests.scenes.blows import ELASTIC, RADIUS, H, ball, wall
-from tests.scenes.corpus import GRAVITY
+from tests.scenes.corpus import GRAVITY, solid
 
 SOLVERS = ("direct", "iterative")
 Impacts = Literal["simultaneous", "successive"]
@@ -111,13 +110,7 @@ def test_what_an_impact_lifts_falls_until_the_next_one(share: float, solver: str
 def test_balls_that_are_pressed_together_as_they_fly_carry_each_other(solver: str) -> None:
     """Loads push two at each other, and a third strikes one from the side: at its time, with both where they lie."""
     bodies = [
-        RigidBody(
-            name=name,
-            mass=1.0,
-            shape=Sphere(RADIUS),
-            position=(x, 0.0, 0.0),
-            material=ELASTIC,
-        )
+        solid(name, Sphere(RADIUS), (x, 0.0, 0.0), material=ELASTIC)
         for name, x in (("left", -RADIUS), ("right", RADIUS))
     ]
     bodies.append(ball("comes", (RADIUS, -2.0 * RADIUS - 0.9 * H * 3.0, 0.0), (0.0, 3.0, 0.0)))

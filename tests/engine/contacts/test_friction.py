@@ -26,6 +26,7 @@ from spook_tracker.engine import (
     simulate,
 )
 from tests.oracles.particles import Array
+from tests.scenes.corpus import fixed, solid
 
 MU = 0.5
 G = 10.0  # m/s²
@@ -38,12 +39,8 @@ def slope(tan: float, turn: float, material: Material, mass: float = MASS) -> Sc
     """A box on a level plane under a gravity tilted by atan(tan) towards the direction `turn` [rad]."""
     tilt = math.atan(tan)
     pull = G * math.sin(tilt)
-    ground = RigidBody(
-        name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=material
-    )
-    box = RigidBody(
-        name="box", mass=mass, shape=Box((1.0, 1.0, 0.2)), position=(0.0, 0.0, 0.1), material=material
-    )
+    ground = fixed("ground", Plane(), (0.0, 0.0, 0.0), material=material)
+    box = solid("box", Box((1.0, 1.0, 0.2)), (0.0, 0.0, 0.1), mass, material=material)
     gravity = (pull * math.cos(turn), pull * math.sin(turn), -G * math.cos(tilt))
     return Scene(bodies=(ground, box), gravity=gravity)
 
@@ -77,18 +74,11 @@ def test_viscous_friction_is_a_force_as_large_as_the_slip(solver: Any, viscosity
 
 
 def test_friction_of_two_materials_is_their_geometric_mean() -> None:
-    ground = RigidBody(
-        name="ground",
-        motion="static",
-        shape=Plane(),
-        position=(0.0, 0.0, 0.0),
-        material=Material(friction=0.2),
-    )
-    box = RigidBody(
-        name="box",
-        mass=1.0,
-        shape=Box((1.0, 1.0, 0.2)),
-        position=(0.0, 0.0, 0.1),
+    ground = fixed("ground", Plane(), (0.0, 0.0, 0.0), material=Material(friction=0.2))
+    box = solid(
+        "box",
+        Box((1.0, 1.0, 0.2)),
+        (0.0, 0.0, 0.1),
         velocity=(3.0, 0.0, 0.0),
         material=Material(friction=0.8),
     )
@@ -149,10 +139,7 @@ def test_a_pair_may_roll_with_friction_and_a_ball_without_it_goes_on() -> None:
     """A ball slows by 5/7 g µ_r / r; of two on one ground the pair alone has it."""
     ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
     balls = [
-        RigidBody(
-            name=name, mass=MASS, shape=Sphere(0.5), position=(0.0, y, 0.5),
-            velocity=(1.0, 0.0, 0.0), angular_velocity=(0.0, 2.0, 0.0),
-        )
+        solid(name, Sphere(0.5), (0.0, y, 0.5), MASS, (1.0, 0.0, 0.0), (0.0, 2.0, 0.0))
         for name, y in (("braked", 0.0), ("free", 3.0))
     ]  # fmt: skip
     pairs = (

@@ -28,19 +28,13 @@ from spook_tracker.engine import (
     Velocity,
     simulate,
 )
+from tests.scenes.corpus import fixed, solid
 
 H = 1 / 60
 
 
 def ball(name: str, x: float, speed: float, mass: float, psi: float, y: float = 0.0) -> RigidBody:
-    return RigidBody(
-        name=name,
-        mass=mass,
-        shape=Sphere(0.1),
-        position=(x, y, 0.0),
-        velocity=(speed, 0.0, 0.0),
-        material=Material(restitution=psi),
-    )
+    return solid(name, Sphere(0.1), (x, y, 0.0), mass, (speed, 0.0, 0.0), material=Material(restitution=psi))
 
 
 @pytest.mark.parametrize("psi", [0.0, 0.3, 0.8, 1.0])
@@ -101,13 +95,7 @@ def test_an_oblique_hit_without_rebound_comes_along_the_line_of_centres_of_its_m
 def test_t12_joints_take_part_in_an_impact(kind: str, bound: float, psi: float) -> None:
     """A ball hits a hinged plank: the impulse is (1 + psi) V/(1/m + d²/I), I about the hinge."""
     speed, mass, arm = 4.0, 0.5, 0.8
-    plank = RigidBody(
-        name="plank",
-        mass=3.0,
-        shape=Box((0.1, 1.0, 0.2)),
-        position=(0.0, 0.5, 0.0),
-        material=Material(restitution=psi),
-    )
+    plank = solid("plank", Box((0.1, 1.0, 0.2)), (0.0, 0.5, 0.0), 3.0, material=Material(restitution=psi))
     moment = 3.0 * (1.0 + 0.01) / 12.0 + 3.0 * 0.25
     ends: tuple[str, str] = (WORLD, "plank")
     pin = {
@@ -160,13 +148,12 @@ def test_balls_held_by_joints_go_on_after_an_impact_as_it_left_them(h: float, so
     for i, (a, w) in enumerate(((-lean, spin), (0.0, 0.0))):
         reach = arm * np.array((math.sin(a), 0.0, -math.cos(a)))
         bodies.append(
-            RigidBody(
-                name=f"b{i}",
-                mass=1.0,
-                shape=Sphere(radius),
-                position=(reach[0] + 2 * radius * i, 0.0, reach[2]),
+            solid(
+                f"b{i}",
+                Sphere(radius),
+                (reach[0] + 2 * radius * i, 0.0, reach[2]),
                 velocity=tuple(np.cross((0.0, -w, 0.0), reach)),
-                angular_velocity=(0.0, -w, 0.0),
+                spin=(0.0, -w, 0.0),
                 material=Material(restitution=1.0),
             )
         )
@@ -252,23 +239,15 @@ def test_friction_turns_what_rebounds_about_its_own_surface_wherever_the_step_be
     place as by impulses. The lever is its radius, not the half gap of the step's start more."""
     rubber, deep = Material(friction=5.0, restitution=1.0), 0.5 if isinstance(shape, Box) else 0.0
     walls = [
-        RigidBody(
-            name=name,
-            motion="static",
-            shape=Plane((0.0, 0.0, up)) if isinstance(shape, Plane) else shape,
-            position=(0.0, 0.0, z - up * deep),
+        fixed(
+            name,
+            Plane((0.0, 0.0, up)) if isinstance(shape, Plane) else shape,
+            (0.0, 0.0, z - up * deep),
             material=rubber,
         )
         for name, up, z in (("floor", 1.0, 0.0), ("ceiling", -1.0, 1.0))
     ]
-    thrown = RigidBody(
-        name="ball",
-        mass=1.0,
-        shape=Sphere(0.1),
-        position=(0.0, 0.0, 0.5),
-        velocity=(3.0, 0.0, -4.0),
-        material=rubber,
-    )
+    thrown = solid("ball", Sphere(0.1), (0.0, 0.0, 0.5), velocity=(3.0, 0.0, -4.0), material=rubber)
     result = simulate(
         Scene(bodies=(*walls, thrown)),
         time_step=0.2 * blows,

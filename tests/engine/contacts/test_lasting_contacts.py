@@ -26,6 +26,7 @@ from spook_tracker.engine import (
     Velocity,
     simulate,
 )
+from tests.scenes.corpus import solid
 
 HALF = Method(half_step_velocities=True)
 GRAVITY, FRICTION, RADIUS = 10.0, 0.2, 0.5
@@ -122,19 +123,8 @@ def test_a_ball_that_slides_down_a_dome_without_friction_is_of_order_2(rebounds:
     start, duration = 0.2, 0.5
     far = 2.0 + RADIUS
     dome = RigidBody(name="dome", motion="static", shape=Sphere(2.0), position=(0.0, 0.0, 0.0))
-    body = RigidBody(
-        name="body",
-        mass=1.0,
-        shape=Sphere(RADIUS),
-        position=(far * math.sin(start), 0.0, far * math.cos(start)),
-    )
-    far_off = RigidBody(
-        name="far off",
-        mass=1.0,
-        shape=Sphere(RADIUS),
-        position=(50.0, 0.0, 0.0),
-        material=Material(restitution=0.5),
-    )
+    body = solid("body", Sphere(RADIUS), (far * math.sin(start), 0.0, far * math.cos(start)))
+    far_off = solid("far off", Sphere(RADIUS), (50.0, 0.0, 0.0), material=Material(restitution=0.5))
     scene = Scene(bodies=(dome, body, *(far_off,) * rebounds), gravity=(0.0, 0.0, -GRAVITY))
 
     def angle(method: Method, n: int) -> float:
@@ -214,9 +204,7 @@ def test_a_block_of_steps_taken_back_behind_a_look_ahead_goes_the_same_way_again
     h = 0.01
 
     def ball(name: str, x: float, v: float) -> RigidBody:
-        return RigidBody(
-            name=name, mass=1.0, shape=Sphere(0.1), position=(x, 0.0, 0.0), velocity=(v, 0.0, 0.0)
-        )
+        return solid(name, Sphere(0.1), (x, 0.0, 0.0), velocity=(v, 0.0, 0.0))
 
     pushed = RigidBody(name="pushed", mass=1.0, inertia=(1.0, 1.0, 1.0), position=(0.0, 9.0, 0.0))
     observe = {"x": Trace(quantity=Position("left")), "v": Trace(quantity=Velocity("left"))}

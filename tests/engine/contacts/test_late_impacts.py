@@ -82,10 +82,7 @@ def test_a_ball_pushed_past_a_post_is_turned_by_the_side_it_comes_to(solver: str
     gap = -meets * PUSHED * normal[0]  # along that normal where the step begins
 
     velocity = after_a_step(
-        (
-            *pushed_ball(),
-            RigidBody(name="post", motion="static", shape=Sphere(RADIUS), position=tuple(post)),
-        ),
+        (*pushed_ball(), RigidBody(name="post", motion="static", shape=Sphere(RADIUS), position=tuple(post))),
         solver,
     )[1]
 
@@ -149,9 +146,7 @@ def test_the_far_end_of_a_bell_that_is_hit_meets_what_its_arc_leads_to(solver: s
     rises, turns = first[1], first[2]
 
     def end(time: float) -> np.ndarray:
-        return np.array(
-            [half * np.cos(turns * time), 0.0, rises * time - half * np.sin(turns * time)],
-        )
+        return np.array([half * np.cos(turns * time), 0.0, rises * time - half * np.sin(turns * time)])
 
     meets = brentq(lambda time: np.linalg.norm(end(time) - ball) - 2.0 * radius, 1e-6, TIME_STEP)
     normal = (end(meets) - ball) / (2.0 * radius)

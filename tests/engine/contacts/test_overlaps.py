@@ -24,6 +24,7 @@ from spook_tracker.engine import (
     simulate,
 )
 from tests.scenes.contact import DOWN, TIME_STEP, ball, cube, ground
+from tests.scenes.corpus import fixed, solid
 
 
 @pytest.mark.parametrize("depth", [1e-3, 0.1, 0.4])
@@ -70,22 +71,14 @@ def test_an_end_that_is_hit_down_within_a_step_does_not_sink(
 ) -> None:
     """A bar lies still with one end on the floor, the other 4 mm above it, out of reach, until a ball hits that end."""
     tilt, reach = 0.004, 0.5
-    bar = RigidBody(
-        name="bar",
-        mass=1.0,
-        shape=shape,
-        position=(0.0, 0.0, 0.05 + reach * math.sin(tilt)),
+    bar = solid(
+        "bar",
+        shape,
+        (0.0, 0.0, 0.05 + reach * math.sin(tilt)),
         orientation=(math.cos(math.pi / 4 + tilt / 2), 0.0, math.sin(math.pi / 4 + tilt / 2), 0.0),
     )
-    below = RigidBody(
-        name="floor",
-        motion="static",
-        shape=floor,
-        position=(0.0, 0.0, 0.0 if isinstance(floor, Plane) else -0.5),
-    )
-    hammer = RigidBody(
-        name="hammer", mass=5.0, shape=Sphere(0.1), position=(-0.45, 0.0, 0.3), velocity=(0.0, 0.0, -8.0)
-    )
+    below = fixed("floor", floor, (0.0, 0.0, 0.0 if isinstance(floor, Plane) else -0.5))
+    hammer = solid("hammer", Sphere(0.1), (-0.45, 0.0, 0.3), 5.0, (0.0, 0.0, -8.0))
     result = simulate(
         Scene(bodies=(below, bar, hammer), gravity=DOWN),
         time_step=TIME_STEP,
@@ -109,13 +102,7 @@ def test_what_is_sunk_into_one_body_sinks_into_no_other(solver: str, shape: Sphe
             ("wall", (0.4, 1.0, 1.0), (face + 0.2, 0.0, 0.5)),
         )
     )
-    slider = RigidBody(
-        name="slider",
-        mass=1.0,
-        shape=shape,
-        position=(-0.225, 0.0, 0.2 - depth),
-        velocity=(speed, 0.0, 0.0),
-    )
+    slider = solid("slider", shape, (-0.225, 0.0, 0.2 - depth), velocity=(speed, 0.0, 0.0))
     result = simulate(
         Scene(bodies=(floor, wall, slider)),
         time_step=TIME_STEP,

@@ -19,6 +19,7 @@ from spook_tracker.engine import (
 )
 from spook_tracker.engine.bodies import Material
 from spook_tracker.scalar_tests import falling_pile, pile
+from tests.scenes.corpus import solid
 
 STEP = 1.0 / 60.0
 
@@ -48,31 +49,12 @@ def test_a_ball_that_passes_a_pile_keeps_every_bit_of_its_velocity() -> None:
     """One thousandth of a radius beside the pile's outermost sphere, without gravity: near is not touching."""
     smooth = Material(friction=0.5)
     rest = [
-        RigidBody(
-            name=f"s{k}",
-            mass=1.0,
-            shape=Sphere(0.25),
-            position=(0.5 * (k % 3), 0.5 * (k // 3), 0.25),
-            material=smooth,
-        )
-        for k in range(9)
+        solid(f"s{k}", Sphere(0.25), (0.5 * (k % 3), 0.5 * (k // 3), 0.25), material=smooth) for k in range(9)
     ]
     floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=smooth)
-    pusher = RigidBody(
-        name="pusher",
-        mass=1.0,
-        shape=Sphere(0.25),
-        position=(-0.6, 0.0, 0.25),
-        velocity=(2.0, 0.0, 0.0),
-        material=smooth,
-    )
-    passer = RigidBody(
-        name="passer",
-        mass=1.0,
-        shape=Sphere(0.25),
-        position=(1.50025, -2.0, 0.25 + 1e-6),
-        velocity=(0.3, 7.0, 0.1),
-        material=smooth,
+    pusher = solid("pusher", Sphere(0.25), (-0.6, 0.0, 0.25), velocity=(2.0, 0.0, 0.0), material=smooth)
+    passer = solid(
+        "passer", Sphere(0.25), (1.50025, -2.0, 0.25 + 1e-6), velocity=(0.3, 7.0, 0.1), material=smooth
     )
     result = simulate(
         Scene(bodies=(floor, *rest, pusher, passer)),

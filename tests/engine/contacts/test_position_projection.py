@@ -7,17 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from spook_tracker.engine import (
-    Box,
-    Maximum,
-    Penetration,
-    Position,
-    RigidBody,
-    Scene,
-    Trace,
-    simulate,
-)
+from spook_tracker.engine import Box, Maximum, Penetration, Position, RigidBody, Scene, Trace, simulate
 from spook_tracker.scalar_tests import loose_bearing
+from tests.scenes.corpus import solid
 
 
 @pytest.mark.parametrize("time_step", [1 / 60, 1 / 240])
@@ -45,12 +37,7 @@ def test_what_parts_is_not_pushed_into_a_third_that_nothing_touches(boxes: int) 
     one was entered by .74 mm, since only pairs that touch had a say."""
     side, gap = 0.2, 1e-4
     row = [
-        RigidBody(
-            name=f"box {k}",
-            mass=1.0,
-            shape=Box((side, side, side)),
-            position=(side - 4e-3 + k * (side + gap), 0.0, 0.0),
-        )
+        solid(f"box {k}", Box((side, side, side)), (side - 4e-3 + k * (side + gap), 0.0, 0.0))
         for k in range(boxes)
     ]
     wall = RigidBody(name="wall", motion="static", shape=Box((side, side, side)), position=(0.0, 0.0, 0.0))

@@ -37,6 +37,7 @@ from spook_tracker.engine import (
 )
 from spook_tracker.engine.joints import Constraint
 from tests.scenes.contact import DOWN, GRAVITY, TIME_STEP, ball, cube, ground
+from tests.scenes.corpus import fixed, solid
 
 
 @pytest.mark.parametrize("time_step", [1 / 240, 1 / 60])
@@ -163,12 +164,7 @@ def test_a_beam_of_locked_boxes_rests_on_its_piles(pile: str) -> None:
         "cylinders": (Capsule(0.5, 0.1), (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)),
         "boxes": (Box((width, 0.1, 1.0)), (1.0, 0.0, 0.0, 0.0)),
     }[pile]
-    boxes = [
-        RigidBody(
-            name=f"box{k}", position=(width * k - half, 0, 0.05), mass=2.5, shape=Box((width, 0.1, 0.1))
-        )
-        for k in range(count)
-    ]
+    boxes = [solid(f"box{k}", Box((width, 0.1, 0.1)), (width * k - half, 0, 0.05), 2.5) for k in range(count)]
     piles = [
         RigidBody(name=name, position=(x, 0, -0.5), shape=shape, orientation=turn, motion="static")
         for name, x in (("left", -half), ("right", half))
@@ -217,16 +213,9 @@ def test_every_shape_rests_on_every_other() -> None:
     }
     for below, (low_shape, low_turn, top, _) in shapes.items():
         for above, (high_shape, high_turn, _, bottom) in shapes.items():
-            lower = RigidBody(
-                name="lower", position=(0, 0, 0), shape=low_shape, orientation=low_turn, motion="static"
-            )
-            upper = RigidBody(
-                name="upper",
-                position=(0, 0, top + bottom + 0.05),
-                mass=1.0,
-                inertia=(1, 1, 1),
-                shape=high_shape,
-                orientation=high_turn,
+            lower = fixed("lower", low_shape, (0, 0, 0), orientation=low_turn)
+            upper = solid(
+                "upper", high_shape, (0, 0, top + bottom + 0.05), inertia=(1, 1, 1), orientation=high_turn
             )
             result = simulate(
                 Scene(bodies=(lower, upper), gravity=DOWN),
@@ -244,9 +233,7 @@ def test_every_shape_rests_on_every_other() -> None:
 
 def test_a_lift_carries_its_load() -> None:
     """On a kinematic platform that rises steadily the load rises with it, pressed by its weight."""
-    lift = RigidBody(
-        name="lift", position=(0, 0, -0.5), shape=Box((2, 2, 1)), motion="kinematic", velocity=(0, 0, 0.7)
-    )
+    lift = solid("lift", Box((2, 2, 1)), (0, 0, -0.5), None, (0, 0, 0.7), motion="kinematic")
     result = simulate(
         Scene(bodies=(lift, cube("load", (0, 0, 0.5))), gravity=DOWN),
         time_step=TIME_STEP,

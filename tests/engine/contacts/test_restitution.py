@@ -34,9 +34,7 @@ from tests.scenes.contact import DOWN, GRAVITY, TIME_STEP, ball, ground
 @pytest.mark.parametrize("solver", ["direct", "iterative"])
 def test_one_contact_returns_psi_times_the_approach(psi: float, solver: str) -> None:
     """Without gravity, touching at the start: v₊ = −psi v₋ along the normal, unchanged across it."""
-    scene = Scene(
-        bodies=(ground(Material(restitution=psi)), ball(velocity=(0.3, -0.2, -4.0))),
-    )
+    scene = Scene(bodies=(ground(Material(restitution=psi)), ball(velocity=(0.3, -0.2, -4.0))))
     result = simulate(
         scene,
         time_step=TIME_STEP,

@@ -27,6 +27,7 @@ from spook_tracker.engine import (
     Velocity,
     simulate,
 )
+from tests.scenes.corpus import fixed, solid
 
 H = 1.0 / 60.0
 DOWN = (0.0, 0.0, -10.0)
@@ -34,9 +35,7 @@ RADIUS = 0.1
 
 
 def floor(mu: float = 0.5) -> RigidBody:
-    return RigidBody(
-        name="floor", motion="static", shape=Plane(), position=(0, 0, 0), material=Material(friction=mu)
-    )
+    return fixed("floor", Plane(), (0, 0, 0), material=Material(friction=mu))
 
 
 def ball(name: str = "ball", height: float = RADIUS, mu: float = 0.5, **fields: object) -> RigidBody:
@@ -161,18 +160,13 @@ def test_a_heap_with_rolling_friction_comes_to_rest_on_a_slope() -> None:
 def coin_on_hills(solver: str, steps: int) -> Result:
     """A coin, thrown on a height field whose patches touch it at up to eight points at a time."""
     heights = tuple(tuple(0.15 * math.sin(0.9 * i) * math.cos(0.7 * j) for j in range(13)) for i in range(13))
-    hills = RigidBody(
-        name="hills",
-        motion="static",
-        shape=HeightField((0.5, 0.5), heights),
-        position=(-3.0, -3.0, 0.0),
-        material=Material(friction=0.5),
+    hills = fixed(
+        "hills", HeightField((0.5, 0.5), heights), (-3.0, -3.0, 0.0), material=Material(friction=0.5)
     )
-    coin = RigidBody(
-        name="coin",
-        mass=1.0,
-        shape=Cylinder(0.3, 0.02),
-        position=(0.3, 0.2, 0.5),
+    coin = solid(
+        "coin",
+        Cylinder(0.3, 0.02),
+        (0.3, 0.2, 0.5),
         velocity=(1.0, -0.5, 0.0),
         orientation=(0.9, 0.3, 0.3, 0.1),
         material=Material(friction=0.5, rolling_friction=0.01, torsional_friction=0.005),

@@ -30,6 +30,7 @@ from spook_tracker.engine import (
     Velocity,
     simulate,
 )
+from tests.scenes.corpus import solid
 
 H = 1 / 60  # s
 GRAVITY = (0.0, 0.0, -9.81)
@@ -101,14 +102,13 @@ def test_balls_that_rebound_are_where_both_their_speeds_lead(h: float, solver: s
 def falling_rod(tilt: float, slip: float, moment: float, material: Material) -> RigidBody:
     """A metre long, .1 m over the ground, its lower end to the right; it falls at 1 m/s."""
     turn = 0.5 * (math.pi / 2 + tilt)
-    return RigidBody(
-        name="rod",
-        mass=1.0,
-        inertia=(moment,) * 3,
-        shape=Capsule(0.02, 1.0),
-        position=(0.0, 0.0, 0.5 * math.sin(tilt) + 0.12),
-        orientation=(math.cos(turn), 0.0, math.sin(turn), 0.0),
+    return solid(
+        "rod",
+        Capsule(0.02, 1.0),
+        (0.0, 0.0, 0.5 * math.sin(tilt) + 0.12),
         velocity=(slip, 0.0, -1.0),
+        inertia=(moment,) * 3,
+        orientation=(math.cos(turn), 0.0, math.sin(turn), 0.0),
         material=material,
     )
 
@@ -292,11 +292,7 @@ def test_iterations_see_no_step_where_tiles_go_on(sweeps: int, seed: int) -> Non
     scene = Scene(bodies=(*tiles, slider), gravity=tuple(frame @ GRAVITY))
     method = Method(solver="iterative", iterations=sweeps)
     result = simulate(
-        scene,
-        time_step=h,
-        duration=0.35,
-        method=method,
-        observe={"v": Trace(quantity=Velocity("slider"))},
+        scene, time_step=h, duration=0.35, method=method, observe={"v": Trace(quantity=Velocity("slider"))}
     )
 
     off = 1e-6 if sweeps == 50 else method.residual_of("unsettled_residual", scene)
@@ -340,13 +336,7 @@ def test_what_lies_on_a_body_that_the_floor_stops_does_not_fall_into_it(
     one before the floor stops that: it went on for g h^2 = 2.7 mm, and for twice that in the next step."""
     made_of = Material(restitution=restitution)
     boxes = [
-        RigidBody(
-            name=name,
-            mass=1.0,
-            shape=Box((0.2, 0.2, 0.2)),
-            position=(0.0, 0.0, height),
-            material=made_of,
-        )
+        solid(name, Box((0.2, 0.2, 0.2)), (0.0, 0.0, height), material=made_of)
         for name, height in (("lower", 0.1 + 1e-9), ("upper", 0.3 + 2e-9))
     ]
     run = simulate(

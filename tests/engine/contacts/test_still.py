@@ -14,7 +14,6 @@ from spook_tracker.engine import (
     Material,
     Plane,
     Position,
-    RigidBody,
     Run,
     Scene,
     Sphere,
@@ -22,6 +21,7 @@ from spook_tracker.engine import (
     start,
 )
 from tests.scenes.contact import DOWN, GRAVITY, TIME_STEP, ground
+from tests.scenes.corpus import fixed, solid
 
 ROUGH = Material(friction=0.5)
 EDGE = 0.3  # m, no binary fraction: gaps of boxes on boxes are never zero in every corner
@@ -32,21 +32,11 @@ def stacks() -> Scene:
     a ball is on its way to the second."""
     rng = np.random.default_rng(4)
     boxes = [
-        RigidBody(
-            name=f"box{column}{level}", mass=1.0, shape=Box((EDGE, EDGE, EDGE)), material=ROUGH,
-            position=(1.1 * column + rng.uniform(-.02, .02), rng.uniform(-.02, .02), .17 + .32 * level),
-        )
+        solid(f"box{column}{level}", Box((EDGE, EDGE, EDGE)), (1.1 * column + rng.uniform(-.02, .02), rng.uniform(-.02, .02), .17 + .32 * level), material=ROUGH)
         for column in range(4)
         for level in range(5)
     ]  # fmt: skip
-    ball = RigidBody(
-        name="ball",
-        mass=0.2,
-        shape=Sphere(0.1),
-        material=ROUGH,
-        position=(1.1, 0.0, 35.0),
-        velocity=(0, 0, -2.0),
-    )
+    ball = solid("ball", Sphere(0.1), (1.1, 0.0, 35.0), 0.2, (0, 0, -2.0), material=ROUGH)
     push = Load(name="push", body="box04")
     return Scene(bodies=(ground(ROUGH), *boxes, ball), forces=(push,), gravity=DOWN)
 
@@ -134,13 +124,9 @@ def test_a_block_at_the_edge_of_sliding_rests_or_slides(excess: float) -> None:
     rough = Material(friction=math.tan(angle) * (1.0 + excess))
     turn = (math.cos(angle / 2), 0.0, math.sin(angle / 2), 0.0)
     up = (math.sin(angle), 0.0, math.cos(angle))
-    slope = RigidBody(
-        name="slope", motion="static", shape=Plane(), position=(0, 0, 0), orientation=turn, material=rough
-    )
+    slope = fixed("slope", Plane(), (0, 0, 0), orientation=turn, material=rough)
     middle = tuple(0.5 * EDGE * x for x in up)
-    block = RigidBody(
-        name="block", mass=1.0, shape=Box((EDGE,) * 3), position=middle, orientation=turn, material=rough
-    )
+    block = solid("block", Box((EDGE,) * 3), middle, orientation=turn, material=rough)
     with start(
         Scene(bodies=(slope, block), gravity=DOWN), time_step=TIME_STEP, observe={"v": Velocity("block")}
     ) as run:

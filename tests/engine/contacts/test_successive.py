@@ -18,6 +18,7 @@ from spook_tracker.engine import (
     simulate,
 )
 from tests.engine.contacts.test_impacts import meetings
+from tests.scenes.corpus import fixed, solid
 
 ELASTIC = Material(restitution=1.0)
 GRAVITY = 9.81  # m/s²
@@ -27,14 +28,7 @@ SUCCESSIVE = ["direct", "iterative"]
 
 
 def ball(name: str, place: np.ndarray, velocity: np.ndarray, mass: float, material: Material) -> RigidBody:
-    return RigidBody(
-        name=name,
-        mass=mass,
-        shape=Sphere(0.5 * SIZE),
-        position=tuple(place),
-        velocity=tuple(velocity),
-        material=material,
-    )
+    return solid(name, Sphere(0.5 * SIZE), tuple(place), mass, tuple(velocity), material=material)
 
 
 @pytest.mark.parametrize("h", STEPS)
@@ -44,9 +38,7 @@ def test_a_single_impact_is_the_same_in_either_order(psi: float, way: float, h: 
     material = Material(restitution=psi)
     ends = []
     for impacts in ("simultaneous", "successive"):
-        wall = RigidBody(
-            name="wall", motion="static", shape=Box((4.0, 4.0, 1.0)), position=(0, 0, 0), material=material
-        )
+        wall = fixed("wall", Box((4.0, 4.0, 1.0)), (0, 0, 0), material=material)
         place = np.array((0.0, 0.0, -way * (0.7 + 1.4 * h * 2.0)))
         thrown = ball("thrown", place, np.array((0.0, 0.0, 2.0 * way)), 1.0, material)
         run = simulate(
@@ -70,12 +62,13 @@ def test_a_kinematic_body_hits_a_row_as_a_ball_of_any_mass_would(seed: int, solv
     places[0] -= rng.uniform(0.5, 2.5) * h * speed
     speeds = np.zeros(count + 1)
     speeds[0] = speed
-    pusher = RigidBody(
-        name="pusher",
+    pusher = solid(
+        "pusher",
+        Sphere(0.5 * SIZE),
+        (places[0], 0.0, 0.0),
+        None,
+        (speed, 0.0, 0.0),
         motion="kinematic",
-        shape=Sphere(0.5 * SIZE),
-        position=(places[0], 0.0, 0.0),
-        velocity=(speed, 0.0, 0.0),
         material=ELASTIC,
     )
     row = [

@@ -17,6 +17,7 @@ from spook_tracker.engine import (
     Velocity,
     simulate,
 )
+from tests.scenes.corpus import solid
 
 RADIUS = 0.1  # m
 SOLVERS = ["direct", "iterative"]
@@ -34,14 +35,8 @@ def test_an_impact_turns_the_slip_round_as_far_as_friction_holds(
 ) -> None:
     """Half a ball's mass over 7/2 takes up the slip: the impulse is (1 + psi_t) 2/7 of it, at most mu (1 + psi) u."""
     rubber = Material(friction=mu, restitution=0.8, tangential_restitution=returned)
-    ball = RigidBody(
-        name="ball",
-        mass=2.0,
-        shape=Sphere(RADIUS),
-        position=(0.0, 0.0, 0.15),
-        velocity=(3.0, 0.0, -2.0),
-        angular_velocity=(0.0, -10.0, 0.0),
-        material=rubber,
+    ball = solid(
+        "ball", Sphere(RADIUS), (0.0, 0.0, 0.15), 2.0, (3.0, 0.0, -2.0), (0.0, -10.0, 0.0), material=rubber
     )
 
     end = simulate(

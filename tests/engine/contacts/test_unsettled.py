@@ -31,6 +31,7 @@ from spook_tracker.scalar_tests import pile, scissor_lift
 from spook_tracker.scalar_tests.beam.scene import scene as beam
 from tests.engine.test_symmetries import heap
 from tests.scenes.contact import DOWN, TIME_STEP, cube, ground
+from tests.scenes.corpus import solid
 
 
 def stack(count: int) -> Scene:
@@ -122,11 +123,10 @@ def test_solves_that_settled_leave_no_residual_to_speak_of() -> None:
     smooth = Material(friction=0.1)
     shapes = (Sphere(0.25), Box((0.4, 0.4, 0.4)), Capsule(0.15, 0.4))
     bodies = [
-        RigidBody(
-            name=f"body {k}",
-            mass=1.0,
-            shape=shapes[k % 3],
-            position=(0.6 * (k % 3) + rng.uniform(-0.05, 0.05), 0.6 * (k // 3), 0.3),
+        solid(
+            f"body {k}",
+            shapes[k % 3],
+            (0.6 * (k % 3) + rng.uniform(-0.05, 0.05), 0.6 * (k // 3), 0.3),
             velocity=tuple(0.5 * rng.normal(size=3)),
             material=smooth,
         )
@@ -152,22 +152,15 @@ def walls_that_close_in() -> Scene:
     """Six boxes with nowhere to go: no set of contacts obeys."""
     rough = Material(friction=0.5)
     walls = tuple(
-        RigidBody(
-            name=name,
-            motion="kinematic",
-            shape=Box((1, 20, 20)),
-            position=(x, 0, 0),
-            velocity=(speed, 0, 0),
-            material=rough,
-        )
+        solid(name, Box((1, 20, 20)), (x, 0, 0), None, (speed, 0, 0), motion="kinematic", material=rough)
         for name, x, speed in (("left", -0.5, 1.0), ("right", 3.5, -1.0))
     )
     boxes = tuple(
-        RigidBody(
-            name=f"box {x} {z}",
-            mass=10.0 ** (3 * ((7 * x + 3 * z) % 5 - 2)),
-            shape=Box((1, 1, 1)),
-            position=(x + 0.5, 0, z + 0.5),
+        solid(
+            f"box {x} {z}",
+            Box((1, 1, 1)),
+            (x + 0.5, 0, z + 0.5),
+            10.0 ** (3 * ((7 * x + 3 * z) % 5 - 2)),
             material=rough,
         )
         for x in range(3)
@@ -220,14 +213,14 @@ def test_the_box_is_judged_by_the_bound_it_was_solved_with(seed: int) -> None:
     for k in range(int(rng.integers(1, 7))):
         turn = rng.normal(size=4)
         bodies.append(
-            RigidBody(
-                name=f"body {k}",
-                shape=(Sphere(0.25), Box((0.4, 0.3, 0.5)), Capsule(0.15, 0.4))[int(rng.integers(3))],
-                mass=float(10 ** rng.uniform(-1, 1)),
-                position=(*rng.uniform(-0.2, 0.2, 2), 0.5 + 0.6 * k),
-                velocity=tuple(2 * rng.normal(size=3)),
+            solid(
+                f"body {k}",
+                (Sphere(0.25), Box((0.4, 0.3, 0.5)), Capsule(0.15, 0.4))[int(rng.integers(3))],
+                (*rng.uniform(-0.2, 0.2, 2), 0.5 + 0.6 * k),
+                float(10 ** rng.uniform(-1, 1)),
+                tuple(2 * rng.normal(size=3)),
+                tuple(3 * rng.normal(size=3)),
                 orientation=tuple(turn / np.linalg.norm(turn)),
-                angular_velocity=tuple(3 * rng.normal(size=3)),
                 material=material,
             )
         )

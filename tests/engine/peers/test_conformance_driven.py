@@ -60,6 +60,7 @@ from tests.engine.peers.test_conformance import (
     rows,
 )
 from tests.scenes import peer as peer_scenes
+from tests.scenes.corpus import solid
 
 G = 9.81  # m/s²
 Z = (0.0, 0.0, 1.0)
@@ -133,13 +134,7 @@ def test_a_motor_drives_what_its_gears_and_rods_drive(asked: Asked, owed: float)
 def test_a_motor_keeps_its_speed_under_gravity(asked: Asked, owed: float) -> None:
     """An arm that its hinge, tilted, turns at 3 rad/s through its highest and lowest place, for 2 s; its turns are counted
     though nothing between is read."""
-    arm = RigidBody(
-        name="arm",
-        mass=2.0,
-        inertia=(0.5, 0.3, 0.4),
-        position=(1.0, 0.0, 0.0),
-        orientation=(0.8, 0.0, 0.6, 0.0),
-    )
+    arm = solid("arm", None, (1.0, 0.0, 0.0), 2.0, inertia=(0.5, 0.3, 0.4), orientation=(0.8, 0.0, 0.6, 0.0))
     joint = Hinge(
         name="j", between=("world", "arm"), at=(0.0,) * 3, axis=(0.0, 0.6, 0.8), motor=Motor(speed=3.0),
         compliance=0.0,

@@ -7,9 +7,7 @@ from typing import Any
 
 import pytest
 
-from spook_tracker.engine import (
-    Scene,
-)
+from spook_tracker.engine import Scene
 from spook_tracker.engine.find import find
 from spook_tracker.engine.protocol import NotSupported
 from tests.scenes import peer as peer_scenes

@@ -7,13 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spook_tracker.engine import (
-    Distance,
-    Particle,
-    Position,
-    Scene,
-    Trace,
-)
+from spook_tracker.engine import Distance, Particle, Position, Scene, Trace
 from spook_tracker.engine.find import find
 from tests.scenes import peer as peer_scenes
 

@@ -7,14 +7,7 @@ from typing import Any
 
 import pytest
 
-from spook_tracker.engine import (
-    Ball,
-    Hinge,
-    Penetration,
-    RigidBody,
-    Scene,
-    Trace,
-)
+from spook_tracker.engine import Ball, Hinge, Penetration, RigidBody, Scene, Trace
 from spook_tracker.engine.find import EngineMissing, find
 from tests.scenes import peer as peer_scenes
 

@@ -8,15 +8,7 @@ from typing import Any
 
 import pytest
 
-from spook_tracker.engine import (
-    Ball,
-    Cylinder,
-    Final,
-    Hinge,
-    Lock,
-    Penetration,
-    Scene,
-)
+from spook_tracker.engine import Ball, Cylinder, Final, Hinge, Lock, Penetration, Scene
 from spook_tracker.engine.find import find
 from tests.scenes import peer as peer_scenes
 

@@ -10,15 +10,7 @@ import numpy as np
 import pytest
 
 import bench.engine_facts as engine_facts
-from spook_tracker.engine import (
-    ContactForce,
-    Final,
-    Load,
-    Position,
-    Scene,
-    SimulationFailed,
-    Trace,
-)
+from spook_tracker.engine import ContactForce, Final, Load, Position, Scene, SimulationFailed, Trace
 from spook_tracker.engine.find import find
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.scalar_tests import resting_grid

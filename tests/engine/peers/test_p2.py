@@ -7,15 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spook_tracker.engine import (
-    ConstraintForce,
-    Distance,
-    Particle,
-    Position,
-    Scene,
-    Trace,
-    simulate,
-)
+from spook_tracker.engine import ConstraintForce, Distance, Particle, Position, Scene, Trace, simulate
 from spook_tracker.engine.find import EngineMissing, find
 
 try:

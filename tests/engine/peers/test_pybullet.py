@@ -14,7 +14,6 @@ from spook_tracker.engine import (
     Material,
     Plane,
     Position,
-    RigidBody,
     Scene,
     Sphere,
     Trace,
@@ -25,6 +24,7 @@ from spook_tracker.engine.peers.surfaces import shares
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.scalar_tests import rolling_friction
 from tests.scenes import peer as peer_scenes
+from tests.scenes.corpus import fixed, solid
 
 pytest.importorskip(
     "pybullet", reason="the extra pybullet is not installed: pip install 'spook-tracker[pybullet]'"
@@ -83,17 +83,9 @@ def test_a_pair_has_the_larger_rolling_friction_or_is_not_supported() -> None:
         def rough(rolling: float) -> Material:
             return Material(friction=0.25, rolling_friction=rolling)
 
-        floor = RigidBody(
-            name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough(0.02)
-        )
+        floor = fixed("floor", Plane(), (0.0, 0.0, 0.0), material=rough(0.02))
         made = [
-            RigidBody(
-                name=f"{k}",
-                mass=1.0,
-                shape=Sphere(0.5),
-                position=(2.0 * k, 0.0, 0.5),
-                material=rough(rolling),
-            )
+            solid(f"{k}", Sphere(0.5), (2.0 * k, 0.0, 0.5), material=rough(rolling))
             for k, rolling in enumerate(of_rolling)
         ]
         return Scene(bodies=(floor, *made))

@@ -13,13 +13,13 @@ from spook_tracker.engine import (
     Particle,
     Plane,
     Position,
-    RigidBody,
     Scene,
     Sphere,
     Trace,
 )
 from spook_tracker.engine.find import EngineMissing, find
 from spook_tracker.engine.protocol import NotSupported
+from tests.scenes.corpus import fixed, solid
 
 try:
     RAPIER = find("rapier")
@@ -34,14 +34,10 @@ def lying(friction: float) -> Scene:
     """Two balls of 1 kg and 3 kg on a plane; the plane comes last among the bodies."""
     surface = Material(friction=friction)
     balls = (
-        RigidBody(
-            name=f"ball {i}", mass=mass, shape=Sphere(0.5), position=(2.0 * i, 0.0, 0.5), material=surface
-        )
+        solid(f"ball {i}", Sphere(0.5), (2.0 * i, 0.0, 0.5), mass, material=surface)
         for i, mass in enumerate((1.0, 3.0))
     )
-    plane = RigidBody(
-        name="plane", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=surface
-    )
+    plane = fixed("plane", Plane(), (0.0, 0.0, 0.0), material=surface)
     return Scene(bodies=(*balls, plane), gravity=GRAVITY)
 
 

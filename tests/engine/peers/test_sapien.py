@@ -8,14 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spook_tracker.engine import (
-    Ball,
-    Cylinder,
-    MaximumAbsolute,
-    RigidBody,
-    Scene,
-    Violation,
-)
+from spook_tracker.engine import Ball, Cylinder, MaximumAbsolute, RigidBody, Scene, Violation
 from spook_tracker.engine.find import find
 from tests.scenes import peer as peer_scenes
 

@@ -34,6 +34,7 @@ from spook_tracker.engine import (
     simulate,
     start,
 )
+from tests.scenes.corpus import solid
 
 HALF = Method(half_step_velocities=True)
 CORRECTED = Method(half_step_velocities=True, corrections=2)
@@ -43,9 +44,7 @@ MASS, MOMENT, ARM, ROTOR = 2.0, 0.05, 0.4, 0.7  # kg, kg m², m, kg m²
 
 def pendulum(floor: bool = False, **hinge: Any) -> Scene:
     """A bob on a hinge, let go level; maybe above a floor that it does not reach."""
-    bob = RigidBody(
-        name="bob", mass=MASS, inertia=(MOMENT, MOMENT, MOMENT), shape=Sphere(0.05), position=(ARM, 0.0, 0.0)
-    )
+    bob = solid("bob", Sphere(0.05), (ARM, 0.0, 0.0), MASS, inertia=(MOMENT, MOMENT, MOMENT))
     joint = Hinge(
         name="joint",
         between=(WORLD, "bob"),
@@ -115,14 +114,14 @@ def test_an_arm_whose_axes_turn_goes_as_by_runge_kutta(
         speed = np.zeros(6)
         mujoco.mj_objectVelocity(model, data, mujoco.mjtObj.mjOBJ_BODY, k + 1, speed, 0)
         bodies.append(
-            RigidBody(
-                name=f"b{k}",
-                mass=float(model.body_mass[k + 1]),
+            solid(
+                f"b{k}",
+                Sphere(0.01) if floor else None,
+                tuple(data.xipos[k + 1]),
+                float(model.body_mass[k + 1]),
+                tuple(speed[3:]),
+                tuple(speed[:3]),
                 inertia=tuple(model.body_inertia[k + 1]),
-                shape=Sphere(0.01) if floor else None,
-                position=tuple(data.xipos[k + 1]),
-                velocity=tuple(speed[3:]),
-                angular_velocity=tuple(speed[:3]),
             )
         )
         joints.append(
@@ -160,24 +159,17 @@ def bar_and_ball(
 ) -> tuple[Scene, float, float]:
     """A bar about the axis y that may turn as it is met [m above it]; and both speeds after an elastic impact."""
     elastic = Material(restitution=1.0)
-    bar = RigidBody(
-        name="bar",
-        mass=2.0,
-        shape=Box((1.0, 0.1, 0.1)),
-        position=(0.5, 0.0, 0.0),
+    bar = solid(
+        "bar",
+        Box((1.0, 0.1, 0.1)),
+        (0.5, 0.0, 0.0),
+        2.0,
+        (0.0, 0.0, 0.5 * spin),
+        (0.0, -spin, 0.0),
         inertia=(0.01, 0.2, 0.2),
-        velocity=(0.0, 0.0, 0.5 * spin),
-        angular_velocity=(0.0, -spin, 0.0),
         material=elastic,
     )
-    ball = RigidBody(
-        name="ball",
-        mass=0.5,
-        shape=Sphere(0.05),
-        position=(0.8, 0.0, 0.1 + gap),
-        velocity=(0.0, 0.0, ball_speed),
-        material=elastic,
-    )
+    ball = solid("ball", Sphere(0.05), (0.8, 0.0, 0.1 + gap), 0.5, (0.0, 0.0, ball_speed), material=elastic)
     joint = Hinge(
         name="joint",
         between=(WORLD, "bar"),
@@ -307,13 +299,7 @@ def test_an_overlap_at_the_start_is_parted_as_without_a_rotor() -> None:
 
 def test_what_slept_goes_on_as_if_it_had_lain_awake() -> None:
     def angle(method: Method) -> tuple[float, int]:
-        bar = RigidBody(
-            name="bar",
-            mass=2.0,
-            shape=Box((1.0, 0.1, 0.1)),
-            position=(0.5, 0.0, 0.05),
-            material=Material(friction=0.5),
-        )
+        bar = solid("bar", Box((1.0, 0.1, 0.1)), (0.5, 0.0, 0.05), 2.0, material=Material(friction=0.5))
         floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
         joint = Hinge(
             name="joint",
@@ -345,13 +331,7 @@ def test_what_slept_goes_on_as_if_it_had_lain_awake() -> None:
 
 @pytest.mark.parametrize("method", [Method(), HALF])
 def test_a_rotor_may_turn_by_more_than_half_a_turn_a_step(method: Method) -> None:
-    wheel = RigidBody(
-        name="wheel",
-        mass=1.0,
-        inertia=(0.1, 0.1, 0.1),
-        position=(0.0, 0.0, 0.0),
-        angular_velocity=(0.0, 0.0, 500.0),
-    )
+    wheel = solid("wheel", None, (0.0, 0.0, 0.0), spin=(0.0, 0.0, 500.0), inertia=(0.1, 0.1, 0.1))
     axle = Hinge(name="axle", between=(WORLD, "wheel"), axis=(0.0, 0.0, 1.0), compliance=0.0, armature=0.3)
     seen = {
         "angle": Final(quantity=JointCoordinate("axle")),

@@ -33,6 +33,7 @@ from spook_tracker.engine import (
     simulate,
     start,
 )
+from tests.scenes.corpus import fixed, solid
 from tests.scenes.coupling import H, Z, hung
 
 
@@ -75,13 +76,9 @@ def thrown_down(joint: Any, restitution: float) -> Scene:
     """A ball that soon meets a floor, with a body above it that touches nothing."""
     surface = Material(friction=0.4, restitution=restitution)
     fall = (0.5, 0.0, -3.0)
-    foot = RigidBody(
-        name="foot", mass=1.0, position=(0.0, 0.0, 0.2), velocity=fall, shape=Sphere(0.1), material=surface
-    )
+    foot = solid("foot", Sphere(0.1), (0.0, 0.0, 0.2), velocity=fall, material=surface)
     head = RigidBody(name="head", mass=2.0, position=(0.3, 0.1, 0.8), velocity=fall, inertia=(0.2, 0.2, 0.1))
-    floor = RigidBody(
-        name="floor", position=(0.0, 0.0, 0.0), shape=Plane(), motion="static", material=surface
-    )
+    floor = fixed("floor", Plane(), (0.0, 0.0, 0.0), material=surface)
     return Scene(bodies=(foot, head, floor), constraints=(joint,), gravity=(0.0, 0.0, -10.0))
 
 
@@ -119,17 +116,14 @@ def test_a_blow_breaks_what_is_too_weak_for_it_whether_it_rebounds_or_not(
     restitution: float, strength: float, breaks: bool
 ) -> None:
     """The lock has to stop 2 kg at 3 m/s within a step, and to send them back."""
-    foot = RigidBody(
-        name="foot",
-        mass=1.0,
-        position=(0.0, 0.0, 0.1),
+    foot = solid(
+        "foot",
+        Sphere(0.1),
+        (0.0, 0.0, 0.1),
         velocity=(0.0, 0.0, -3.0),
-        shape=Sphere(0.1),
         material=Material(restitution=restitution),
     )
-    head = RigidBody(
-        name="head", mass=2.0, position=(0.0, 0.0, 0.8), velocity=(0.0, 0.0, -3.0), inertia=(0.2, 0.2, 0.1)
-    )
+    head = solid("head", None, (0.0, 0.0, 0.8), 2.0, (0.0, 0.0, -3.0), inertia=(0.2, 0.2, 0.1))
     floor = RigidBody(name="floor", position=(0.0, 0.0, 0.0), shape=Plane(), motion="static")
     blow = 2.0 * 3.0 * (1.0 + restitution) / H  # N
     neck = Lock(name="neck", between=("foot", "head"), compliance=0.0, strength=strength * blow)
@@ -156,13 +150,7 @@ def test_a_wire_breaks_and_what_is_saved_before_is_whole_again() -> None:
 
 def test_a_motor_that_wants_to_stand_is_dry_friction() -> None:
     """3 rad/s against 0.5 N m on 2 kg m²: 12 s of even slowing down, then rest; no more torque than what acts."""
-    wheel = RigidBody(
-        name="wheel",
-        mass=1.0,
-        inertia=(2.0, 2.0, 2.0),
-        position=(0.0, 0.0, 0.0),
-        angular_velocity=(0.0, 0.0, 3.0),
-    )
+    wheel = solid("wheel", None, (0.0, 0.0, 0.0), spin=(0.0, 0.0, 3.0), inertia=(2.0, 2.0, 2.0))
     rubbing = Hinge(name="axle", between=(WORLD, "wheel"), axis=Z, motor=Motor(speed=0.0, max_force=0.5))
     push = Load(name="push", body="wheel", torque=(0.0, 0.0, 0.1))
     observe = {"w": Trace(quantity=AngularVelocity("wheel")), "f": Final(quantity=ConstraintForce("axle"))}

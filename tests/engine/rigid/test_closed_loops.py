@@ -6,16 +6,7 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine import (
-    WORLD,
-    Energy,
-    Hinge,
-    JointCoordinate,
-    RigidBody,
-    Scene,
-    Trace,
-    simulate,
-)
+from spook_tracker.engine import WORLD, Energy, Hinge, JointCoordinate, RigidBody, Scene, Trace, simulate
 from tests.oracles.particles import Array
 
 CORNERS = np.array([(0, 0, 0), (1, 0, 0), (1, 0, -1), (1, -1, -1), (0, -1, -1), (0, -1, 0)], dtype=float)

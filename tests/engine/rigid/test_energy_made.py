@@ -19,6 +19,7 @@ from spook_tracker.engine import (
     Trace,
     simulate,
 )
+from tests.scenes.corpus import solid
 
 ORDER_4 = Method(composition="order4")
 LINKS = 10  # of 1 kg and 1 m
@@ -31,13 +32,7 @@ def loaded_chain(load: float) -> Scene:
         RigidBody(name=f"{k}", mass=1.0, position=(0.0, 0.0, -k - 0.5), inertia=(1 / 12, 1 / 12, 0.01))
         for k in range(LINKS)
     ]
-    weight = RigidBody(
-        name="load",
-        mass=load,
-        position=(0.0, 0.0, -LINKS - 0.5),
-        inertia=(0.1 * load,) * 3,
-        velocity=(1.0, 0.0, 0.0),
-    )
+    weight = solid("load", None, (0.0, 0.0, -LINKS - 0.5), load, (1.0, 0.0, 0.0), inertia=(0.1 * load,) * 3)
     ends = [WORLD, *(link.name for link in links), "load"]
     joints = [
         Ball(name=f"to {ends[k + 1]}", between=(ends[k], ends[k + 1]), at=(0.0, 0.0, -k), compliance=0.0)

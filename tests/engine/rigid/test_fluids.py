@@ -23,6 +23,7 @@ from spook_tracker.engine import (
     Sphere,
     simulate,
 )
+from tests.scenes.corpus import solid
 
 G, RHO = 9.81, 1000.0
 
@@ -37,14 +38,7 @@ def push(
     """Force [N] and torque [N m] about the centre of mass that the fluid gives, from one tiny step without spin."""
     h = 1e-6
     gravity = tuple(-G * float(u) for u in up)
-    body = RigidBody(
-        name="body",
-        mass=1.0,
-        inertia=(1.0, 1.0, 1.0),
-        shape=shape,
-        position=position,
-        orientation=orientation,
-    )
+    body = solid("body", shape, position, inertia=(1.0, 1.0, 1.0), orientation=orientation)
     scene = Scene(bodies=(body,), forces=(Fluid(name="sea", density=RHO, **fluid),), gravity=gravity)
     state = simulate(scene, time_step=h, steps=1).final_state["body"]
     return state[7:10] / h - np.array(gravity), state[10:13] / h

@@ -21,13 +21,13 @@ from spook_tracker.engine import (
     Method,
     Motor,
     Orientation,
-    RigidBody,
     Scene,
     Trace,
     simulate,
 )
 from tests.oracles.particles import Array
 from tests.oracles.rigid import free_turn, product, rotation
+from tests.scenes.corpus import solid
 
 MOMENTS = np.array([0.9144, 1.098, 1.66])  # kg m²
 TILTED = np.array([0.9, 0.2, -0.3, 0.25]) / np.linalg.norm([0.9, 0.2, -0.3, 0.25])
@@ -62,13 +62,14 @@ class Euler:
 
 def run(start: Array, h: float, duration: float) -> tuple[Array, Array, Array, Array, Array]:
     """Times, body-frame angular velocities, world momenta, energies and orientations."""
-    body = RigidBody(
-        name="body",
-        mass=2.0,
+    body = solid(
+        "body",
+        None,
+        (0.0, 0.0, 0.0),
+        2.0,
+        spin=tuple(rotation(TILTED) @ start),
         inertia=tuple(MOMENTS),
-        position=(0.0, 0.0, 0.0),
         orientation=tuple(TILTED),
-        angular_velocity=tuple(rotation(TILTED) @ start),
     )
     observe = {
         "w": Trace(quantity=AngularVelocity("body")),
@@ -146,13 +147,7 @@ def test_the_flip_of_the_middle_axis_has_its_period() -> None:
 @pytest.mark.parametrize("h", [0.5, 0.02])
 def test_a_symmetric_top_precesses_as_it_must(h: float) -> None:
     """Body-frame rate (1 − I3/I1) w3 of the transverse spin, and the axis circles the momentum at |L|/I1."""
-    body = RigidBody(
-        name="top",
-        mass=1.0,
-        inertia=(2.0, 2.0, 3.0),
-        position=(0.0, 0.0, 0.0),
-        angular_velocity=(0.4, 0.0, 1.5),
-    )
+    body = solid("top", None, (0.0, 0.0, 0.0), spin=(0.4, 0.0, 1.5), inertia=(2.0, 2.0, 3.0))
     observe = {"q": Trace(quantity=Orientation("top"))}
     spin = np.array([0.8, 0.0, 4.5])
     rate, along = np.linalg.norm(spin) / 2.0, spin / np.linalg.norm(spin)
@@ -171,9 +166,7 @@ def test_a_symmetric_top_precesses_as_it_must(h: float) -> None:
 
 def steady(inertia: tuple[float, float, float], rate: float, h: float, steps: int, **method: Any) -> Array:
     """Orientations of a body that spins about its z-axis."""
-    body = RigidBody(
-        name="b", mass=1.0, inertia=inertia, position=(0.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, rate)
-    )
+    body = solid("b", None, (0.0, 0.0, 0.0), spin=(0.0, 0.0, rate), inertia=inertia)
     observe = {"q": Trace(quantity=Orientation("b"))}
     return np.asarray(
         simulate(Scene(bodies=(body,)), time_step=h, steps=steps, observe=observe, **method)["q"]
@@ -197,16 +190,8 @@ def test_a_steady_spin_turns_by_its_rate_in_every_step(
 @pytest.mark.parametrize("turn", [0.3, 2.0, 30.0])
 def test_a_body_locked_to_a_driven_one_turns_with_it(turn: float) -> None:
     h, steps = 0.05, 100
-    driven = RigidBody(
-        name="driven", motion="kinematic", position=(0.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, turn / h)
-    )
-    held = RigidBody(
-        name="held",
-        mass=1.0,
-        inertia=(0.3, 0.4, 0.5),
-        position=(0.0, 0.0, 0.0),
-        angular_velocity=(0.0, 0.0, turn / h),
-    )
+    driven = solid("driven", None, (0.0, 0.0, 0.0), None, spin=(0.0, 0.0, turn / h), motion="kinematic")
+    held = solid("held", None, (0.0, 0.0, 0.0), spin=(0.0, 0.0, turn / h), inertia=(0.3, 0.4, 0.5))
     scene = Scene(bodies=(driven, held), constraints=(Lock(name="lock", between=("driven", "held")),))
     q = simulate(scene, time_step=h, steps=steps, observe={"q": Trace(quantity=Orientation())})["q"]
 
@@ -218,13 +203,7 @@ def test_a_body_locked_to_a_driven_one_turns_with_it(turn: float) -> None:
 def test_a_motor_turns_its_wheel_by_its_speed_times_the_time(turn: float, method: Method) -> None:
     """Also past half a turn a step, where the angle itself cannot tell which way it went."""
     h, steps = 0.02, 150
-    wheel = RigidBody(
-        name="wheel",
-        mass=1.0,
-        inertia=(0.3, 0.4, 0.5),
-        position=(0.0, 0.0, 0.0),
-        angular_velocity=(0.0, 0.0, turn / h),
-    )
+    wheel = solid("wheel", None, (0.0, 0.0, 0.0), spin=(0.0, 0.0, turn / h), inertia=(0.3, 0.4, 0.5))
     drive = {"motor": Motor(speed=turn / h)} if method == Method() else {}
     axle = Hinge(name="axle", between=(WORLD, "wheel"), axis=(0.0, 0.0, 1.0), compliance=0.0, **drive)
     observe = {"angle": Final(quantity=JointCoordinate("axle"))}
@@ -236,9 +215,7 @@ def test_a_motor_turns_its_wheel_by_its_speed_times_the_time(turn: float, method
 
 
 def test_what_tumbles_faster_than_a_thousand_radians_a_step_keeps_its_energy() -> None:
-    body = RigidBody(
-        name="b", mass=1.0, inertia=tuple(MOMENTS), position=(0.0, 0.0, 0.0), angular_velocity=(3e5, 1e5, 2e5)
-    )
+    body = solid("b", None, (0.0, 0.0, 0.0), spin=(3e5, 1e5, 2e5), inertia=tuple(MOMENTS))
     observe = {"e": Trace(quantity=KineticEnergy()), "l": Trace(quantity=AngularMomentum())}
     for h in (1e-4, 0.1):
         result = simulate(Scene(bodies=(body,)), time_step=h, steps=50, observe=observe)

@@ -29,6 +29,7 @@ from spook_tracker.engine import (
     simulate,
 )
 from spook_tracker.engine.protocol import Capabilities, unsupported
+from tests.scenes.corpus import solid
 from tests.scenes.coupling import H, Z, hung, masses, pair
 
 FREE: dict[
@@ -70,14 +71,7 @@ def test_each_holds_what_it_says_and_leaves_the_rest_free(kind: Any) -> None:
 def test_a_recording_reads_the_same_violations(kind: Any) -> None:
     """Two bodies on a soft joint, both moving: the rows of the engine and those found from places and turns."""
     bodies = tuple(
-        RigidBody(
-            name=name,
-            mass=mass,
-            inertia=(1.0, 1.5, 2.0),
-            position=(x, 0.2, 0.0),
-            velocity=(0.1, x, -0.2),
-            angular_velocity=(0.3, -x, 0.4),
-        )
+        solid(name, None, (x, 0.2, 0.0), mass, (0.1, x, -0.2), (0.3, -x, 0.4), inertia=(1.0, 1.5, 2.0))
         for name, mass, x in (("one", 1.0, 0.0), ("two", 2.0, 1.0))
     )
     joint = kind(

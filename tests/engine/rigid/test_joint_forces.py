@@ -35,6 +35,7 @@ from spook_tracker.engine import (
     simulate,
     start,
 )
+from tests.scenes.corpus import solid
 
 Z, X = (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)
 H = 0.01  # s
@@ -42,13 +43,7 @@ INERTIA = 0.5  # kg m²
 
 
 def wheel(speed: float = 0.0, **joint: Any) -> Scene:
-    body = RigidBody(
-        name="wheel",
-        mass=2.0,
-        inertia=(1.0, 1.0, INERTIA),
-        position=(0.0, 0.0, 0.0),
-        angular_velocity=(0.0, 0.0, speed),
-    )
+    body = solid("wheel", None, (0.0, 0.0, 0.0), 2.0, spin=(0.0, 0.0, speed), inertia=(1.0, 1.0, INERTIA))
     axle = Hinge(name="axle", between=(WORLD, "wheel"), axis=Z, compliance=0.0, **joint)
     return Scene(bodies=(body,), constraints=(axle,))
 
@@ -106,10 +101,7 @@ def test_a_driven_hinge_sticks_until_the_torque_exceeds_its_friction_and_then_sl
 def test_friction_takes_the_energy_that_it_brakes_with_and_no_more() -> None:
     """From w₀ to rest in I w₀/τ: the angle is I w₀²/(2 τ), and the friction's work all of the energy."""
     speed, friction = 3.0, 2.0
-    observe = {
-        "angle": Final(quantity=JointCoordinate("axle")),
-        "energy": Trace(quantity=KineticEnergy()),
-    }
+    observe = {"angle": Final(quantity=JointCoordinate("axle")), "energy": Trace(quantity=KineticEnergy())}
     steps = 100
     result = simulate(wheel(speed, friction=friction), time_step=H, steps=steps, observe=observe)
     stops = INERTIA * speed / friction  # 0.75 s, a whole number of steps
@@ -124,13 +116,8 @@ def test_friction_takes_the_energy_that_it_brakes_with_and_no_more() -> None:
 
 @pytest.mark.parametrize("way", ["along", "about"])
 def test_a_cylindrical_joint_rubs_along_its_axis_and_about_it_apart(way: str) -> None:
-    body = RigidBody(
-        name="rod",
-        mass=2.0,
-        inertia=(1.0, 1.0, INERTIA),
-        position=(0.0, 0.0, 0.0),
-        velocity=(0.0, 0.0, 1.0),
-        angular_velocity=(0.0, 0.0, 2.0),
+    body = solid(
+        "rod", None, (0.0, 0.0, 0.0), 2.0, (0.0, 0.0, 1.0), (0.0, 0.0, 2.0), inertia=(1.0, 1.0, INERTIA)
     )
     friction = (3.0, 0.0) if way == "along" else (0.0, 0.4)
     joint = Cylindrical(name="sleeve", between=(WORLD, "rod"), axis=Z, compliance=0.0, friction=friction)

@@ -37,6 +37,7 @@ from spook_tracker.engine import (
 from spook_tracker.engine.observe import Quantity
 from tests.oracles.particles import Array
 from tests.oracles.rigid import conjugate, product, rotation
+from tests.scenes.corpus import solid
 
 GRAVITY = 9.81  # m/s²
 DOWN = (0.0, 0.0, -GRAVITY)
@@ -78,11 +79,11 @@ def test_a_hinge_makes_a_physical_pendulum() -> None:
     inertia = mass * (size[0] ** 2 + size[2] ** 2) / 12.0
     start = math.radians(60.0)
     turned = 0.5 * math.pi - start  # the plank's x axis points from the pivot to its centre
-    plank = RigidBody(
-        name="plank",
-        mass=mass,
-        shape=Box(size),
-        position=(arm * math.cos(turned), 0.0, -arm * math.sin(turned)),
+    plank = solid(
+        "plank",
+        Box(size),
+        (arm * math.cos(turned), 0.0, -arm * math.sin(turned)),
+        mass,
         orientation=(math.cos(0.5 * turned), 0.0, math.sin(0.5 * turned), 0.0),
     )
     hinge = Hinge(
@@ -119,14 +120,15 @@ def test_a_ball_joint_makes_a_heavy_top() -> None:
     )
     exact = np.array([rotation(q / np.linalg.norm(q)) @ arm for q in solved.y[:4].T])
     spin = rotation(q0) @ w0
-    top = RigidBody(
-        name="top",
-        mass=mass,
+    top = solid(
+        "top",
+        None,
+        tuple(rotation(q0) @ arm),
+        mass,
+        tuple(np.cross(spin, rotation(q0) @ arm)),
+        tuple(spin),
         inertia=tuple(moments),
-        position=tuple(rotation(q0) @ arm),
         orientation=tuple(q0),
-        velocity=tuple(np.cross(spin, rotation(q0) @ arm)),
-        angular_velocity=tuple(spin),
     )
     pivot = Ball(name="pivot", between=(WORLD, "top"), at=(0.0, 0.0, 0.0), compliance=RIGID)
     scene = Scene(bodies=(top,), constraints=(pivot,), gravity=DOWN)
@@ -178,14 +180,7 @@ def test_a_universal_joint_lets_two_axes_turn() -> None:
     start = np.concatenate([[1.0, 0.0, 0.0, 0.0], w0])
     solved = solve_ivp(slope, (0.0, DURATION), start, "DOP853", TIMES, rtol=1e-12, atol=1e-12)
     exact = np.array([rotation(q / np.linalg.norm(q)) @ arm for q in solved.y[:4].T])
-    body = RigidBody(
-        name="body",
-        mass=mass,
-        inertia=tuple(moments),
-        position=tuple(arm),
-        velocity=tuple(np.cross(w0, arm)),
-        angular_velocity=tuple(w0),
-    )
+    body = solid("body", None, tuple(arm), mass, tuple(np.cross(w0, arm)), tuple(w0), inertia=tuple(moments))
     joint = Universal(
         name="cross", between=(WORLD, "body"), at=(0.0, 0.0, 0.0), axis=tuple(axis), cross_axis=tuple(cross),
         compliance=RIGID,
@@ -222,11 +217,12 @@ def test_a_distance_holds_a_bar_by_its_end() -> None:
     y0 = [first, second, 0.0, 0.0]
     solved = solve_ivp(slope, (0.0, DURATION), y0, "DOP853", TIMES, rtol=1e-12, atol=1e-12)
     half = -0.5 * second  # turned about y so that its −z axis points along (sin b, 0, −cos b)
-    bar = RigidBody(
-        name="bar",
-        mass=mass,
+    bar = solid(
+        "bar",
+        None,
+        tuple(centre(np.array(first), np.array(second))),
+        mass,
         inertia=(inertia, inertia, 0.1),
-        position=tuple(centre(np.array(first), np.array(second))),
         orientation=(math.cos(half), 0.0, math.sin(half), 0.0),
     )
     rod = Distance(
@@ -257,13 +253,14 @@ def test_locked_bodies_turn_as_one() -> None:
     solved = solve_ivp(slope, (0.0, DURATION), start, "DOP853", TIMES, rtol=1e-12, atol=1e-12)
     exact = np.array([rotation(q / np.linalg.norm(q)) @ (arm, 0.0, 0.0) for q in solved.y[:4].T])
     bodies = tuple(
-        RigidBody(
-            name=name,
-            mass=mass,
+        solid(
+            name,
+            None,
+            (sign * arm, 0.0, 0.0),
+            mass,
+            tuple(np.cross(w0, [sign * arm, 0.0, 0.0])),
+            tuple(w0),
             inertia=tuple(moments),
-            position=(sign * arm, 0.0, 0.0),
-            velocity=tuple(np.cross(w0, [sign * arm, 0.0, 0.0])),
-            angular_velocity=tuple(w0),
         )
         for name, sign in (("right", 1.0), ("left", -1.0))
     )
@@ -282,11 +279,12 @@ def test_a_parallelogram_of_hinges_swings_as_one_pendulum() -> None:
 
     def bar(name: str, x: float) -> RigidBody:
         half = -0.5 * start
-        return RigidBody(
-            name=name,
-            mass=crank,
+        return solid(
+            name,
+            None,
+            (x + 0.5 * length * math.sin(start), 0.0, -0.5 * length * math.cos(start)),
+            crank,
             inertia=(inertia, inertia, 0.01),
-            position=(x + 0.5 * length * math.sin(start), 0.0, -0.5 * length * math.cos(start)),
             orientation=(math.cos(half), 0.0, math.sin(half), 0.0),
         )
 
@@ -294,9 +292,7 @@ def test_a_parallelogram_of_hinges_swings_as_one_pendulum() -> None:
     bodies = (
         bar("left", 0.0),
         bar("right", span),
-        RigidBody(
-            name="coupler", mass=coupler, inertia=(0.1, 0.2, 0.2), position=(low[0] + 0.5 * span, 0.0, low[1])
-        ),
+        solid("coupler", None, (low[0] + 0.5 * span, 0.0, low[1]), coupler, inertia=(0.1, 0.2, 0.2)),
     )
 
     def pin(first: str, second: str, x: float, z: float) -> Hinge:
@@ -333,13 +329,13 @@ def test_the_pendulum_reference_has_its_period() -> None:
 
 def test_orientation_and_angular_velocity_belong_together() -> None:
     """The rotation vector of one step is h times the angular velocity, to second order, in world axes."""
-    body = RigidBody(
-        name="body",
-        mass=1.0,
+    body = solid(
+        "body",
+        None,
+        (0.0, 0.0, 0.0),
+        spin=(1.0, -2.0, 0.5),
         inertia=(0.5, 0.6, 0.7),
-        position=(0.0, 0.0, 0.0),
         orientation=(0.5, 0.5, -0.5, 0.5),
-        angular_velocity=(1.0, -2.0, 0.5),
     )
     h = 1e-4
     observe = {"q": Trace(quantity=Orientation("body")), "w": Trace(quantity=AngularVelocity("body"))}

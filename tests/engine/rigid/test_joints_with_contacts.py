@@ -31,6 +31,7 @@ from spook_tracker.engine import (
 from spook_tracker.scalar_tests import loose_bearing
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.heavier import heavier
+from tests.scenes.corpus import solid
 
 STEP = 1 / 60
 G = 9.81
@@ -43,12 +44,12 @@ def legged(seed: int) -> Scene:
     rough = Material(friction=mu)
     bodies = [
         RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough),
-        RigidBody(
-            name="trunk",
-            mass=float(10 ** random.uniform(-1, 1.5)),
-            shape=Box((0.6, 0.4, 0.1)),
-            position=(0.0, 0.0, 0.62),
-            velocity=(float(random.uniform(-2, 2)), float(random.uniform(-1, 1)), -1.0),
+        solid(
+            "trunk",
+            Box((0.6, 0.4, 0.1)),
+            (0.0, 0.0, 0.62),
+            float(10 ** random.uniform(-1, 1.5)),
+            (float(random.uniform(-2, 2)), float(random.uniform(-1, 1)), -1.0),
             material=rough,
         ),
     ]
@@ -58,12 +59,8 @@ def legged(seed: int) -> Scene:
         upper, lower = f"thigh{k}", f"shin{k}"
         for name, z in ((upper, 0.44), (lower, 0.2)):
             bodies.append(
-                RigidBody(
-                    name=name,
-                    mass=float(10 ** random.uniform(-1, 0.5)),
-                    shape=Capsule(0.03, 0.18),
-                    position=(x, y, z),
-                    material=rough,
+                solid(
+                    name, Capsule(0.03, 0.18), (x, y, z), float(10 ** random.uniform(-1, 0.5)), material=rough
                 )
             )
         drive = JointSpring(stiffness=float(10 ** random.uniform(0, 3)), damping=0.02, max_force=50.0)
@@ -140,14 +137,7 @@ def whips(limbs: int, links: int) -> Scene:
     rough = Material(friction=0.6)
     bodies = [
         RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough),
-        RigidBody(
-            name="trunk",
-            mass=2.0,
-            shape=Box((0.5, 0.3, 0.1)),
-            position=(0.0, 0.0, 0.06),
-            material=rough,
-            angular_velocity=(0.3, 0.5, 0.0),
-        ),
+        solid("trunk", Box((0.5, 0.3, 0.1)), (0.0, 0.0, 0.06), 2.0, spin=(0.3, 0.5, 0.0), material=rough),
     ]
     joints = []
     for limb in range(limbs):
@@ -194,15 +184,10 @@ def frame(mu: float, half_angle: float) -> Scene:
     rough = Material(friction=mu)
     top = radius + length * math.cos(half_angle)
     bars = [
-        RigidBody(
-            name=name,
-            mass=1.0,
-            shape=Capsule(radius, length),
-            position=(
-                side * length / 2 * math.sin(half_angle),
-                0.0,
-                radius + length / 2 * math.cos(half_angle),
-            ),
+        solid(
+            name,
+            Capsule(radius, length),
+            (side * length / 2 * math.sin(half_angle), 0.0, radius + length / 2 * math.cos(half_angle)),
             orientation=(math.cos(half_angle / 2), 0.0, -side * math.sin(half_angle / 2), 0.0),
             material=rough,
         )
@@ -211,10 +196,7 @@ def frame(mu: float, half_angle: float) -> Scene:
     floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough)
     hinge = Hinge(name="top", between=("left", "right"), at=(0.0, 0.0, top), axis=(0, 1, 0), compliance=0.0)
     return Scene(
-        bodies=(floor, *bars),
-        constraints=(hinge,),
-        gravity=(0.0, 0.0, -G),
-        no_contact=(("left", "right"),),
+        bodies=(floor, *bars), constraints=(hinge,), gravity=(0.0, 0.0, -G), no_contact=(("left", "right"),)
     )
 
 
@@ -242,16 +224,8 @@ def test_a_driven_slide_pushes_a_box_as_statics_say():
     scene = Scene(
         bodies=(
             RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), material=rough),
-            RigidBody(
-                name="pusher",
-                mass=pusher,
-                shape=Box((0.1, 0.4, 0.1)),
-                position=(-0.25, 0.0, 0.2),
-                material=smooth,
-            ),
-            RigidBody(
-                name="box", mass=box, shape=Box((0.4, 0.4, 0.4)), position=(0.0, 0.0, 0.2), material=rough
-            ),
+            solid("pusher", Box((0.1, 0.4, 0.1)), (-0.25, 0.0, 0.2), pusher, material=smooth),
+            solid("box", Box((0.4, 0.4, 0.4)), (0.0, 0.0, 0.2), box, material=rough),
         ),
         constraints=(
             Prismatic(

@@ -32,6 +32,7 @@ from spook_tracker.engine import (
     simulate,
 )
 from spook_tracker.scalar_tests.multibody import bricard, four_bars
+from tests.scenes.corpus import solid
 
 G = 9.81  # m/s²
 LINKS, LENGTH = 10, 1.0
@@ -44,13 +45,7 @@ def chain(load: float, start: float = 0.01) -> Scene:
     along = np.array([math.sin(start), 0.0, -math.cos(start)])
     turn = (math.cos(0.5 * start), 0.0, -math.sin(0.5 * start), 0.0)
     bodies = [
-        RigidBody(
-            name=f"link {k}",
-            mass=1.0,
-            inertia=(1 / 12, 1 / 12, 1e-3),
-            position=tuple((k + 0.5) * along),
-            orientation=turn,
-        )
+        solid(f"link {k}", None, tuple((k + 0.5) * along), inertia=(1 / 12, 1 / 12, 1e-3), orientation=turn)
         for k in range(LINKS)
     ]
     bodies.append(
@@ -90,11 +85,11 @@ def bridge(compliance: float) -> Scene:
     angles = [math.atan(G * (k - 0.5 * (count - 1)) / horizontal) for k in range(count)]
     ends = np.cumsum([(0.0, 0.0, 0.0), *((math.cos(a), 0.0, math.sin(a)) for a in angles)], axis=0)
     links = tuple(
-        RigidBody(
-            name=f"link {k}",
-            mass=1.0,
+        solid(
+            f"link {k}",
+            None,
+            tuple(0.5 * (ends[k] + ends[k + 1])),
             inertia=(1e-3, 1 / 12, 1 / 12),
-            position=tuple(0.5 * (ends[k] + ends[k + 1])),
             orientation=(math.cos(0.5 * a), 0.0, -math.sin(0.5 * a), 0.0),
         )
         for k, a in enumerate(angles)
@@ -214,13 +209,7 @@ def test_compositions_go_through_singular_positions(count: int, order: str, step
 
 
 def spun(speed: float, spring: JointSpring | None = None) -> Scene:
-    wheel = RigidBody(
-        name="wheel",
-        mass=1.0,
-        inertia=(0.2, 0.2, 0.4),
-        position=(0.0, 0.0, 0.0),
-        angular_velocity=(0.0, 0.0, speed),
-    )
+    wheel = solid("wheel", None, (0.0, 0.0, 0.0), spin=(0.0, 0.0, speed), inertia=(0.2, 0.2, 0.4))
     axle = Hinge(name="axle", between=(WORLD, "wheel"), axis=(0.0, 0.0, 1.0), spring=spring)
     return Scene(bodies=(wheel,), constraints=(axle,))
 

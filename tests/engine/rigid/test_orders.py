@@ -40,6 +40,7 @@ from spook_tracker.engine import (
 )
 from spook_tracker.scalar_tests import spinning_top, swinging_door
 from tests.oracles.rigid_composition import assert_dense_steps, oracle_of
+from tests.scenes.corpus import solid
 from tests.scenes.rigid import EVERY_JOINT, one_joint
 
 HALF = Method(half_step_velocities=True)
@@ -212,13 +213,7 @@ def test_a_body_without_joints_goes_round_its_circle_in_time(pull: str, name: st
     """Beside a swing, which makes the rows; a spring of no length and a central field both ask for w² of the circle."""
     method, order = METHODS[name]
     rate, radius = 1.3, 0.8  # rad/s, m
-    free = RigidBody(
-        name="free",
-        mass=2.0,
-        inertia=INERTIA,
-        position=(radius, 0.0, 0.0),
-        velocity=(0.0, rate * radius, 0.0),
-    )
+    free = solid("free", None, (radius, 0.0, 0.0), 2.0, (0.0, rate * radius, 0.0), inertia=INERTIA)
     rod = RigidBody(name="rod", mass=1.0, inertia=INERTIA, position=(0.0, 0.0, 3.0))
     swing = Hinge(name="swing", between=(WORLD, "rod"), at=(1.0, 0.0, 3.0), axis=(0.0, 1.0, 0.0))
     forces = {

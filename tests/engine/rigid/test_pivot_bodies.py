@@ -8,16 +8,7 @@ import numpy as np
 import pytest
 
 from spook_tracker import engine
-from spook_tracker.engine import (
-    WORLD,
-    AngularMomentum,
-    Ball,
-    Hinge,
-    Method,
-    Scene,
-    Trace,
-    simulate,
-)
+from spook_tracker.engine import WORLD, AngularMomentum, Ball, Hinge, Method, Scene, Trace, simulate
 from tests.oracles.rigid_composition import STATE, PivotOracle, assert_dense_steps
 from tests.scenes import rigid as rigid_scenes
 

@@ -112,14 +112,7 @@ def test_steps_are_those_of_rows_in_space(size: float, method: Method) -> None:
         bodies, loops, chain = 1 + seed % 5, int(rng.integers(3)), bool(rng.integers(2))
         speed, h = float(rng.choice([0.0, 1.0, 10.0])), float(rng.choice([1e-3, 1 / 60, 0.1]))
         scene = mechanism(
-            rng,
-            bodies,
-            loops,
-            chain=chain,
-            decades=3.0,
-            compliances=compliances,
-            reach=size,
-            speed=speed,
+            rng, bodies, loops, chain=chain, decades=3.0, compliances=compliances, reach=size, speed=speed
         )
         plane, space = both(scene, h * min(1.0, size**0.5), 12, method)
         kinds.append((solves_in_plane(scene, method), plane.status))

@@ -9,15 +9,7 @@ import numpy as np
 import pytest
 
 from spook_tracker import engine
-from spook_tracker.engine import (
-    WORLD,
-    Hinge,
-    Method,
-    Prismatic,
-    RigidBody,
-    Scene,
-    simulate,
-)
+from spook_tracker.engine import WORLD, Hinge, Method, Prismatic, RigidBody, Scene, simulate
 from spook_tracker.scalar_tests import swinging_door
 from spook_tracker.scalar_tests.multibody import four_bars
 from tests.engine.test_symmetries import rotation, turned

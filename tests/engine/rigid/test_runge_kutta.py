@@ -48,6 +48,7 @@ from spook_tracker.engine import (
 )
 from tests.engine.rigid.test_joint_trees import floating, hung, rigid
 from tests.scenes import rigid as rigid_scenes
+from tests.scenes.corpus import solid
 
 RK8 = Method(runge_kutta="order8")
 ORDER8 = Method(composition="order8")
@@ -342,13 +343,8 @@ def refused(name: str) -> tuple[Scene, Method]:
         cross = Universal(name="cross", between=(WORLD, "b0"), at=(0, 0, 0), axis=(1, 0, 0), cross_axis=(0, 1, 0), compliance=0.0)  # fmt: skip
         return dataclasses.replace(scene, constraints=(cross,)), RK8
     if name == "kinematic":
-        moved = RigidBody(
-            name="k",
-            mass=1.0,
-            inertia=(1.0,) * 3,
-            position=(9.0, 0.0, 0.0),
-            velocity=(1.0, 0.0, 0.0),
-            motion="kinematic",
+        moved = solid(
+            "k", None, (9.0, 0.0, 0.0), velocity=(1.0, 0.0, 0.0), inertia=(1.0,) * 3, motion="kinematic"
         )
         return dataclasses.replace(scene, bodies=(*scene.bodies, moved)), RK8
     if name == "a damped rest that moves":

@@ -36,6 +36,7 @@ from spook_tracker.engine import (
     simulate,
 )
 from tests.oracles.rigid import RigidOracle
+from tests.scenes.corpus import solid
 from tests.scenes.rigid import TIME_STEP, tree
 
 GRAVITY = (0.0, 0.0, -9.81)
@@ -131,9 +132,7 @@ def test_a_particle_among_rigid_bodies_is_still_a_particle() -> None:
 
 def test_a_kinematic_body_moves_as_told_and_carries_others() -> None:
     """A turntable turns by w t exactly; a lock carries a body round with it; a belt drags a box to its speed."""
-    table = RigidBody(
-        name="table", motion="kinematic", position=(0.0, 0.0, 0.0), angular_velocity=(0.0, 0.0, 2.0)
-    )
+    table = solid("table", None, (0.0, 0.0, 0.0), None, spin=(0.0, 0.0, 2.0), motion="kinematic")
     rider = body(
         "rider", position=(0.5, 0.0, 0.0), velocity=(0.0, 1.0, 0.0), angular_velocity=(0.0, 0.0, 2.0)
     )
@@ -145,17 +144,8 @@ def test_a_kinematic_body_moves_as_told_and_carries_others() -> None:
     assert np.abs(np.unwrap(2.0 * np.arctan2(run["q"][:, 3], run["q"][:, 0])) - 2.0 * t).max() < 1e-12
     assert np.abs(run["x"][:, :2] - 0.5 * np.stack([np.cos(2.0 * t), np.sin(2.0 * t)], axis=1)).max() < 2e-3
     rough = Material(friction=0.5)
-    belt = RigidBody(
-        name="belt",
-        motion="kinematic",
-        shape=Plane(),
-        position=(0.0, 0.0, 0.0),
-        velocity=(1.0, 0.0, 0.0),
-        material=rough,
-    )
-    box = RigidBody(
-        name="box", mass=1.0, shape=Box((0.2, 0.2, 0.1)), position=(0.0, 0.0, 0.05), material=rough
-    )
+    belt = solid("belt", Plane(), (0.0, 0.0, 0.0), None, (1.0, 0.0, 0.0), motion="kinematic", material=rough)
+    box = solid("box", Box((0.2, 0.2, 0.1)), (0.0, 0.0, 0.05), material=rough)
     dragged = simulate(
         Scene(bodies=(belt, box), gravity=(0.0, 0.0, -10.0)),
         time_step=0.01,

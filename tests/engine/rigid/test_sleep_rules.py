@@ -36,6 +36,7 @@ from spook_tracker.engine import (
     Wire,
     simulate,
 )
+from tests.scenes.corpus import solid
 from tests.scenes.sleep import (
     FLOOR,
     GRAVITY,
@@ -103,13 +104,8 @@ def test_what_is_separated_from_what_it_overlaps_is_not_at_rest() -> None:
 def test_what_comes_back_to_where_it_was_within_a_step_is_not_at_rest() -> None:
     """A ball that meets a wall in the middle of a step."""
     elastic = Material(restitution=1.0)
-    ball = RigidBody(
-        name="ball",
-        mass=1.0,
-        shape=Sphere(0.2),
-        position=(-0.7 - 1.5 * TIME_STEP, 0.0, 0.0),
-        velocity=(1.0, 0.0, 0.0),
-        material=elastic,
+    ball = solid(
+        "ball", Sphere(0.2), (-0.7 - 1.5 * TIME_STEP, 0.0, 0.0), velocity=(1.0, 0.0, 0.0), material=elastic
     )
     run = held(scene(still("wall", 0.0, 0.0, material=elastic), ball, weighs=False), sleepy(**AT_ONCE))
     for _ in range(6):
@@ -165,9 +161,7 @@ def test_wires_and_springs_that_pull_aside_tie_sleepers(kind: str) -> None:
     """A ball that strikes the last wakes all, in the same step."""
     places = (0.0, 4.0, 8.0)
     bodies = [box(f"b{k}", x, 0.0) for k, x in enumerate(places)]
-    ball = RigidBody(
-        name="ball", mass=1.0, shape=Sphere(0.2), position=(14.0, 0.0, 0.0), velocity=(-4.0, 0.0, 0.0)
-    )
+    ball = solid("ball", Sphere(0.2), (14.0, 0.0, 0.0), velocity=(-4.0, 0.0, 0.0))
     if kind == "wire":
         ends = tuple((f"b{k}", (x, 0.0, 0.1)) for k, x in enumerate(places))
         built = Scene(bodies=(*bodies, ball), constraints=(Wire(name="tie", through=ends),))
@@ -299,13 +293,7 @@ def test_what_fell_asleep_turning_slowly_wakes_without_that_turn() -> None:
 def test_what_begins_to_fall_slowly_is_not_asleep(hung: bool) -> None:
     """On a small moon a ball stays below sleep_speed for seconds: thrown up by 1 cm/s, or let go on a string."""
     gravity, seconds = 0.01, 5.0
-    ball = RigidBody(
-        name="ball",
-        mass=1.0,
-        position=(0.0, 0.0, 1.0),
-        shape=Sphere(0.1),
-        velocity=(0.0, 0.0, 0.0 if hung else 0.01),
-    )
+    ball = solid("ball", Sphere(0.1), (0.0, 0.0, 1.0), velocity=(0.0, 0.0, 0.0 if hung else 0.01))
     floor = RigidBody(name="floor", position=(0.0, 0.0, 0.0), shape=Plane(), motion="static")
     rod = Distance(name="rod", between=((1.0, 0.0, 1.0), "ball"), compliance=0.0)
     result = simulate(
@@ -326,9 +314,7 @@ def test_what_begins_to_fall_slowly_is_not_asleep(hung: bool) -> None:
 @pytest.mark.parametrize(("thrown", "slow"), [(4.0, 3.0), (0.5, 3.0)])
 def test_what_flies_is_left_alone_however_slow_it_is_at_its_top(thrown: float, slow: float) -> None:
     """To the bits of a run without sleeping: what nothing holds is not at rest."""
-    ball = RigidBody(
-        name="ball", mass=1.0, shape=Sphere(0.1), position=(0.0, 0.0, 0.1), velocity=(0.0, 0.0, thrown)
-    )
+    ball = solid("ball", Sphere(0.1), (0.0, 0.0, 0.1), velocity=(0.0, 0.0, thrown))
     asked = scene(FLOOR, ball)
     observe = {"x": Trace(quantity=Position("ball"))}
     flight = 2.0 * thrown / GRAVITY - TIME_STEP
@@ -347,9 +333,7 @@ def test_a_ball_turns_back_on_a_slope_unless_it_is_slow_for_as_long_as_sleep_tak
     """Slower than s for 2 s/(g sin α): it sleeps where that is sleep_after, two steps more or less."""
     method, pull = Method(), 0.5 * GRAVITY  # along a smooth slope of 30°
     slow = share * 0.5 * pull * method.sleep_after
-    ball = RigidBody(
-        name="ball", mass=1.0, shape=Sphere(0.1), position=(0.0, 0.0, 0.1), velocity=(2.0 * slow, 0.0, 0.0)
-    )
+    ball = solid("ball", Sphere(0.1), (0.0, 0.0, 0.1), velocity=(2.0 * slow, 0.0, 0.0))
     ground = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
     slope = Scene(bodies=(ground, ball), gravity=(-pull, 0.0, -math.sqrt(0.75) * GRAVITY))
     result = simulate(

@@ -30,6 +30,7 @@ from spook_tracker.engine import (
     simulate,
     start,
 )
+from tests.scenes.corpus import solid
 from tests.scenes.sleep import (
     FALLEN,
     FLOOR,
@@ -74,14 +75,7 @@ def test_a_heap_asleep_carries_its_weight_and_stays_to_the_last_bit(solver: str)
 
 def test_nothing_is_different_until_a_body_sleeps() -> None:
     """Its bits are those of a run without: a ball that rolls for ever keeps its heap awake, and one alone does not."""
-    rolls = RigidBody(
-        name="ball",
-        mass=1.0,
-        shape=Sphere(0.2),
-        position=(9.0, 0.0, 0.2),
-        velocity=(1.0, 0.0, 0.0),
-        material=SMOOTH,
-    )
+    rolls = solid("ball", Sphere(0.2), (9.0, 0.0, 0.2), velocity=(1.0, 0.0, 0.0), material=SMOOTH)
     built = scene(FLOOR, *stack(), rolls)
     awake, tired = (simulate(built, time_step=TIME_STEP, steps=25, method=m) for m in (Method(), sleepy()))
     assert "asleep" not in awake.counters
@@ -130,14 +124,7 @@ def test_a_ball_dropped_onto_sleepers_does_to_them_what_it_does_without_sleep(so
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_a_sleeper_that_is_hit_gets_the_momentum(solver: str) -> None:
     """Plastic, without friction: both go on with m v/(m + M), whichever solver."""
-    ball = RigidBody(
-        name="ball",
-        mass=0.5,
-        shape=Sphere(0.25),
-        position=(-4.0, 0.0, 0.5),
-        velocity=(3.0, 0.0, 0.0),
-        material=SMOOTH,
-    )
+    ball = solid("ball", Sphere(0.25), (-4.0, 0.0, 0.5), 0.5, (3.0, 0.0, 0.0), material=SMOOTH)
     target = box("target", 0.0, 0.5, mass=2.0, material=SMOOTH)
     run = held(scene(FLOOR, target, ball, weighs=False), sleepy(solver), 60, p=Momentum())
     assert asleep(run) == 1
@@ -150,22 +137,11 @@ def test_a_sleeper_that_is_hit_gets_the_momentum(solver: str) -> None:
 def test_an_impact_runs_through_a_row_of_sleepers() -> None:
     """Newton's cradle, successive blows: the last leaves with all the speed, the others sleep again."""
     balls = [
-        RigidBody(
-            name=f"ball {k}",
-            mass=1.0,
-            shape=Sphere(0.5),
-            position=(float(k), 0.0, 0.0),
-            material=Material(restitution=1.0),
-        )
+        solid(f"ball {k}", Sphere(0.5), (float(k), 0.0, 0.0), material=Material(restitution=1.0))
         for k in range(4)
     ]
-    first = RigidBody(
-        name="first",
-        mass=1.0,
-        shape=Sphere(0.5),
-        position=(-4.0, 0.0, 0.0),
-        velocity=(2.0, 0.0, 0.0),
-        material=Material(restitution=1.0),
+    first = solid(
+        "first", Sphere(0.5), (-4.0, 0.0, 0.0), velocity=(2.0, 0.0, 0.0), material=Material(restitution=1.0)
     )
     run = held(scene(first, *balls, weighs=False), sleepy(impacts="successive"), 80)
     assert asleep(run) == 4
@@ -179,16 +155,9 @@ def test_an_impact_runs_through_a_row_of_sleepers() -> None:
 @pytest.mark.parametrize("speed", [30.0, 3000.0])
 def test_nothing_flies_through_sleepers(speed: float) -> None:
     """A bullet that goes many times the thickness of a plate in a step."""
-    plate = RigidBody(
-        name="plate", mass=1.0, shape=Box((0.02, 1.0, 1.0)), position=(0.0, 0.0, 0.0), material=SMOOTH
-    )
-    bullet = RigidBody(
-        name="bullet",
-        mass=0.01,
-        shape=Sphere(0.01),
-        position=(-speed * 1.003, 0.0, 0.0),
-        velocity=(speed, 0.0, 0.0),
-        material=SMOOTH,
+    plate = solid("plate", Box((0.02, 1.0, 1.0)), (0.0, 0.0, 0.0), material=SMOOTH)
+    bullet = solid(
+        "bullet", Sphere(0.01), (-speed * 1.003, 0.0, 0.0), 0.01, (speed, 0.0, 0.0), material=SMOOTH
     )
     run = held(scene(plate, bullet, weighs=False), sleepy(), 60, p=Momentum())
     assert asleep(run) == 1
@@ -239,9 +208,7 @@ def test_on_a_path_that_has_come_to_its_end_bodies_sleep_again_and_a_plane_that_
     path = Table(times=(0.0, 0.1, 0.9, 1.0), values=(-0.5, -0.5, -0.13, -0.13))
     run = held(scene(table(path=(0.0, 0.0, path)), *stack()), sleepy(), 100)
     assert asleep(run) == 3
-    plate = RigidBody(
-        name="plate", motion="kinematic", shape=Plane(), position=(0.0, 0.0, 0.0), material=ROUGH
-    )
+    plate = solid("plate", Plane(), (0.0, 0.0, 0.0), None, motion="kinematic", material=ROUGH)
     run = held(scene(plate, *stack()), sleepy(), 60)
     assert asleep(run) == 3
     run.set_velocity("plate", angular_velocity=(0.0, 0.1, 0.0))
@@ -250,12 +217,13 @@ def test_on_a_path_that_has_come_to_its_end_bodies_sleep_again_and_a_plane_that_
 
 
 def test_a_kinematic_body_that_comes_along_wakes() -> None:
-    pusher = RigidBody(
-        name="pusher",
+    pusher = solid(
+        "pusher",
+        Box((0.2, 1.0, 0.5)),
+        (-3.0, 0.0, 0.5),
+        None,
+        (2.0, 0.0, 0.0),
         motion="kinematic",
-        shape=Box((0.2, 1.0, 0.5)),
-        position=(-3.0, 0.0, 0.5),
-        velocity=(2.0, 0.0, 0.0),
         material=SMOOTH,
     )
     target = box("target", 0.0, 0.5, material=SMOOTH)

@@ -29,20 +29,14 @@ from spook_tracker.engine import (
     simulate,
 )
 from tests.engine.contacts.test_rough_impacts import SOLVERS, STEPS, ball, floor
+from tests.scenes.corpus import solid
 
 
 @pytest.mark.parametrize("h", STEPS)
 @pytest.mark.parametrize("psi", [0.0, 0.5, 1.0])
 def test_a_stop_returns_its_own_restitution(h: float, psi: float) -> None:
     """A bar turning freely at 2 rad/s meets the stop of its hinge at .5 rad."""
-    bar = RigidBody(
-        name="bar",
-        mass=1.0,
-        shape=Box((1.0, 0.1, 0.1)),
-        position=(0.5, 0, 0),
-        velocity=(0, 1.0, 0),
-        angular_velocity=(0, 0, 2.0),
-    )
+    bar = solid("bar", Box((1.0, 0.1, 0.1)), (0.5, 0, 0), velocity=(0, 1.0, 0), spin=(0, 0, 2.0))
     hinge = Hinge(
         name="hinge",
         between=(WORLD, "bar"),
@@ -76,13 +70,12 @@ def test_a_stop_knows_of_no_impact_far_away(kind: type, phase: float, solver: st
     """A ball that rebounds 50 m away in the very step took all of the stop's rebound: rows were assembled again after it,
     and the stop seemed closed long since; in the blow it took part as one without restitution."""
     turns, speed, elastic = kind is Hinge, 2.0, Material(restitution=1.0)
-    body = RigidBody(
-        name="body",
-        mass=1.0,
-        shape=Box((1.0, 0.1, 0.1)),
-        position=(0.0, 0.0, 5.0),
+    body = solid(
+        "body",
+        Box((1.0, 0.1, 0.1)),
+        (0.0, 0.0, 5.0),
         velocity=(0.0, 0.0 if turns else speed, 0.0),
-        angular_velocity=(0.0, 0.0, speed if turns else 0.0),
+        spin=(0.0, 0.0, speed if turns else 0.0),
     )
     joint = kind(
         name="joint",
@@ -195,13 +188,13 @@ def test_a_stop_met_from_the_other_end_is_the_stop_met_from_afar(
         )
         told = {"angular_velocity" if turns else "velocity": (carried, 0.0, 0.0)}
         carrier = RigidBody(name="carrier", motion="kinematic", position=(0.0, 0.0, 0.0), **told)
-        slider = RigidBody(
-            name="slider",
-            mass=1.0,
-            inertia=(1.0, 1.0, 1.0),
-            position=(0.0, 0.0, 0.0),
+        slider = solid(
+            "slider",
+            None,
+            (0.0, 0.0, 0.0),
             velocity=carrier.velocity,
-            angular_velocity=carrier.angular_velocity,
+            spin=carrier.angular_velocity,
+            inertia=(1.0, 1.0, 1.0),
         )
         joint = kind(
             name="joint",

@@ -38,6 +38,7 @@ from spook_tracker.engine import (
 from spook_tracker.engine.protocol import Capabilities, unsupported
 from spook_tracker.engine.theory import one_row_matrix
 from spook_tracker.scalar_tests import cornering
+from tests.scenes.corpus import solid
 
 H = 1.0 / 240.0
 GRAVITY = 10.0
@@ -69,13 +70,8 @@ def wheel(
     **changes: Any,
 ) -> Scene:
     """A wheel that cannot tip over, at rest in its tyre if nothing else is said."""
-    body = RigidBody(
-        name="wheel",
-        mass=MASS,
-        inertia=(1e15, moment, 1e15),
-        position=(0.0, 0.0, height),
-        velocity=velocity,
-        angular_velocity=(0.0, spin, 0.0),
+    body = solid(
+        "wheel", None, (0.0, 0.0, height), MASS, velocity, (0.0, spin, 0.0), inertia=(1e15, moment, 1e15)
     )
     return Scene(bodies=(body,), constraints=(tyre(**changes),), gravity=gravity)
 
@@ -198,9 +194,7 @@ def test_a_road_that_moves_takes_the_wheel_along() -> None:
     scene = wheel((2.0, 0.0, 0.0))
     observe = {"v": Final(quantity=Velocity("wheel")), "w": Final(quantity=AngularVelocity("wheel"))}
     moving = Scene(
-        bodies=(road, *scene.bodies),
-        constraints=(tyre(between=("road", "wheel")),),
-        gravity=scene.gravity,
+        bodies=(road, *scene.bodies), constraints=(tyre(between=("road", "wheel")),), gravity=scene.gravity
     )
     result = simulate(moving, time_step=H, steps=240, observe=observe)
 
@@ -240,9 +234,7 @@ def test_wheels_are_dynamic_bodies_and_methods_plain() -> None:
 
 # --- springs beside the centre --------------------------------------------------------------------------
 
-BODY = RigidBody(
-    name="body", mass=2.0, inertia=(0.3, 0.4, 0.5), position=(0, 0, 0), angular_velocity=(0.1, 0.2, 0.3)
-)
+BODY = solid("body", None, (0, 0, 0), 2.0, spin=(0.1, 0.2, 0.3), inertia=(0.3, 0.4, 0.5))
 SPRING = Spring(
     name="spring",
     between=((0.0, 0.0, 3.0), "body"),
@@ -315,9 +307,7 @@ def test_a_spring_on_what_has_only_a_centre_is_refused() -> None:
 
 def test_a_spring_of_bounded_force_gives_way_and_holds_again() -> None:
     """A flywheel on a spring too weak for it: it slows down with F/I, is turned back, and swings within the spring's reach."""
-    body = RigidBody(
-        name="wheel", mass=1.0, inertia=(2.0, 2.0, 2.0), position=(0, 0, 0), angular_velocity=(0, 3.0, 0)
-    )
+    body = solid("wheel", None, (0, 0, 0), spin=(0, 3.0, 0), inertia=(2.0, 2.0, 2.0))
     spring = JointSpring(stiffness=50.0, max_force=4.0)
     hinge = Hinge(name="axle", between=(WORLD, "wheel"), axis=Y, compliance=0.0, spring=spring)
     observe = {"w": Trace(quantity=AngularVelocity("wheel"))}

@@ -34,6 +34,7 @@ from spook_tracker.engine import (
     Wire,
     simulate,
 )
+from tests.scenes.corpus import fixed, solid
 
 GRAVITY = 10.0  # m/s²
 STEP = 0.01  # s
@@ -193,13 +194,13 @@ def test_an_open_differential_gives_both_wheels_half_the_torque_whichever_slips(
     mass = {"left": 5.0, "right": 5.0, "carrier": 4.0, "car": 60.0, "sled": 6.0}
     turned = (math.sqrt(0.5), math.sqrt(0.5), 0.0, 0.0)  # z to −y: the wheels' axles lie across
     wheels = tuple(
-        RigidBody(
-            name=name,
-            mass=mass[name],
+        solid(
+            name,
+            Cylinder(radius=radius, length=0.1),
+            (0.0, y, radius),
+            mass[name],
             inertia=(0.15, 0.15, spin[name]),
-            position=(0.0, y, radius),
             orientation=turned,
-            shape=Cylinder(radius=radius, length=0.1),
             material=Material(friction=friction),
         )
         for name, y, friction in (("left", 1.0, 0.0), ("right", -1.0, 1.0))
@@ -210,17 +211,7 @@ def test_an_open_differential_gives_both_wheels_half_the_torque_whichever_slips(
     )
     y = (0.0, 1.0, 0.0)
     scene = Scene(
-        bodies=(
-            *wheels,
-            *plain,
-            RigidBody(
-                name="floor",
-                motion="static",
-                shape=Plane(),
-                position=(0.0, 0.0, 0.0),
-                material=Material(friction=1.0),
-            ),
-        ),
+        bodies=(*wheels, *plain, fixed("floor", Plane(), (0.0, 0.0, 0.0), material=Material(friction=1.0))),
         constraints=(
             Prismatic(name="ahead", between=(WORLD, "sled"), axis=(1.0, 0.0, 0.0), compliance=0.0),
             Prismatic(name="height", between=("sled", "car"), axis=Z, compliance=0.0),
@@ -263,13 +254,7 @@ def test_a_rough_wire_over_a_hung_pulley_drags_a_block_along_a_table() -> None:
                 shape=Box(size=(2 * half, 2 * half, 2 * half)),
                 material=Material(friction=table),
             ),
-            RigidBody(
-                name="table",
-                motion="static",
-                shape=Plane(),
-                position=(0.0, 0.0, 0.0),
-                material=Material(friction=table),
-            ),
+            fixed("table", Plane(), (0.0, 0.0, 0.0), material=Material(friction=table)),
         ),
         constraints=(
             Prismatic(
