@@ -101,10 +101,9 @@ def lopsided(scene: Scene) -> Scene:
     )
 
 
-BROKEN: dict[str, Simulate] = {
+BROKEN: dict[str, Simulate] = {  # what is seen in few tests comes last
     "soft joints": with_scene(softened),
     "spongy surfaces": with_scene(spongy),
-    "deaf to options": deaf,
     **{
         f"{name} 3 % too small": off_by(0.97, name)
         for name in (
@@ -119,6 +118,7 @@ BROKEN: dict[str, Simulate] = {
         )
     },
     "bodies 3 % too large": off_by(1.03, "radius", "size"),
-    "lopsided": with_scene(lopsided),
     "restless clock": restless,
+    "deaf to options": deaf,
+    "lopsided": with_scene(lopsided),
 }
