@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -10,13 +9,11 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import (
-    Distance,
     Final,
     Particle,
     Position,
     Scene,
     SimulationFailed,
-    Spring,
     simulate,
 )
 from spook_tracker.scalar_tests import chain
@@ -25,7 +22,7 @@ from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.oscillator import scene as oscillator
 from spook_tracker.scalar_tests.pendulum import scene as pendulum_scene
 from spook_tracker.scalar_tests.planetarium import scene as planetarium_scene
-from tests.toys.broken_engines import deaf, with_scene
+from tests.toys.broken_engines import deaf, off_by, scaled, with_scene
 
 # test, configuration, metric, value known from an independent prototype or a closed form, |difference| allowed
 KNOWN = (
@@ -93,47 +90,19 @@ def test_values_agree_with_what_is_known(
 # --- a broken engine ------------------------------------------------------------------------------------
 
 
-def heavy(scene: Scene) -> Scene:
-    x, y, z = scene.gravity
-    return replace(scene, gravity=(x, y, 1.01 * z))
-
-
-def softened(factor: float) -> Callable[[Scene], Scene]:
-    def change(scene: Scene) -> Scene:
-        rows = tuple(replace(c, compliance=c.compliance * factor) for c in scene.constraints)
-        return replace(scene, constraints=rows)
-
-    return change
-
-
-def damped(factor: float) -> Callable[[Scene], Scene]:
-    def change(scene: Scene) -> Scene:
-        rows = [replace(c, damping=c.damping * factor) for c in scene.constraints if isinstance(c, Distance)]
-        return replace(scene, constraints=tuple(rows))
-
-    return change
-
-
-def stiffened(scene: Scene) -> Scene:
-    springs = [
-        replace(f, stiffness=f.stiffness * (1.0 + 1e-12)) for f in scene.forces if isinstance(f, Spring)
-    ]
-    return replace(scene, forces=tuple(springs))
-
-
 def coarse(scene: Scene, *, time_step: float, duration: float, **options: Any) -> Any:
     """Takes steps of 20 s, whatever it is told."""
     return simulate(scene, time_step=20.0, duration=duration, **options)
 
 
 BROKEN: dict[str, Any] = {
-    "falling_object": with_scene(heavy),
+    "falling_object": off_by(1.01, "gravity"),
     "pendulum": deaf,
     "n_pendulum": deaf,
-    "oscillator_spring": with_scene(stiffened),
-    "oscillator_row": with_scene(softened(1.0 + 1e-9)),
-    "oscillator_damped": with_scene(damped(1.0 + 1e-9)),
-    "oscillator_filter": with_scene(damped(1.0 + 1e-6)),
+    "oscillator_spring": off_by(1.0 + 1e-12, "stiffness"),
+    "oscillator_row": off_by(1.0 + 1e-9, "compliance"),
+    "oscillator_damped": off_by(1.0 + 1e-9, "damping"),
+    "oscillator_filter": off_by(1.0 + 1e-6, "damping"),
 }
 
 
@@ -154,18 +123,8 @@ def test_an_engine_that_steps_too_coarsely_loses_the_orbit() -> None:
 def test_the_slightest_change_of_physics_leaves_a_set_point_or_a_limit(test: str) -> None:
     """A part in a thousand of gravity, stiffness or attraction is seen, though the printed limit may hold."""
 
-    def change(scene: Scene) -> Scene:
-        x, y, z = scene.gravity
-        forces = [
-            replace(f, stiffness=f.stiffness * 1.001)
-            if isinstance(f, Spring)
-            else replace(f, strength=f.strength * 1.001)  # type: ignore[call-arg]
-            for f in scene.forces
-        ]
-        softer = softened(0.999)(scene)
-        return replace(softer, gravity=(x, y, 1.001 * z), forces=tuple(forces))
-
-    broken = with_scene(change)
+    more, less = (1.001, ("gravity", "stiffness", "strength")), (0.999, ("compliance",))
+    broken = with_scene(lambda scene: scaled(scaled(scene, *more), *less))
     seen = [
         not (metric.passes(value) and metric.holds_set_point(value))
         for measurement in CATALOGUE[test].measurements
