@@ -1,4 +1,4 @@
-"""What the particle scenes measure, against numbers known from elsewhere; and that a broken engine is seen."""
+"""What the particle scenes are held to agrees with what is known from elsewhere, and a broken engine is seen."""
 
 from __future__ import annotations
 
@@ -24,50 +24,11 @@ from spook_tracker.scalar_tests.pendulum import scene as pendulum_scene
 from spook_tracker.scalar_tests.planetarium import scene as planetarium_scene
 from tests.toys.broken_engines import deaf, off_by, scaled, with_scene
 
-# test, configuration, metric, value known from an independent prototype or a closed form, |difference| allowed
-KNOWN = (
-    ("falling_object", "plain", "position_error", 1.635, 1e-9),
-    ("falling_object", "plain", "position_error_read_late", 4.903637, 1e-6),
-    ("falling_object", "half-step", "position_error", 0.0, 1e-11),
-    ("pendulum", "plain", "length_deviation", 0.407038, 0.407038e-5),
-    ("pendulum", "plain", "energy_deviation", 3.433, 5e-4),
-    ("pendulum", "curved", "length_deviation", 9.3e-4, 5e-6),
-    ("pendulum", "curved twice", "length_deviation", 2.5e-6, 5e-8),
-    ("n_pendulum", "plain", "length_deviation", 34.483, 34.483e-4),
-    ("n_pendulum", "plain", "length_deviation_early", 12.164, 12.164e-4),
-    ("n_pendulum", "plain", "weakest_link", 25.0, 0.0),
-    ("n_pendulum", "plain", "energy_at_the_end", -35.85, 5e-3),
-    ("n_pendulum", "plain", "energy_gain", 0.24, 5e-3),
-    ("n_pendulum", "two substeps", "length_deviation", 13.0, 0.05),
-    ("n_pendulum", "curved twice", "length_deviation", 10.0, 0.05),
-    ("n_pendulum", "small motion", "frequency_error", 0.0, 1e-8),
-    ("planetarium", "plain", "energy_oscillation", 9.843e-4, 5e-8),
-    ("planetarium", "plain", "energy_oscillation_as_printed", 2.2857, 5e-5),
-    ("planetarium", "plain", "angular_momentum_drift", 0.0, 1e-12),
-    ("planetarium", "plain", "position_error", 2.5e-4, 5e-6),
-    ("planetarium", "half-step", "position_error", 5.2e-7, 1e-8),
-    ("planetarium", "long run", "energy_drift", 0.0, 1e-7),
-    ("oscillator_spring", "plain", "difference", 0.0, 0.0),
-    ("oscillator_filter", "plain", "left_at_100", 0.961, 5e-4),
-    ("oscillator_filter", "plain", "left_at_50", 0.857, 5e-4),
-    ("oscillator_filter", "plain", "left_at_20", 0.414, 5e-4),
-    ("oscillator_filter", "plain", "left_at_10", 0.0667, 5e-5),
-    ("oscillator_filter", "plain", "left_at_7", 0.0142, 5e-5),
-    ("oscillator_filter", "plain", "left_at_5", 2.7e-3, 5e-5),
-    ("oscillator_filter", "plain", "left_at_2", 7.45e-5, 5e-7),
-)
 PARTICLE_TESTS = [
     name
     for name, test in CATALOGUE.items()
     if all(isinstance(body, Particle) for body in test.example().scene.bodies)
 ]
-
-
-def measured(test: str, configuration: str, metric: str, engine: Simulate = simulate) -> float:
-    for measurement in CATALOGUE[test].measurements:
-        if measurement.configuration == configuration and metric in {m.name for m in measurement.metrics}:
-            return measurement.measure(engine)[metric]
-    raise LookupError((test, configuration, metric))
 
 
 def gates(test: str, engine: Simulate) -> list[tuple[Metric, float]]:
@@ -78,13 +39,6 @@ def gates(test: str, engine: Simulate) -> list[tuple[Metric, float]]:
             values = measurement.measure(engine)
             found += [(metric, values[metric.name]) for metric in metrics]
     return found
-
-
-@pytest.mark.parametrize(("test", "configuration", "metric", "value", "allowed"), KNOWN)
-def test_values_agree_with_what_is_known(
-    test: str, configuration: str, metric: str, value: float, allowed: float
-) -> None:
-    assert abs(measured(test, configuration, metric) - value) <= allowed
 
 
 # --- a broken engine ------------------------------------------------------------------------------------

@@ -1,4 +1,4 @@
-"""What the rigid scenes measure, against numbers known from elsewhere; and that a broken engine is seen."""
+"""What the rigid scenes are held to agrees with what is known from elsewhere, and a broken engine is seen."""
 
 from __future__ import annotations
 
@@ -19,47 +19,10 @@ from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from tests.toys.broken_engines import lopsided, off_by, with_scene
 
 SLOW = {("beam", 2000.0)}  # a beam of 250 m takes seconds; every night runs it
-# test, configuration, metric, value known from a closed form or an independent prototype, |difference| allowed
-KNOWN = (
-    ("beam", "plain", "height_deviation", 0.0, 1e-12),
-    ("beam", "compliant", "sag", 2.134e-7, 2.134e-10),
-    ("door", "damped", "weight_error", -4.3e-7, 5e-9),
-    ("door", "damped", "weight_error_settled", 0.0, 1e-9),
-    ("door", "printed", "weight_error_at_20_s", 0.0090, 5e-5),
-    ("door", "damped", "split_error", 0.0, 1e-9),
-    ("friction", "cone", "force_ratio", 0.5, 1e-9),
-    ("friction", "cone", "sliding_error", 0.0, 1e-9),
-    ("friction", "cone", "direction_error", 0.0, 1e-6),
-    ("friction", "box", "anisotropy", 0.1, 1e-3),
-    ("cantilever", "dynamic", "tip_against_statics", 0.0, 1e-7),
-    ("cantilever", "self-weight", "self_weight_ratio", 0.9925, 1e-4),
-    ("resting_box", "direct", "depth_on_plane", 0.0, 1e-12),
-    ("resting_box", "direct", "depth_on_box", 0.0, 1e-12),
-    ("resting_ball", "direct", "weight_error", 0.0, 1e-12),
-    ("resting_stack", "direct", "load_error", 0.0, 1e-9),
-    ("resting_stack", "direct", "overlap", 0.0, 1e-9),
-)
 
 
 def measurements(test: str) -> list[Measurement]:
     return [m for m in CATALOGUE[test].measurements if (test, m.parameters.get("N")) not in SLOW]
-
-
-@pytest.mark.parametrize(("test", "configuration", "metric", "value", "allowed"), KNOWN)
-def test_values_agree_with_what_is_known(
-    test: str, configuration: str, metric: str, value: float, allowed: float
-) -> None:
-    for measurement in measurements(test):
-        if measurement.configuration == configuration and metric in {m.name for m in measurement.metrics}:
-            assert abs(measurement.measure(simulate)[metric] - value) <= allowed
-            return
-    raise LookupError((test, configuration, metric))
-
-
-def test_the_ringing_of_the_printed_door_is_the_known_one() -> None:
-    printed = next(m for m in CATALOGUE["door"].measurements if m.configuration == "printed")
-
-    assert abs(abs(printed.measure(simulate)["weight_error_to_65_s"]) - 0.0193) < 5e-5
 
 
 def test_a_box_on_soft_ground_lies_as_deep_as_its_weight_pushes_it() -> None:
