@@ -15,6 +15,7 @@ import ctypes
 import fcntl
 import gc
 import importlib
+import marshal
 import os
 import pickle
 import resource
@@ -41,6 +42,15 @@ AS_STARTED = ("PYTHON", "LD_", "OPENBLAS", "LC_", "LANG", "TZ")  # of the enviro
 LIMITS = [getattr(resource, f"RLIMIT_{name}") for name in ("AS", "CPU", "DATA", "FSIZE", "NOFILE")]
 COMMAND = str(Path(sys.executable).with_name("tracker"))
 PACKAGE = Path(str(spook_tracker.__file__)).parent.resolve()
+CALL = """#!{python} -IS
+import marshal, os, socket, sys
+asked = socket.socket(socket.AF_UNIX)
+asked.connect({name!r})
+socket.send_fds(asked, [b"."], [0, 1, 2])
+asked.sendall(marshal.dumps((sys.argv[1:], os.getcwd(), dict(os.environb))))
+asked.shutdown(socket.SHUT_WR)
+os._exit(asked.recv(1)[0])
+"""
 _start: Callable[..., int] = _posixsubprocess.fork_exec
 _lock = threading.Lock()
 _source: socket.socket | None = None  # of the one that waits
@@ -65,7 +75,7 @@ class Order(NamedTuple):
 def begin() -> None:
     """From here on processes of ours are forked, where they may be."""
     global _usual
-    if sys.platform == "linux":
+    if sys.platform == "linux" and not sys.flags.no_site:
         _usual = _read(dict(os.environb))
         _posixsubprocess.fork_exec = subprocess._fork_exec = _fork_exec  # type: ignore[attr-defined]
 
@@ -82,6 +92,33 @@ def close() -> None:
     if _source is not None:
         _source.close()
         _source = None
+
+
+def command(program: Path) -> None:
+    """Make a program of it that shells can call for our command, which this process then starts."""
+    called = socket.socket(socket.AF_UNIX)
+    called.bind("")  # to a name of no file
+    called.listen()
+    program.write_text(CALL.format(python=sys.executable, name=called.getsockname()))
+    program.chmod(0o755)
+
+    def answer() -> None:
+        while True:
+            asked, _ = called.accept()
+            with asked:
+                _, streams, *_ = socket.recv_fds(asked, 1, 3)
+                with asked.makefile("rb") as told:
+                    words, place, environment = marshal.loads(told.read())
+                line = [sys.executable, "-m", "spook_tracker", *words]
+                stdin, stdout, stderr = streams
+                ended = subprocess.run(
+                    line, stdin=stdin, stdout=stdout, stderr=stderr, cwd=place, env=environment, check=False
+                )
+                asked.sendall(bytes([ended.returncode & 255]))
+                for stream in streams:
+                    os.close(stream)
+
+    threading.Thread(target=answer, daemon=True).start()
 
 
 def _line(args: Sequence[str]) -> tuple[str, list[str], str] | None:
@@ -168,8 +205,9 @@ def _forked(order: Order, descriptors: list[int]) -> int:
 def _imported() -> socket.socket:
     """The other end of a process that has imported everything and waits."""
     ours, its = socket.socketpair()
-    root, number = str(Path(__file__).parents[1]), its.fileno()
-    code = f"import sys; sys.path.insert(0, {root!r}); from tests.warm import wait; wait({number}, {os.getpid()})"
+    root, number, package = str(Path(__file__).parents[1]), its.fileno(), str(PACKAGE)
+    asked = f"wait({number}, {os.getpid()}, {package!r})"
+    code = f"import sys; sys.path.insert(0, {root!r}); from tests.warm import wait; {asked}"
     nothing = os.open(os.devnull, os.O_RDWR)
     environment = [k + b"=" + v for k, v in os.environb.items() if k != b"PYTHONPATH"]
     fails = os.pipe()
@@ -183,13 +221,15 @@ def _imported() -> socket.socket:
     return ours
 
 
-def wait(number: int, parent: int) -> None:
+def wait(number: int, parent: int, package: str) -> None:
     """The life of the process that has imported everything, in which it forks."""
     ctypes.CDLL(None).prctl(ENDS_WITH_PARENT, signal.SIGKILL, 0, 0, 0)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     asked = socket.socket(fileno=number)
     for name in IMPORTED:
         importlib.import_module(f"spook_tracker.tracker.{name}")
+    if str(PACKAGE) != package:
+        os._exit(1)  # the one that asks has the tracker from elsewhere: what it starts will, too
     del sys.path[0], sys.modules["tests"], sys.modules[__name__]
     gc.collect()
     gc.freeze()
@@ -218,7 +258,8 @@ def wait(number: int, parent: int) -> None:
 
 def _become(order: Order, descriptors: list[int]) -> None:
     """Be as if this process had been started for a program."""
-    global _forks
+    global _forks, _lock
+    _lock = threading.Lock()  # the other is held where this one was forked
     if order.session:
         os.setsid()
     signal.signal(signal.SIGINT, signal.default_int_handler)

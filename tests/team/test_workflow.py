@@ -16,6 +16,7 @@ from pathlib import Path
 import pytest
 
 from tests.places import ROOT
+from tests.warm import command
 
 yaml = pytest.importorskip("yaml", reason="PyYAML is not installed here")
 from tests.team.repository import BUILD, GRAVITY, git, needs_compiler  # noqa: E402
@@ -59,11 +60,10 @@ class Team:
         programs = folder / "programs"
         programs.mkdir()
         pip = f'echo "$PIP_CONSTRAINT" "$@" >> {folder}/pip.log'
-        for name, line in (("pip", pip), ("tracker", f'exec {sys.executable} -m spook_tracker "$@"')):
-            (programs / name).write_text(f"#!/bin/sh\n{line}\n")
+        for name, script in (("pip", f"#!/bin/sh\n{pip}\n"), ("gh", GH.format(folder=folder))):
+            (programs / name).write_text(script)
             (programs / name).chmod(0o755)
-        (programs / "gh").write_text(GH.format(folder=folder))
-        (programs / "gh").chmod(0o755)
+        command(programs / "tracker")
         self.service = Service(self.origin, folder / "ci", programs)
 
     def commit(self, subject: str) -> str:
