@@ -112,19 +112,6 @@ def test_it_tips_over_its_rim_in_any_direction(away: float, share: float, falls:
     assert np.diff(found["energy"]).max() < 0.05  # J of 6
 
 
-def test_rolling_down_it_has_the_inertia_of_its_kind() -> None:
-    """a = g sin θ/(1 + I/(m r²)) = (2/3) g sin θ."""
-    body = can(position=(0, 0, 0.3), orientation=turned((1, 0, 0), math.pi / 2))
-    found = simulate(
-        Scene(bodies=(GROUND, body), gravity=(1.0, 0.0, -10.0)),
-        time_step=H,
-        steps=60,
-        observe={"v": Final(quantity=Velocity("can"))},
-    )
-
-    np.testing.assert_allclose(found["v"], (2.0 / 3.0, 0, 0), atol=1e-9)
-
-
 @pytest.mark.parametrize("solver", ["direct", "iterative"])
 @pytest.mark.parametrize("turn", [0.5, 0.99, 1.1, 2.0, 7.0])
 def test_a_wheel_rolls_on_however_far_it_turns_in_a_step(turn: float, solver: str) -> None:

@@ -52,24 +52,33 @@ def ball(
 # Friction at a blow -------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("h", STEPS)
 @pytest.mark.parametrize("solver", SOLVERS)
 @pytest.mark.parametrize("model", ["cone", "box", "scaled_box"])
-@pytest.mark.parametrize(("mu", "slip"), [(0.2, 2.28), (5.0, 15 / 7)], ids=["sliding", "gripping"])
-def test_a_ball_rubs_while_it_rebounds(h: float, solver: str, model: str, mu: float, slip: float) -> None:
-    """u = 2, v = 3, psi = .8: sliding takes mu (1 + psi) u = .72 of v, gripping 2/7 of it; spin 5/2 dv/r."""
-    rough = Material(restitution=0.8, friction=mu)
-    scene = Scene(bodies=(floor(rough), ball("ball", (0, 0, 0.15), (3, 0, -2), material=rough)))
-    result = simulate(
-        scene,
+@pytest.mark.parametrize(
+    ("h", "mu", "returned"),
+    [
+        *((h, mu, 0.0) for h in STEPS for mu in (0.2, 5.0)),  # sliding and gripping
+        *((H, mu, returned) for mu, returned in ((5.0, 1.0), (5.0, 0.6), (0.2, 1.0), (0.0, 1.0))),
+    ],
+)
+def test_a_ball_rubs_while_it_rebounds_and_turns_its_slip_round_as_far_as_friction_holds(
+    solver: str, model: str, h: float, mu: float, returned: float
+) -> None:
+    """Half a ball's mass over 7/2 takes up the slip: the impulse is (1 + psi_t) 2/7 of it, at most mu (1 + psi) u, u = 2."""
+    rubber = Material(friction=mu, restitution=0.8, tangential_restitution=returned)
+    thrown = solid("ball", Sphere(0.1), (0, 0, 0.15), 2.0, (3.0, 0, -2.0), (0, -10.0, 0), material=rubber)
+    end = simulate(
+        Scene(bodies=(floor(rubber), thrown)),
         time_step=h,
         steps=round(0.1 / h),
         method=Method(solver=solver, friction=model),  # type: ignore[arg-type]
         observe={"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))},
     )
 
-    assert result["v"] == pytest.approx((slip, 0.0, 1.6), abs=1e-9)
-    assert result["w"] == pytest.approx((0.0, 2.5 * (3.0 - slip) / 0.1, 0.0), abs=1e-7)
+    slip = 3.0 + 10.0 * 0.1
+    taken = min((1.0 + returned) * slip * 2.0 / 7.0, mu * 1.8 * 2.0)
+    assert end["v"] == pytest.approx((3.0 - taken, 0.0, 1.6), abs=1e-9)
+    assert end["w"] == pytest.approx((0.0, -10.0 + 2.5 * taken / 0.1, 0.0), abs=1e-7)
 
 
 @pytest.mark.parametrize("h", STEPS)
