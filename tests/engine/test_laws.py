@@ -19,6 +19,7 @@ from spook_tracker.engine import (
     AngularMomentum,
     Ball,
     Box,
+    Capsule,
     ContactPoints,
     Cylindrical,
     Distance,
@@ -33,6 +34,7 @@ from spook_tracker.engine import (
     Momentum,
     Penetration,
     Planar,
+    Plane,
     PointOnLine,
     Prismatic,
     Result,
@@ -256,6 +258,16 @@ def goes(body: str, speed: tuple[float, ...], within: float) -> Law:
     return law
 
 
+def slower(speed: float) -> Law:
+    """Nothing is ever faster, m/s, by the energy of what moves with that speed."""
+
+    def law(run: Run) -> None:
+        lightest = min(body.mass for body in run.scene.bodies if body.mass)
+        assert run.seen["kinetic"].max() <= 0.5 * lightest * speed**2
+
+    return law
+
+
 def impacts(least: int, most: int) -> Law:
     """So many are answered."""
 
@@ -363,6 +375,7 @@ TABLE = (
             SUCCESSIVE, (h,), 6 * h, (flies(0.0, 4e-12, -4e-12), overlap(1e-9), impacts(1, 99)))
         for first, h in enumerate(STEPS)
     ),
+    Row("springs between particles", blows.sprung_particles, ALONE, ("direct",), (0.01,), 5.0, (momentum(1e-12), spin(1e-12))),
     # what falls, leans and lies
     Row("up a slope and back", blows.on_a_slope, tuple((slope, share) for slope in (-0.3, 0.3, 1.0) for share in (0.2, 0.9)),
         (*BOTH, *SUCCESSIVE), (H,), 4 * H, (falls(),)),
@@ -371,6 +384,9 @@ TABLE = (
     # Paths that curve within a step may overlap by a five-hundredth of the larger one's radius.
     Row("boxes that hardly rebound", blows.hardly, each(0, 1, 8), BOTH, (H,), 2.0,
         (falls(), overlap(1e-3 * float(np.linalg.norm(blows.HARDLY))))),
+    Row("a box on a box that the floor stops", blows.borne, each(0.0, 0.1, 0.9), BOTH, (H,), 10 * H, (overlap(1e-8), slower(1e-6))),
+    Row("an end hit down", blows.end_hit_down, tuple((bar, floor) for bar in (Capsule(0.05, 1.0), Box((0.1, 0.3, 1.0)))
+        for floor in (Plane(), Box((4.0, 4.0, 1.0)))), BOTH, (H,), 0.1, (overlap(2e-3 * 0.6),)),
     Row("thrown up slowly", blows.thrown_up, ALONE, BOTH, (H,), 3 * H, (falls(4e-13), goes("ball", (0.0, 0.0, 0.0), 1e-12))),
     # Of a stack of a hundred that sweeps lift apart no overlap is more than what the allowed .1 m/s close in a step, nor of boxes.
     Row("a stack lifted apart", corpus.stack, each(100), ("two hundred iterations",), (H,), 2.0, (falls(1e-12), overlap(0.1 * H))),

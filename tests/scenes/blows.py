@@ -9,7 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import WORLD, Box, Limit, Lock, Material, Prismatic, RigidBody, Scene, Shape, Sphere
+from spook_tracker.engine import (
+    WORLD,
+    Box,
+    Limit,
+    Lock,
+    Material,
+    Particle,
+    Prismatic,
+    RigidBody,
+    Scene,
+    Shape,
+    Sphere,
+    Spring,
+)
 from spook_tracker.scalar_tests import pile
 from tests.scenes import corpus
 
@@ -164,6 +177,39 @@ def thrown_up() -> Scene:
         "ball", Sphere(0.25), (0, 0, 0.25), velocity=(0, 0, 0.1 * corpus.GRAVITY * H), material=corpus.ROUGH
     )
     return falling(corpus.floor(corpus.ROUGH), up)
+
+
+def borne(psi: float) -> Scene:
+    """A box on a box, both 1 nm above what bears them: they get g h in the same step, the upper one without approaching the
+    lower one before the floor stops that. It went on for g h² = 2.7 mm, and for twice that in the next step."""
+    made_of = Material(restitution=psi)
+    heights = (("lower", 0.1 + 1e-9), ("upper", 0.3 + 2e-9))
+    boxes = (corpus.solid(name, Box((0.2, 0.2, 0.2)), (0, 0, z), material=made_of) for name, z in heights)
+    return falling(corpus.floor(made_of), *boxes)
+
+
+def end_hit_down(shape: Shape, floor: Shape) -> Scene:
+    """A bar lies still with one end on the floor, the other 4 mm above it, out of reach, until a ball hits that end."""
+    tilt, turn = 0.004, 0.5 * (math.pi / 2 + 0.004)
+    turned = (math.cos(turn), 0.0, math.sin(turn), 0.0)
+    return falling(
+        corpus.fixed("floor", floor, (0, 0, -0.5 * isinstance(floor, Box))),
+        corpus.solid("bar", shape, (0, 0, 0.05 + 0.5 * math.sin(tilt)), orientation=turned),
+        corpus.solid("hammer", Sphere(0.1), (-0.45, 0, 0.3), 5.0, (0, 0, -8.0)),
+    )
+
+
+def sprung_particles() -> Scene:
+    """Four, each tied to each by a spring with a damper."""
+    bodies = (
+        Particle(name=f"b{i}", mass=1.0 + i, position=(1.0 * i, 0.3 * i * i, 0.1 * i)) for i in range(4)
+    )
+    springs = (
+        Spring(name=f"{i}{j}", between=(f"b{i}", f"b{j}"), stiffness=10.0 + i, rest_length=0.7, viscosity=0.3)
+        for i in range(4)
+        for j in range(i)
+    )
+    return Scene(bodies=tuple(bodies), forces=tuple(springs))
 
 
 # Slides -----------------------------------------------------------------------------------------------------------------

@@ -336,31 +336,6 @@ def test_what_is_set_in_motion_by_a_plastic_impact_rebounds_in_the_same_step(
     assert float(run["deep"]) < 1e-9
 
 
-@pytest.mark.parametrize("solver", SOLVERS)
-@pytest.mark.parametrize("restitution", [0.0, 0.1, 0.9])
-def test_what_lies_on_a_body_that_the_floor_stops_does_not_fall_into_it(
-    restitution: float, solver: str
-) -> None:
-    """Both are 1 nm above what bears them and get g h in the same step, the upper one without approaching the lower
-    one before the floor stops that: it went on for g h^2 = 2.7 mm, and for twice that in the next step."""
-    made_of = Material(restitution=restitution)
-    boxes = [
-        solid(name, Box((0.2, 0.2, 0.2)), (0.0, 0.0, height), material=made_of)
-        for name, height in (("lower", 0.1 + 1e-9), ("upper", 0.3 + 2e-9))
-    ]
-    run = simulate(
-        Scene(bodies=(floor(made_of), *boxes), gravity=GRAVITY),
-        time_step=H,
-        steps=10,
-        method=Method(solver=solver),
-        observe={"deep": Maximum(quantity=Penetration()), "v": Trace(quantity=Velocity("upper"))},
-    )
-
-    assert run.completed
-    assert float(run["deep"]) < 1e-8
-    assert np.abs(run["v"]).max() < 1e-6
-
-
 # Answers that were not found ----------------------------------------------------------------------------------
 
 

@@ -14,7 +14,6 @@ from spook_tracker.engine import (
     Final,
     Load,
     Method,
-    Momentum,
     Particle,
     Position,
     Scene,
@@ -97,22 +96,6 @@ def test_t6_beyond_two_radians_a_step_a_spring_as_a_force_explodes() -> None:
     assert stable < 0.1 * 50.0
     assert unstable.status == "diverged"
     assert unstable.failed_body == "ball"
-
-
-def test_springs_between_bodies_obey_newtons_third_law() -> None:
-    bodies = tuple(
-        Particle(name=f"b{i}", mass=1.0 + i, position=(float(i), 0.3 * i * i, 0.1 * i)) for i in range(4)
-    )
-    springs = tuple(
-        Spring(name=f"{i}{j}", between=(f"b{i}", f"b{j}"), stiffness=10.0 + i, rest_length=0.7, viscosity=0.3)
-        for i in range(4)
-        for j in range(i)
-    )
-    observe = {"p": Trace(quantity=Momentum()), "l": Trace(quantity=AngularMomentum(about=(1.0, 1.0, 1.0)))}
-    result = simulate(Scene(bodies=bodies, forces=springs), time_step=0.01, steps=500, observe=observe)
-
-    assert np.abs(result["p"]).max() < 1e-12
-    assert np.abs(result["l"]).max() < 1e-12
 
 
 K, XI = 2.0 * math.pi / 365.0, 0.017  # 1/s and 1: the thesis' planet
