@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spook_tracker.engine import Energy, Final, Particle, RigidBody, Scene, Sphere, simulate
+from spook_tracker.engine import Energy, Particle, RigidBody, Scene, Sphere, simulate
 from spook_tracker.engine.result import SimulationFailed
+from tests.scenes.seen import finals
 
 
 def body(name: str, **more: object) -> RigidBody:
@@ -31,9 +32,7 @@ def test_a_kinematic_body_that_spins_beyond_arithmetic_has_not_completed(spin: f
 def test_an_energy_beyond_arithmetic_has_not_completed() -> None:
     heavy = Particle(name="heavy", position=(0.0, 0.0, 0.0), velocity=(1e99, 0.0, 0.0), mass=1e200)
 
-    result = simulate(
-        Scene(bodies=(heavy,)), time_step=1e-3, steps=3, observe={"energy": Final(quantity=Energy())}
-    )
+    result = simulate(Scene(bodies=(heavy,)), time_step=1e-3, steps=3, observe=finals(energy=Energy()))
 
     assert result.status == "not_finite"
     assert "the observable 'energy' is infinite" in result.failure
@@ -44,9 +43,7 @@ def test_an_energy_beyond_arithmetic_has_not_completed() -> None:
 def test_numbers_that_are_only_large_complete() -> None:
     fast = Particle(name="fast", position=(0.0, 0.0, 0.0), velocity=(1e99, 0.0, 0.0), mass=1.0)
 
-    result = simulate(
-        Scene(bodies=(fast,)), time_step=1e-3, steps=3, observe={"energy": Final(quantity=Energy())}
-    )
+    result = simulate(Scene(bodies=(fast,)), time_step=1e-3, steps=3, observe=finals(energy=Energy()))
 
     assert result.status == "completed"
     assert result["energy"] == pytest.approx(0.5e198)

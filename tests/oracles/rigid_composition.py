@@ -24,22 +24,17 @@ from spook_tracker.engine import (
     Orientation,
     Position,
     Scene,
-    Trace,
     Velocity,
     explain,
     simulate,
 )
 from tests.oracles.rigid import RigidOracle, free_turn, momentum_of_turn, product, rotation
+from tests.scenes.seen import traces
 
 Array = npt.NDArray[Any]
 _SUZUKI = 1.0 / (4.0 - 4.0 ** (1.0 / 3.0))
 STAGES = {2: (1.0,), 4: (_SUZUKI, _SUZUKI, 1.0 - 4.0 * _SUZUKI, _SUZUKI, _SUZUKI)}
-STATE = {
-    "x": Trace(quantity=Position()),
-    "q": Trace(quantity=Orientation()),
-    "v": Trace(quantity=Velocity()),
-    "w": Trace(quantity=AngularVelocity()),
-}
+STATE = traces(x=Position(), q=Orientation(), v=Velocity(), w=AngularVelocity())
 
 
 def assert_dense_steps(

@@ -8,20 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spook_tracker.engine import (
-    Final,
-    Particle,
-    Position,
-    Scene,
-    SimulationFailed,
-    simulate,
-)
+from spook_tracker.engine import Particle, Position, Scene, SimulationFailed, simulate
 from spook_tracker.scalar_tests import chain
 from spook_tracker.scalar_tests.case import Metric, Simulate
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.oscillator import scene as oscillator
 from spook_tracker.scalar_tests.pendulum import scene as pendulum_scene
 from spook_tracker.scalar_tests.planetarium import scene as planetarium_scene
+from tests.scenes.seen import finals
 from tests.toys.broken_engines import deaf, off_by, scaled, with_scene
 
 PARTICLE_TESTS = [
@@ -138,7 +132,7 @@ def test_the_one_step_map_is_what_the_engine_does() -> None:
         oscillator.row_scene(50.4, 0.05, start=2.0, speed=3.0),
         time_step=oscillator.TIME_STEP,
         steps=1,
-        observe={"x": Final(quantity=Position("mass"))},
+        observe=finals(x=Position("mass")),
     )
 
     assert abs(result["x"][2] - exact[0]) < 1e-13

@@ -19,7 +19,6 @@ from spook_tracker.engine import (
     Compound,
     ContactForce,
     ConvexHull,
-    Final,
     Fluid,
     Material,
     Orientation,
@@ -32,10 +31,10 @@ from spook_tracker.engine import (
     SceneError,
     Shape,
     Sphere,
-    Trace,
     simulate,
 )
 from tests.scenes.corpus import solid
+from tests.scenes.seen import finals, traces
 
 H = 1.0 / 60.0
 CUBE = tuple(itertools.product((-0.5, 0.5), repeat=3))
@@ -167,9 +166,7 @@ def depth_of(first: Any, second: Any) -> float:
 
 
 def overlap(one: RigidBody, two: RigidBody) -> float:
-    result = simulate(
-        Scene(bodies=(one, two)), time_step=H, steps=1, observe={"d": Trace(quantity=Penetration())}
-    )
+    result = simulate(Scene(bodies=(one, two)), time_step=H, steps=1, observe=traces(d=Penetration()))
     return float(result["d"].max())
 
 
@@ -262,11 +259,9 @@ def test_cubes_as_hulls_stack_as_boxes_do(count: int) -> None:
             RigidBody(name=str(k), mass=1.0, shape=shape, position=(0.05 * k, 0, 0.5 + k), material=ROUGH)
             for k in range(count)
         ]
-        observe = {
-            "x": Final(quantity=Position(str(count - 1))),
-            "q": Final(quantity=Orientation(str(count - 1))),
-            "force": Final(quantity=ContactForce("0", "ground")),
-        }
+        observe = finals(
+            x=Position(str(count - 1)), q=Orientation(str(count - 1)), force=ContactForce("0", "ground")
+        )
         found.append(
             simulate(
                 Scene(bodies=(GROUND, *bodies), gravity=(0, 0, -10.0)),
@@ -293,7 +288,7 @@ def test_a_hull_in_a_compound_and_in_water_is_the_box_it_looks_like() -> None:
             orientation=(math.cos(0.1), math.sin(0.1), 0.0, 0.0),
         )
         water = Fluid(name="water", density=1000.0, level=0.0, drag_coefficient=1.0)
-        observe = {"x": Trace(quantity=Position("b")), "q": Trace(quantity=Orientation("b"))}
+        observe = traces(x=Position("b"), q=Orientation("b"))
         found.append(
             simulate(
                 Scene(bodies=(body,), forces=(water,), gravity=(0, 0, -10.0)),

@@ -13,19 +13,18 @@ from spook_tracker.engine import (
     Capsule,
     ContactForce,
     Cylinder,
-    Final,
     Material,
     Method,
     Position,
     RigidBody,
     Scene,
     Sphere,
-    Trace,
     TriangleMesh,
     Velocity,
     simulate,
 )
 from spook_tracker.engine.shapes import Shape
+from tests.scenes.seen import finals, traces
 
 H, G = 1.0 / 60.0, 10.0
 INNER, OUTER = 0.3, 2.0  # m, half the side of the square hole and of the sheet
@@ -46,11 +45,7 @@ def fall(shape: Shape, place: Any, steps: int, method: Method | None = None, **f
     body = RigidBody(
         name="body", mass=2.0, shape=shape, position=place, material=Material(friction=0.5), **fields
     )
-    observe = {
-        "x": Trace(quantity=Position("body")),
-        "v": Trace(quantity=Velocity("body")),
-        "f": Final(quantity=ContactForce("body", "sheet")),
-    }
+    observe = traces(x=Position("body"), v=Velocity("body")) | finals(f=ContactForce("body", "sheet"))
     scene = Scene(bodies=(sheet, body), gravity=(0.0, 0.0, -G))
     return simulate(scene, time_step=H, steps=steps, observe=observe, method=method or Method())
 

@@ -39,6 +39,7 @@ from spook_tracker.engine import (
     Velocity,
     simulate,
 )
+from tests.scenes.seen import maxima, traces
 
 H = 1.0 / 60.0
 SMOOTH, ROUGH = Material(), Material(friction=0.5)
@@ -377,11 +378,7 @@ def test_a_smooth_ball_in_a_gutter_goes_on_along_it(speed: float, facets: int, s
         time_step=H,
         duration=1.5,
         method=Method(solver=solver),
-        observe={
-            "v": Trace(quantity=Velocity("body")),
-            "w": Trace(quantity=AngularVelocity("body")),
-            "deep": Maximum(quantity=Penetration()),
-        },
+        observe=traces(v=Velocity("body"), w=AngularVelocity("body")) | maxima(deep=Penetration()),
     )
 
     assert np.abs(result["w"]).max() < 1e-9

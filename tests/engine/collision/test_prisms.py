@@ -14,7 +14,6 @@ from spook_tracker.engine import (
     ContactForce,
     ConvexHull,
     Cylinder,
-    Final,
     Fluid,
     HeightField,
     Material,
@@ -27,6 +26,7 @@ from spook_tracker.engine import (
     Velocity,
     simulate,
 )
+from tests.scenes.seen import finals
 
 H = 1.0 / 60.0
 G = 10.0  # m/s²
@@ -59,11 +59,7 @@ def stands(
         ),
         gravity=gravity,
     )
-    observe = {
-        "x": Final(quantity=Position("prism")),
-        "force": Final(quantity=ContactForce("prism")),
-        "points": Final(quantity=ContactCount()),
-    }
+    observe = finals(x=Position("prism"), force=ContactForce("prism"), points=ContactCount())
     return top, simulate(scene, time_step=H, steps=steps, observe=observe)
 
 
@@ -115,7 +111,7 @@ def test_water_lifts_a_prism_by_what_it_displaces(sides: int) -> None:
     body = RigidBody(name="b", mass=5.0, shape=prism(sides), position=(0.0, 0.0, 0.0))
     water = Fluid(name="water", density=1000.0, level=0.1)
     scene = Scene(bodies=(body,), forces=(water,), gravity=(0.0, 0.0, -G))
-    found = simulate(scene, time_step=1e-6, steps=1, observe={"v": Final(quantity=Velocity("b"))})
+    found = simulate(scene, time_step=1e-6, steps=1, observe=finals(v=Velocity("b")))
     lift = (float(found["v"][2]) / 1e-6 + G) * 5.0
     assert lift == pytest.approx(1000.0 * G * area * (0.5 * HEIGHT + 0.1), rel=1e-9)
 

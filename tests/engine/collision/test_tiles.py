@@ -30,13 +30,13 @@ from spook_tracker.engine import (
     Scene,
     Shape,
     Sphere,
-    Trace,
     Velocity,
     simulate,
     start,
 )
 from tests.places import ROOT
 from tests.scenes.corpus import fixed, solid
+from tests.scenes.seen import traces
 
 GRAVITY = (0.0, 0.0, -9.81)  # m/s²
 PYRAMID = ConvexHull.placed(
@@ -98,11 +98,7 @@ def slide(
     z = SLIDERS[slider][1]
     velocity = (5.0 * math.cos(heading), 5.0 * math.sin(heading), 0.0)
     body = slider_at(slider, y, velocity)
-    seen = {
-        "v": Trace(quantity=Velocity("slider")),
-        "w": Trace(quantity=AngularVelocity("slider")),
-        "x": Trace(quantity=Position("slider")),
-    }
+    seen = traces(v=Velocity("slider"), w=AngularVelocity("slider"), x=Position("slider"))
     tiles = loose(floor(), mass) if mass > 0.0 else floor()
     scene = Scene(bodies=(*tiles, body), gravity=GRAVITY)
     result = simulate(scene, time_step=h, duration=duration, method=method, observe=seen)
@@ -161,7 +157,7 @@ def test_a_body_that_sinks_before_iterations_hold_it_meets_no_edge(
         time_step=h,
         duration=min(3.0, 5.5 * size) / speed,
         method=Method(solver="iterative", iterations=sweeps),
-        observe={"v": Trace(quantity=Velocity("slider"))},
+        observe=traces(v=Velocity("slider")),
     )
     assert np.abs(result["v"] - velocity).max() < 0.1
 
@@ -211,7 +207,7 @@ def test_iterations_over_tiles_that_can_move_meet_an_edge_that_stands_out(slider
         time_step=1 / 60,
         duration=0.5,
         method=Method(solver="iterative", iterations=sweeps),
-        observe={"v": Trace(quantity=Velocity("slider"))},
+        observe=traces(v=Velocity("slider")),
     )
     assert result["v"][:, 0].min() < 4.0
 
@@ -234,7 +230,7 @@ def test_an_edge_that_stands_out_is_met(slider: str, solver: str) -> None:
         time_step=1 / 60,
         duration=0.5,
         method=Method(solver=solver),  # type: ignore[arg-type]
-        observe={"v": Trace(quantity=Velocity("slider"))},
+        observe=traces(v=Velocity("slider")),
     )
     assert result["v"][:, 0].min() < 4.0
 
@@ -245,11 +241,7 @@ def test_a_wall_of_two_parts_holds_what_touches_it(solver: str, speed: float) ->
     """A box leans on the floor and on two boxes side by side, and is pushed along: neither is let pass for the other."""
     walls = [fixed(f"wall {k}", Box((1.0, 1.0, 2.0)), (0.75, k - 0.5, 1.0)) for k in range(2)]
     body = solid("box", Box((0.5, 0.4, 0.3)), (0.0, -0.3, 0.15), velocity=(speed, speed, 0.0))
-    seen = {
-        "v": Trace(quantity=Velocity("box")),
-        "x": Trace(quantity=Position("box")),
-        "overlap": Trace(quantity=Penetration()),
-    }
+    seen = traces(v=Velocity("box"), x=Position("box"), overlap=Penetration())
     scene = Scene(bodies=(*floor(), *walls, body), gravity=GRAVITY)
     result = simulate(
         scene,
@@ -308,7 +300,7 @@ def test_what_falls_onto_tiles_lands_on_their_plane(
         )
         velocity = (speed * math.cos(heading), speed * math.sin(heading), 0.0)
         body = slider_at(slider, y, velocity, lift=drop)
-        seen = {"v": Trace(quantity=Velocity("slider")), "x": Trace(quantity=Position("slider"))}
+        seen = traces(v=Velocity("slider"), x=Position("slider"))
         result = simulate(
             Scene(
                 bodies=(

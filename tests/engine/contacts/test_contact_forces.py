@@ -26,12 +26,12 @@ from spook_tracker.engine import (
     Scene,
     Shape,
     Sphere,
-    Trace,
     Velocity,
     compile,
     simulate,
 )
 from tests.scenes.contact import DOWN, GRAVITY, ground
+from tests.scenes.seen import finals, traces
 
 H = 1 / 60  # s
 
@@ -59,12 +59,7 @@ def test_t8_a_body_rests_at_the_depth_its_compliance_gives(
 ) -> None:
     """eps m g over the number of contact points, whatever the step; the forces sum to the weight."""
     scene = Scene(bodies=(ground(Material(compliance=eps)), resting), gravity=DOWN)
-    observe = {
-        "f": Final(quantity=ContactForce("body")),
-        "n": Final(quantity=ContactCount()),
-        "depth": Final(quantity=Penetration()),
-        "v": Final(quantity=Velocity("body")),
-    }
+    observe = finals(f=ContactForce("body"), n=ContactCount(), depth=Penetration(), v=Velocity("body"))
     result = simulate(scene, time_step=h, duration=600.0 * h if eps < 1e-5 else 5.0, observe=observe)
 
     assert int(result["n"]) == points
@@ -106,11 +101,11 @@ def test_the_points_of_a_box_on_a_slope_hold_it() -> None:
 
 def test_points_beyond_those_asked_for_are_left_out_and_none_is_no_number() -> None:
     scene = Scene(bodies=(ground(), body(Box((1.0, 0.6, 0.4)), 0.2)), gravity=DOWN)
-    two = simulate(scene, time_step=H, steps=2, observe={"p": Trace(quantity=ContactPoints(2))})["p"]
+    two = simulate(scene, time_step=H, steps=2, observe=traces(p=ContactPoints(2)))["p"]
     flying = Scene(bodies=(body(Sphere(0.3), 9.0),), gravity=DOWN)
-    none = simulate(flying, time_step=H, steps=2, observe={"p": Final(quantity=ContactPoints(3))})["p"]
+    none = simulate(flying, time_step=H, steps=2, observe=finals(p=ContactPoints(3)))["p"]
     dust = Scene(bodies=(Particle(name="dust", position=(0, 0, 0), mass=1.0),), gravity=DOWN)
-    dusty = simulate(dust, time_step=H, steps=2, observe={"p": Final(quantity=ContactPoints(3))})["p"]
+    dusty = simulate(dust, time_step=H, steps=2, observe=finals(p=ContactPoints(3)))["p"]
 
     assert two.shape == (3, 2, 10)
     assert np.isnan(two[0]).all(), "no step has ended yet"

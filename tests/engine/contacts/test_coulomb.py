@@ -14,7 +14,6 @@ from spook_tracker.engine import (
     Box,
     ContactForce,
     Cylinder,
-    Final,
     Material,
     Method,
     Plane,
@@ -27,6 +26,7 @@ from spook_tracker.engine import (
     simulate,
 )
 from tests.scenes.corpus import fixed, solid
+from tests.scenes.seen import finals, traces
 
 TIME_STEP = 1.0 / 60.0  # s
 GRAVITY = 10.0  # m/s²
@@ -201,7 +201,7 @@ def test_a_sliding_ball_begins_to_roll_and_keeps_five_sevenths() -> None:
         Scene(bodies=bodies, gravity=(0, 0, -GRAVITY)),
         time_step=TIME_STEP,
         duration=2.0,
-        observe={"v": Trace(quantity=Velocity("ball")), "w": Trace(quantity=AngularVelocity("ball"))},
+        observe=traces(v=Velocity("ball"), w=AngularVelocity("ball")),
     )
 
     time = TIME_STEP * np.arange(121)
@@ -230,7 +230,7 @@ def test_what_rolls_down_a_slope_gives_a_share_of_gravity_to_its_spin(
         ),
         time_step=TIME_STEP,
         duration=1.0,
-        observe={"v": Trace(quantity=Velocity("it")), "f": Final(quantity=ContactForce("it"))},
+        observe=traces(v=Velocity("it")) | finals(f=ContactForce("it")),
     )
 
     gain = (1.0 - share) * GRAVITY * math.sin(theta) * TIME_STEP
@@ -257,11 +257,7 @@ def test_each_contact_in_a_heap_of_balls_obeys_the_law() -> None:
         Scene(bodies=tuple(bodies), gravity=(0, 0, -GRAVITY)),
         time_step=TIME_STEP,
         steps=60,
-        observe={
-            "x": Trace(quantity=Position()),
-            "v": Trace(quantity=Velocity()),
-            "w": Trace(quantity=AngularVelocity()),
-        }
+        observe=traces(x=Position(), v=Velocity(), w=AngularVelocity())
         | {f"{a} {b}": Trace(quantity=ContactForce(a, b)) for a, b in pairs},
     )
     index = {"plane": 0} | {name: k + 1 for k, name in enumerate(names)}

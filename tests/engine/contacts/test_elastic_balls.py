@@ -18,18 +18,17 @@ import pytest
 from spook_tracker.engine import (
     ContactForce,
     Energy,
-    Final,
     Load,
     Method,
     Position,
     Scene,
     Sphere,
-    Trace,
     Velocity,
     simulate,
 )
 from tests.scenes.blows import ELASTIC, RADIUS, H, ball, wall
 from tests.scenes.corpus import GRAVITY, solid
+from tests.scenes.seen import finals, traces
 
 SOLVERS = ("direct", "iterative")
 Impacts = Literal["simultaneous", "successive"]
@@ -61,11 +60,7 @@ def test_the_floor_carries_what_lies_on_it_until_an_impact_lifts_it(
         time_step=H,
         steps=1,
         method=Method(solver=solver, impacts=impacts),  # type: ignore[arg-type]
-        observe={
-            "energy": Trace(quantity=Energy()),
-            "velocity": Final(quantity=Velocity()),
-            "floor": Final(quantity=ContactForce("floor")),
-        },
+        observe=traces(energy=Energy()) | finals(velocity=Velocity(), floor=ContactForce("floor")),
     )
     rises = result["velocity"][1:, 2]
     (change,) = np.diff(result["energy"])
@@ -93,11 +88,7 @@ def test_what_an_impact_lifts_falls_until_the_next_one(share: float, solver: str
         time_step=H,
         steps=1,
         method=Method(solver=solver, impacts="successive"),  # type: ignore[arg-type]
-        observe={
-            "energy": Trace(quantity=Energy()),
-            "velocity": Final(quantity=Velocity()),
-            "roof": Final(quantity=ContactForce("roof")),
-        },
+        observe=traces(energy=Energy()) | finals(velocity=Velocity(), roof=ContactForce("roof")),
     )
     (change,) = np.diff(result["energy"])
     change -= 0.5 * H * GRAVITY * result["velocity"][2:, 2] @ (1.0, 2.0)
@@ -125,7 +116,7 @@ def test_balls_that_are_pressed_together_as_they_fly_carry_each_other(solver: st
         time_step=H,
         steps=1,
         method=Method(solver=solver),  # type: ignore[arg-type]
-        observe={"x": Final(quantity=Position()), "v": Final(quantity=Velocity())},
+        observe=finals(x=Position(), v=Velocity()),
     )
 
     assert result["x"][1, 1] == pytest.approx(0.1 * H * 3.0, rel=1e-9)

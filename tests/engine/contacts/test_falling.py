@@ -17,11 +17,11 @@ from spook_tracker.engine import (
     RigidBody,
     Shape,
     Sphere,
-    Trace,
     simulate,
 )
 from spook_tracker.engine.result import Array
 from spook_tracker.scalar_tests import falling_pile
+from tests.scenes.seen import traces
 
 TURNED = np.array(
     [
@@ -91,11 +91,7 @@ def overlaps(
         time_step=falling_pile.TIME_STEP,
         steps=falling_pile.STEPS,
         method=Method(solver=solver),
-        observe={
-            "x": Trace(quantity=Position()),
-            "q": Trace(quantity=Orientation()),
-            "w": Trace(quantity=AngularVelocity()),
-        },
+        observe=traces(x=Position(), q=Orientation(), w=AngularVelocity()),
     )
     deepest = unexplained = -np.inf
     for x, q, w in zip(run["x"], run["q"], run["w"], strict=True):

@@ -12,7 +12,6 @@ import pytest
 from spook_tracker.engine import (
     Box,
     ContactForce,
-    Final,
     Material,
     Method,
     PairFriction,
@@ -21,12 +20,12 @@ from spook_tracker.engine import (
     Scene,
     SceneError,
     Sphere,
-    Trace,
     Velocity,
     simulate,
 )
 from tests.oracles.particles import Array
 from tests.scenes.corpus import fixed, solid
+from tests.scenes.seen import finals, traces
 
 MU = 0.5
 G = 10.0  # m/s²
@@ -47,7 +46,7 @@ def slope(tan: float, turn: float, material: Material, mass: float = MASS) -> Sc
 
 def slide(scene: Scene, steps: int = 90, method: Method | None = None) -> tuple[Array, Array]:
     """Velocity trace and final contact force of the box."""
-    observe = {"v": Trace(quantity=Velocity("box")), "f": Final(quantity=ContactForce("box"))}
+    observe = traces(v=Velocity("box")) | finals(f=ContactForce("box"))
     result = simulate(scene, time_step=H, steps=steps, observe=observe, method=method or Method())
     return result["v"], result["f"]
 
@@ -60,7 +59,7 @@ def test_viscous_friction_is_a_force_as_large_as_the_slip(solver: Any, viscosity
     oil = Material(friction=1e6, slip_compliance=0.5 / viscosity)
     scene = slope(0.0, 0.0, oil)
     pushed = replace(scene, bodies=(scene.bodies[0], replace(scene.bodies[1], velocity=(0.3, -0.4, 0.0))))
-    observe = {"v": Trace(quantity=Velocity("box")), "f": Trace(quantity=ContactForce("box"))}
+    observe = traces(v=Velocity("box"), f=ContactForce("box"))
     result = simulate(
         pushed, time_step=H, steps=60, observe=observe, method=Method(solver=solver, iterations=2000)
     )
@@ -103,7 +102,7 @@ def test_the_box_never_gives_more_than_its_corners(edge: tuple[float, float, flo
         time_step=1 / 60,
         steps=60,
         method=Method(friction="box", solver=solver),
-        observe={"f": Trace(quantity=ContactForce("b"))},
+        observe=traces(f=ContactForce("b")),
     )["f"][1:]
 
     assert np.all(np.hypot(force[:, 0], force[:, 1]) <= math.sqrt(2.0) * mu * force[:, 2] * (1.0 + 1e-9))
@@ -127,9 +126,7 @@ def test_a_pair_rubs_as_it_is_told_whatever_its_materials_say(
     assert (np.linalg.norm(v[-1]) < 1e-9) == (mu > 0.5)
     beside = replace(told.bodies[1], name="beside", position=(0.0, 5.0, 0.1))  # type: ignore[arg-type]
     both = replace(told, bodies=(*told.bodies, beside))
-    found = simulate(
-        both, time_step=H, steps=90, method=method, observe={"v": Final(quantity=Velocity("beside"))}
-    )
+    found = simulate(both, time_step=H, steps=90, method=method, observe=finals(v=Velocity("beside")))
     assert found["v"] == pytest.approx(
         slide(slope(0.5, 0.3, Material(friction=own)), method=method)[0][-1], abs=1e-9
     )
@@ -147,7 +144,7 @@ def test_a_pair_may_roll_with_friction_and_a_ball_without_it_goes_on() -> None:
         PairFriction(between=("free", "ground"), friction=0.5),
     )
     scene = Scene(bodies=(ground, *balls), gravity=(0.0, 0.0, -G), pair_frictions=pairs)
-    found = simulate(scene, time_step=H, steps=60, observe={"v": Final(quantity=Velocity())})["v"]
+    found = simulate(scene, time_step=H, steps=60, observe=finals(v=Velocity()))["v"]
 
     assert found[1, 0] == pytest.approx(1.0 - 5.0 / 7.0 * G * 0.01 / 0.5, abs=1e-3)
     assert found[2, 0] == pytest.approx(1.0, abs=1e-9)

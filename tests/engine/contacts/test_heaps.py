@@ -10,18 +10,17 @@ from spook_tracker.engine import (
     Box,
     Capsule,
     Energy,
-    Final,
     Material,
     Position,
     RigidBody,
     Scene,
     Sphere,
-    Trace,
     Velocity,
     simulate,
 )
 from spook_tracker.scalar_tests import masonry_arch
 from tests.scenes.contact import DOWN, TIME_STEP, cube, ground
+from tests.scenes.seen import finals, traces
 
 
 def test_a_tall_stack_at_rest_factors_no_matrix() -> None:
@@ -47,7 +46,7 @@ def test_loads_that_nothing_decides_send_no_pivoting_in_circles() -> None:
             if isinstance(body, RigidBody)
         ),
     )
-    crown = {"z": Trace(quantity=Position("stone 2"))}
+    crown = traces(z=Position("stone 2"))
     run = simulate(rigid, time_step=TIME_STEP, steps=15, observe=crown)
 
     assert run.completed
@@ -66,10 +65,7 @@ def test_a_heap_of_every_shape_costs_few_factorisations() -> None:
         place = (0.7 * (k % 4) + dx, 0.7 * (k // 4 % 4) + dy, 0.5 + 0.7 * (k // 16))
         bodies.append(RigidBody(name=f"b{k}", position=place, mass=1.0, shape=shapes[k % 3], material=rough))
     result = simulate(
-        Scene(bodies=tuple(bodies), gravity=DOWN),
-        time_step=TIME_STEP,
-        steps=90,
-        observe={"e": Trace(quantity=Energy())},
+        Scene(bodies=tuple(bodies), gravity=DOWN), time_step=TIME_STEP, steps=90, observe=traces(e=Energy())
     )
 
     assert result.completed
@@ -98,9 +94,7 @@ def test_an_impact_goes_through_as_many_balls_as_it_reaches() -> None:
         )
         for k in range(len(expected))
     )
-    result = simulate(
-        Scene(bodies=tuple(balls)), time_step=TIME_STEP, steps=1, observe={"v": Final(quantity=Velocity())}
-    )
+    result = simulate(Scene(bodies=tuple(balls)), time_step=TIME_STEP, steps=1, observe=finals(v=Velocity()))
 
     assert result.completed
     assert np.abs(result["v"][:, 0] - expected).max() <= 1e-12 * expected.sum()

@@ -12,7 +12,6 @@ from spook_tracker.engine import (
     AngularVelocity,
     Ball,
     Box,
-    Final,
     Hinge,
     KineticEnergy,
     Lock,
@@ -24,11 +23,11 @@ from spook_tracker.engine import (
     RigidBody,
     Scene,
     Sphere,
-    Trace,
     Velocity,
     simulate,
 )
 from tests.scenes.corpus import fixed, solid
+from tests.scenes.seen import finals, traces
 
 H = 1 / 60
 
@@ -47,7 +46,7 @@ def test_t12_a_ball_leaves_a_wall_with_its_restitution(psi: float, speed: float,
         Scene(bodies=(wall, ball("ball", 0.0, speed, 2.0, psi))),
         time_step=h,
         steps=steps,
-        observe={"v": Final(quantity=Velocity("ball"))},
+        observe=finals(v=Velocity("ball")),
     )["v"]
 
     assert v == pytest.approx([-psi * speed, 0.0, 0.0], abs=1e-9 * speed)
@@ -58,11 +57,7 @@ def test_t12_a_ball_leaves_a_wall_with_its_restitution(psi: float, speed: float,
 def test_t12_two_balls_part_with_their_restitution(ratio: float, psi: float) -> None:
     """Head on: relative speed −psi times that before, momentum kept, and energy by elastic balls."""
     first, second = ball("first", -0.5, 3.0, 1.0, psi), ball("second", 0.5, -1.0, ratio, 0.0)
-    observe = {
-        "v": Final(quantity=Velocity()),
-        "p": Trace(quantity=Momentum()),
-        "e": Final(quantity=KineticEnergy()),
-    }
+    observe = finals(v=Velocity(), e=KineticEnergy()) | traces(p=Momentum())
     result = simulate(Scene(bodies=(first, second)), time_step=H, steps=40, observe=observe)
     centre = (3.0 - ratio) / (1.0 + ratio)
     exact = [centre - psi * 4.0 * ratio / (1.0 + ratio), centre + psi * 4.0 / (1.0 + ratio)]
@@ -84,7 +79,7 @@ def test_an_oblique_hit_without_rebound_comes_along_the_line_of_centres_of_its_m
             Scene(bodies=(first, ball("second", 0.0, 0.0, 1.0, 0.0))),
             time_step=h,
             steps=4,
-            observe={"v": Final(quantity=Velocity("second"))},
+            observe=finals(v=Velocity("second")),
         )["v"]
 
         assert v == pytest.approx(0.5 * speed * line[0] * line, abs=1e-14 * speed)
@@ -105,7 +100,7 @@ def test_t12_joints_take_part_in_an_impact(kind: str, bound: float, psi: float) 
         ),
     }[kind]
     scene = Scene(bodies=(plank, ball("ball", -0.4, speed, mass, psi, y=arm)), constraints=(pin,))
-    observe = {"v": Trace(quantity=Velocity("ball")), "w": Trace(quantity=AngularVelocity("plank"))}
+    observe = traces(v=Velocity("ball"), w=AngularVelocity("plank"))
     result = simulate(scene, time_step=1e-3, steps=200, observe=observe)
     impulse = (1.0 + psi) * speed / (1.0 / mass + arm**2 / moment)
     hit = int(np.argmax(result["v"][:, 0] < speed - 1e-6))
@@ -129,7 +124,7 @@ def test_an_impact_runs_through_a_row_of_balls(gap: float) -> None:
             time_step=H,
             steps=60,
             method=Method(impacts=impacts),  # type: ignore[arg-type]
-            observe={"v": Final(quantity=Velocity())},
+            observe=finals(v=Velocity()),
         )
         np.testing.assert_allclose(result["v"][:, 0], after, rtol=0, atol=1e-12)
 
@@ -165,7 +160,7 @@ def test_balls_held_by_joints_go_on_after_an_impact_as_it_left_them(h: float, so
         time_step=h,
         duration=0.2,
         method=Method(solver=solver),  # type: ignore[arg-type]
-        observe={"w": Trace(quantity=AngularVelocity())},
+        observe=traces(w=AngularVelocity()),
     )
     w = -result["w"][:, :, 1]
     hit = int(np.argmax(w[:, 1] > 0.5 * spin))
@@ -217,11 +212,7 @@ def test_successive_impacts_come_in_the_order_of_their_times(seed: int, ends: in
         time_step=h,
         steps=12,
         method=Method(impacts="successive", solver=solver),  # type: ignore[arg-type]
-        observe={
-            "v": Final(quantity=Velocity()),
-            "p": Trace(quantity=Momentum()),
-            "energy": Trace(quantity=KineticEnergy()),
-        },
+        observe=finals(v=Velocity()) | traces(p=Momentum(), energy=KineticEnergy()),
     )
 
     assert np.abs(run["v"][:, 0] - after).max() < 1e-6 * np.abs(speeds).max()
@@ -253,11 +244,7 @@ def test_friction_turns_what_rebounds_about_its_own_surface_wherever_the_step_be
         time_step=0.2 * blows,
         steps=1,
         method=Method(solver=solver),  # type: ignore[arg-type]
-        observe={
-            "v": Final(quantity=Velocity("ball")),
-            "w": Final(quantity=AngularVelocity("ball")),
-            "x": Final(quantity=Position("ball")),
-        },
+        observe=finals(v=Velocity("ball"), w=AngularVelocity("ball"), x=Position("ball")),
     )
     along, way = 3.0, 0.3  # m/s, and half a flight of 0.2 s, m
     for blow in range(blows):

@@ -10,17 +10,16 @@ import pytest
 from spook_tracker.engine import (
     AngularVelocity,
     Box,
-    Final,
     Material,
     Method,
     Plane,
     RigidBody,
     Scene,
     Sphere,
-    Trace,
     Velocity,
     simulate,
 )
+from tests.scenes.seen import finals, traces
 
 ROUGH = Material(friction=0.5)
 DOWN = (0.0, 0.0, -10.0)
@@ -41,7 +40,7 @@ def box(**fields: object) -> RigidBody:
 @pytest.mark.parametrize("model", ["cone", "box", "scaled_box"])
 def test_every_solver_and_model_brings_a_box_to_the_speed_of_the_belt(solver: str, model: str) -> None:
     method = Method(solver=solver, friction=model)  # type: ignore[arg-type]
-    observe = {"v": Trace(quantity=Velocity("box"))}
+    observe = traces(v=Velocity("box"))
     v = simulate(
         Scene(bodies=(belt(), box()), gravity=DOWN), time_step=H, steps=30, method=method, observe=observe
     )["v"]
@@ -56,10 +55,7 @@ def test_a_belt_turned_with_its_body_carries_where_it_points() -> None:
     angle = 0.7
     turned = belt(orientation=(math.cos(angle / 2), 0.0, 0.0, math.sin(angle / 2)))
     v = simulate(
-        Scene(bodies=(turned, box()), gravity=DOWN),
-        time_step=H,
-        steps=30,
-        observe={"v": Final(quantity=Velocity("box"))},
+        Scene(bodies=(turned, box()), gravity=DOWN), time_step=H, steps=30, observe=finals(v=Velocity("box"))
     )["v"]
 
     np.testing.assert_allclose(v, [math.cos(angle), math.sin(angle), 0.0], atol=1e-9)
@@ -70,10 +66,7 @@ def test_two_rollers_with_surfaces_push_each_other_apart_by_the_same_impulse() -
     cart = box(surface_velocity=(1.0, 0.0, 0.0))
     floor = belt(surface_velocity=(0.0, 0.0, 0.0))
     v = simulate(
-        Scene(bodies=(floor, cart), gravity=DOWN),
-        time_step=H,
-        steps=30,
-        observe={"v": Final(quantity=Velocity("box"))},
+        Scene(bodies=(floor, cart), gravity=DOWN), time_step=H, steps=30, observe=finals(v=Velocity("box"))
     )["v"]
 
     np.testing.assert_allclose(
@@ -87,7 +80,7 @@ def test_a_ball_on_a_belt_ends_at_two_sevenths_of_its_speed() -> None:
         Scene(bodies=(belt(), ball), gravity=DOWN),
         time_step=H,
         steps=60,
-        observe={"v": Final(quantity=Velocity("box")), "w": Final(quantity=AngularVelocity("box"))},
+        observe=finals(v=Velocity("box"), w=AngularVelocity("box")),
     )
 
     assert found["v"][0] == pytest.approx(2.0 / 7.0, abs=1e-9)
@@ -99,10 +92,7 @@ def test_a_bounce_on_a_belt_takes_its_speed_along() -> None:
     bouncy = Material(friction=0.08, restitution=0.5)
     ball = box(shape=Sphere(0.1), material=bouncy, velocity=(0.0, 0.0, -2.0))
     found = simulate(
-        Scene(bodies=(belt(material=bouncy), ball)),
-        time_step=H,
-        steps=2,
-        observe={"v": Final(quantity=Velocity("box"))},
+        Scene(bodies=(belt(material=bouncy), ball)), time_step=H, steps=2, observe=finals(v=Velocity("box"))
     )
 
     assert found["v"][2] == pytest.approx(1.0, abs=1e-12)

@@ -13,7 +13,6 @@ from spook_tracker.engine import (
     Box,
     ContactForce,
     ContactPoints,
-    Final,
     Lock,
     Material,
     Method,
@@ -23,10 +22,10 @@ from spook_tracker.engine import (
     Scene,
     SceneError,
     Sphere,
-    Trace,
     Velocity,
     simulate,
 )
+from tests.scenes.seen import finals, traces
 
 H = 1.0 / 60.0
 GRAVITY = 10.0
@@ -86,7 +85,7 @@ def bound(way: float, model: str = "cone") -> float:
 
 
 def run(scene: Scene, steps: int, method: Method, body: str = "box") -> Any:
-    observe = {"v": Trace(quantity=Velocity(body))}
+    observe = traces(v=Velocity(body))
     return simulate(scene, time_step=H, steps=steps, method=method, observe=observe)["v"]
 
 
@@ -155,11 +154,7 @@ def test_both_bodies_feel_the_same_force(solver: str) -> None:
     plate = box("plate", shape=Box((4.0, 4.0, 0.1)), **slow)
     rider = box(position=(0, 0, 0.15), velocity=(0.6, 0.3, 0.0), material=grained())
     scene = Scene(bodies=(floor(Material()), plate, rider), gravity=(0, 0, -GRAVITY))
-    observe = {
-        "p": Trace(quantity=Momentum()),
-        "a": Trace(quantity=Velocity("box")),
-        "b": Trace(quantity=Velocity("plate")),
-    }
+    observe = traces(p=Momentum(), a=Velocity("box"), b=Velocity("plate"))
     method = Method(solver=solver, iterations=2000)  # type: ignore[arg-type]
     found = simulate(scene, time_step=H, steps=30, method=method, observe=observe)
 
@@ -206,7 +201,7 @@ def test_creep_is_slower_where_friction_is_higher() -> None:
 
 
 def test_the_forces_that_are_told_lie_in_the_ellipse() -> None:
-    observe = {"f": Final(quantity=ContactForce("box")), "points": Final(quantity=ContactPoints(most=4))}
+    observe = finals(f=ContactForce("box"), points=ContactPoints(most=4))
     gravity = slope(0.6, 0.9)
     scene = Scene(bodies=(floor(grained()), box()), gravity=gravity)
     found = simulate(scene, time_step=H, steps=20, observe=observe)

@@ -5,21 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spook_tracker.engine import (
-    Final,
-    Method,
-    Penetration,
-    Plane,
-    RigidBody,
-    Scene,
-    Sphere,
-    Trace,
-    Velocity,
-    simulate,
-)
+from spook_tracker.engine import Method, Penetration, Plane, RigidBody, Scene, Sphere, Velocity, simulate
 from spook_tracker.engine.bodies import Material
 from spook_tracker.scalar_tests import falling_pile, pile
 from tests.scenes.corpus import solid
+from tests.scenes.seen import finals, traces
 
 STEP = 1.0 / 60.0
 
@@ -39,7 +29,7 @@ def test_every_step_of_the_nightly_pile_settles() -> None:
         time_step=pile.TIME_STEP,
         steps=pile.STEPS,
         method=pile.SWEEPS,
-        observe={"depth": Final(quantity=Penetration())},
+        observe=finals(depth=Penetration()),
     )
     assert result.completed, result.failure
     assert result["depth"] < 1e-3
@@ -61,7 +51,7 @@ def test_a_ball_that_passes_a_pile_keeps_every_bit_of_its_velocity() -> None:
         time_step=STEP,
         steps=8,
         method=Method(solver="iterative"),
-        observe={"v": Trace(quantity=Velocity("passer")), "hit": Trace(quantity=Velocity("s1"))},
+        observe=traces(v=Velocity("passer"), hit=Velocity("s1")),
     )
     assert (result["v"] == np.array([0.3, 7.0, 0.1])).all()
     assert np.abs(result["hit"]).max() > 0.1  # the pile itself was hit meanwhile

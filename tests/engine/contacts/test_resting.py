@@ -38,6 +38,7 @@ from spook_tracker.engine import (
 from spook_tracker.engine.joints import Constraint
 from tests.scenes.contact import DOWN, GRAVITY, TIME_STEP, ball, cube, ground
 from tests.scenes.corpus import fixed, solid
+from tests.scenes.seen import finals, traces
 
 
 @pytest.mark.parametrize("time_step", [1 / 240, 1 / 60])
@@ -52,12 +53,9 @@ def test_resting_depth_is_compliance_times_load(time_step: float, relaxation: fl
         Scene(bodies=(ground(stiff), box), gravity=DOWN),
         time_step=time_step,
         duration=12.0,
-        observe={
-            "z": Final(quantity=Position("box")),
-            "force": Final(quantity=ContactForce("box")),
-            "depth": Final(quantity=Penetration()),
-            "count": Final(quantity=ContactCount()),
-        },
+        observe=finals(
+            z=Position("box"), force=ContactForce("box"), depth=Penetration(), count=ContactCount()
+        ),
     )
 
     assert result["z"][2] - 0.5 == pytest.approx(-eps * mass * GRAVITY / 4.0, abs=1e-12)
@@ -221,10 +219,7 @@ def test_every_shape_rests_on_every_other() -> None:
                 Scene(bodies=(lower, upper), gravity=DOWN),
                 time_step=TIME_STEP,
                 steps=40,
-                observe={
-                    "x": Final(quantity=Position("upper")),
-                    "f": Final(quantity=ContactForce("upper", "lower")),
-                },
+                observe=finals(x=Position("upper"), f=ContactForce("upper", "lower")),
             )
 
             assert result["x"] == pytest.approx((0, 0, top + bottom), abs=1e-9), (below, above)
@@ -238,11 +233,7 @@ def test_a_lift_carries_its_load() -> None:
         Scene(bodies=(lift, cube("load", (0, 0, 0.5))), gravity=DOWN),
         time_step=TIME_STEP,
         duration=2.0,
-        observe={
-            "v": Final(quantity=Velocity("load")),
-            "z": Final(quantity=Position("load")),
-            "f": Final(quantity=ContactForce("load")),
-        },
+        observe=finals(v=Velocity("load"), z=Position("load"), f=ContactForce("load")),
     )
 
     assert result["v"][2] == pytest.approx(0.7, abs=1e-10)
@@ -275,7 +266,7 @@ def test_what_joints_hold_lands_as_what_is_free(
         time_step=TIME_STEP,
         steps=40,
         method=Method(solver=solver, iterations=400),
-        observe={"z": Trace(quantity=Position("box")), "force": Final(quantity=ContactForce("box"))},
+        observe=traces(z=Position("box")) | finals(force=ContactForce("box")),
     )
 
     assert float(result["z"][:, 2].min()) == pytest.approx(0.5, abs=1e-9)
@@ -299,7 +290,7 @@ def test_a_load_presses_a_slide_to_a_wall_in_the_step_it_begins(driven: bool) ->
         ),
         time_step=TIME_STEP,
         steps=10,
-        observe={"x": Trace(quantity=Position("slide")), "force": Final(quantity=ContactForce("slide"))},
+        observe=traces(x=Position("slide")) | finals(force=ContactForce("slide")),
     )
 
     assert float(result["x"][:, 0].max()) == pytest.approx(1e-6, abs=1e-12)

@@ -10,9 +10,7 @@ import pytest
 from spook_tracker.engine import (
     Box,
     Capsule,
-    Final,
     Material,
-    Maximum,
     Method,
     Particle,
     Penetration,
@@ -21,13 +19,13 @@ from spook_tracker.engine import (
     RigidBody,
     Scene,
     Sphere,
-    Trace,
     Velocity,
     simulate,
 )
 from spook_tracker.scalar_tests import bouncing_ball
 from tests.oracles.ball import dropped
 from tests.scenes.contact import DOWN, GRAVITY, TIME_STEP, ball, ground
+from tests.scenes.seen import finals, maxima, traces
 
 
 @pytest.mark.parametrize("psi", [0.0, 0.25, 0.5, 1.0])
@@ -36,11 +34,7 @@ def test_one_contact_returns_psi_times_the_approach(psi: float, solver: str) -> 
     """Without gravity, touching at the start: v₊ = −psi v₋ along the normal, unchanged across it."""
     scene = Scene(bodies=(ground(Material(restitution=psi)), ball(velocity=(0.3, -0.2, -4.0))))
     result = simulate(
-        scene,
-        time_step=TIME_STEP,
-        steps=1,
-        method=Method(solver=solver),
-        observe={"v": Final(quantity=Velocity("ball"))},
+        scene, time_step=TIME_STEP, steps=1, method=Method(solver=solver), observe=finals(v=Velocity("ball"))
     )
 
     np.testing.assert_allclose(result["v"], (0.3, -0.2, 4.0 * psi), rtol=0, atol=1e-14)
@@ -54,10 +48,7 @@ def test_bounces_reach_e_to_the_2n_of_the_height_at_first_order() -> None:
     errors = []
     for time_step in (1e-3, 2.5e-4):
         result = simulate(
-            scene,
-            time_step=time_step,
-            duration=2.0,
-            observe={"z": Trace(quantity=Position("ball")), "v": Trace(quantity=Velocity("ball"))},
+            scene, time_step=time_step, duration=2.0, observe=traces(z=Position("ball"), v=Velocity("ball"))
         )
         z, v = result["z"][:, 2] - 0.5, result["v"][:, 2]
         tops = np.flatnonzero((v[1:] <= 0.0) & (v[:-1] > 0.0))
@@ -84,11 +75,7 @@ def test_a_fast_body_neither_enters_nor_rebounds(
         Scene(bodies=(wall, ball(height=3.0, velocity=(0, 0, -speed), shape=shape))),
         time_step=TIME_STEP,
         steps=30,
-        observe={
-            "z": Trace(quantity=Position("ball")),
-            "depth": Maximum(quantity=Penetration()),
-            "v": Trace(quantity=Velocity("ball")),
-        },
+        observe=traces(z=Position("ball"), v=Velocity("ball")) | maxima(depth=Penetration()),
     )
 
     assert result["z"][:, 2].min() == result["z"][-1, 2] == pytest.approx(0.5 + top, abs=1e-13)
@@ -123,7 +110,7 @@ def test_an_impact_ahead_in_the_step_gives_back_what_it_meets_with(psi: float, s
         time_step=TIME_STEP,
         steps=40,
         method=Method(solver=solver),
-        observe={"v": Trace(quantity=Velocity("capsule")), "x": Trace(quantity=Position("capsule"))},
+        observe=traces(v=Velocity("capsule"), x=Position("capsule")),
     )
     v, gap = result["v"][:, 2], result["x"][:, 2] - 0.35
     (blow, *_) = np.nonzero((v[:-1] < 0.0) & (v[1:] > 0.0))[0]
@@ -142,7 +129,7 @@ def test_a_particle_beside_a_blow_falls_as_it_does_alone(method: Method) -> None
     """Forces act on what is free in halves in such a step, and a particle has no inertia to turn by."""
     stone = Particle(name="stone", mass=2.0, position=(3.0, 0.0, 5.0), velocity=(0.5, 0.0, 1.0))
     bouncing = (ground(Material(restitution=0.5)), ball(position=(0.0, 0.0, 1.1)))
-    observe = {"x": Trace(quantity=Position("stone")), "v": Trace(quantity=Velocity("stone"))}
+    observe = traces(x=Position("stone"), v=Velocity("stone"))
     beside, alone = (
         simulate(Scene(bodies=bodies, gravity=DOWN), time_step=0.01, steps=60, method=method, observe=observe)
         for bodies in ((*bouncing, stone), (stone,))

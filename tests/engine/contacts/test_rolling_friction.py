@@ -13,7 +13,6 @@ from spook_tracker.engine import (
     Box,
     Capsule,
     Cylinder,
-    Final,
     HeightField,
     KineticEnergy,
     Material,
@@ -23,11 +22,11 @@ from spook_tracker.engine import (
     RigidBody,
     Scene,
     Sphere,
-    Trace,
     Velocity,
     simulate,
 )
 from tests.scenes.corpus import fixed, solid
+from tests.scenes.seen import finals, traces
 
 H = 1.0 / 60.0
 DOWN = (0.0, 0.0, -10.0)
@@ -56,7 +55,7 @@ def test_a_ball_slows_down_alike_in_every_direction(solver: str, away: float) ->
         time_step=H,
         steps=120,
         method=Method(solver=solver),  # type: ignore[arg-type]
-        observe={"v": Trace(quantity=Velocity("ball"))},
+        observe=traces(v=Velocity("ball")),
     )["v"]
 
     exact = np.maximum(0.0, 1.0 - 5.0 / 7.0 * 0.01 / RADIUS * 10.0 * H * np.arange(121))
@@ -71,7 +70,7 @@ def test_without_friction_a_spinning_ball_still_feels_the_torque() -> None:
         Scene(bodies=(floor(0.0), spinning), gravity=DOWN),
         time_step=H,
         steps=10,
-        observe={"w": Trace(quantity=AngularVelocity("ball")), "v": Final(quantity=Velocity("ball"))},
+        observe=traces(w=AngularVelocity("ball")) | finals(v=Velocity("ball")),
     )
 
     slowing = 0.01 * 10.0 / (0.4 * RADIUS**2)
@@ -90,11 +89,7 @@ def test_two_balls_that_turn_against_each_other_keep_their_angular_momentum() ->
         ),
         ball("right", height=0.0, position=(RADIUS, 0, 0), torsional_friction=0.02, velocity=(-1.0, 0, 0)),
     )
-    observe = {
-        "momentum": Trace(quantity=AngularMomentum()),
-        "energy": Trace(quantity=KineticEnergy()),
-        "w": Final(quantity=AngularVelocity("right")),
-    }
+    observe = traces(momentum=AngularMomentum(), energy=KineticEnergy()) | finals(w=AngularVelocity("right"))
     found = simulate(Scene(bodies=bodies), time_step=H, steps=3, observe=observe)
 
     np.testing.assert_allclose(found["momentum"], np.tile(found["momentum"][0], (4, 1)), atol=1e-14)
@@ -132,7 +127,7 @@ def test_a_box_and_a_capsule_take_it_at_every_point() -> None:
             Scene(bodies=(floor(0.0), body), gravity=DOWN),
             time_step=H,
             steps=30,
-            observe={"w": Final(quantity=AngularVelocity("ball"))},
+            observe=finals(w=AngularVelocity("ball")),
         )
         spins[type(shape)] = float(found["w"][2])
 
@@ -151,7 +146,7 @@ def test_a_heap_with_rolling_friction_comes_to_rest_on_a_slope() -> None:
         Scene(bodies=(floor(), *balls), gravity=(10.0 * math.sin(tilt), 0.0, -10.0 * math.cos(tilt))),
         time_step=H,
         steps=60,
-        observe={"energy": Final(quantity=KineticEnergy())},
+        observe=finals(energy=KineticEnergy()),
     )
 
     assert found["energy"] < 1e-20
@@ -176,7 +171,7 @@ def coin_on_hills(solver: str, steps: int) -> Result:
         time_step=H,
         steps=steps,
         method=Method(solver=solver, iterations=5000),  # type: ignore[arg-type]
-        observe={"v": Trace(quantity=Velocity("coin")), "w": Trace(quantity=AngularVelocity("coin"))},
+        observe=traces(v=Velocity("coin"), w=AngularVelocity("coin")),
     )
 
 

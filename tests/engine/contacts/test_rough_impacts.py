@@ -15,10 +15,8 @@ from spook_tracker.engine import (
     Box,
     Capsule,
     ContactForce,
-    Final,
     KineticEnergy,
     Material,
-    Maximum,
     Method,
     Penetration,
     Plane,
@@ -31,6 +29,7 @@ from spook_tracker.engine import (
     simulate,
 )
 from tests.scenes.corpus import solid
+from tests.scenes.seen import finals, maxima, traces
 
 H = 1 / 60  # s
 GRAVITY = (0.0, 0.0, -9.81)
@@ -72,7 +71,7 @@ def test_a_ball_rubs_while_it_rebounds_and_turns_its_slip_round_as_far_as_fricti
         time_step=h,
         steps=round(0.1 / h),
         method=Method(solver=solver, friction=model),  # type: ignore[arg-type]
-        observe={"v": Final(quantity=Velocity("ball")), "w": Final(quantity=AngularVelocity("ball"))},
+        observe=finals(v=Velocity("ball"), w=AngularVelocity("ball")),
     )
 
     slip = 3.0 + 10.0 * 0.1
@@ -100,7 +99,7 @@ def test_balls_that_rebound_are_where_both_their_speeds_lead(h: float, solver: s
             time_step=h,
             steps=6,
             method=Method(solver=solver),  # type: ignore[arg-type]
-            observe={"x": Final(quantity=Position("ball")), "v": Final(quantity=Velocity("ball"))},
+            observe=finals(x=Position("ball"), v=Velocity("ball")),
         )
         expected = -0.3 * along + (6 * h - meeting) * result["v"]
 
@@ -141,7 +140,7 @@ def test_the_end_of_a_rod_grips_where_it_rebounds(solver: str, tilt: float, slip
         time_step=0.01,
         steps=12,
         method=Method(solver=solver),  # type: ignore[arg-type]
-        observe={"v": Trace(quantity=Velocity("rod")), "w": Trace(quantity=AngularVelocity("rod"))},
+        observe=traces(v=Velocity("rod"), w=AngularVelocity("rod")),
     )
     hit = int(np.argmax(np.abs(result["v"][:, 2] + 1.0) > 1e-6))
     found = (result["v"][hit, 0], result["v"][hit, 2], result["w"][hit, 1])
@@ -168,7 +167,7 @@ def test_an_impact_elsewhere_is_none_of_its_business(
             time_step=0.01,
             steps=12,
             method=Method(solver=solver),  # type: ignore[arg-type]
-            observe={"v": Final(quantity=Velocity("rod")), "e": Trace(quantity=KineticEnergy())},
+            observe=finals(v=Velocity("rod")) | traces(e=KineticEnergy()),
         )
         ends.append(result["v"].tolist())
         assert np.diff(result["e"]).max() <= 1e-12
@@ -214,9 +213,7 @@ def test_what_passes_without_touching_is_not_touched(
     half = 0.075 if isinstance(shape, Capsule) else 0.05
     going = ball("going", (-0.5, 0.01, 0.0), (speed, 0, 0), shape=shape)
     coming = ball("coming", (0.5, 0.0, 2 * half + gap), (-speed, 0, 0), shape=shape)
-    result = simulate(
-        Scene(bodies=(going, coming)), time_step=H, steps=30, observe={"v": Final(quantity=Velocity())}
-    )
+    result = simulate(Scene(bodies=(going, coming)), time_step=H, steps=30, observe=finals(v=Velocity()))
 
     assert result["v"].tolist() == [[speed, 0.0, 0.0], [-speed, 0.0, 0.0]]
 
@@ -227,11 +224,7 @@ def test_an_off_centre_hit_goes_along_the_line_of_centres(h: float) -> None:
     elastic = Material(restitution=1.0)
     small = {"shape": Sphere(0.05), "material": elastic}
     bodies = (ball("cue", (-0.5, 0, 0), (3, 0, 0), **small), ball("other", (0, 0.05, 0), (0, 0, 0), **small))
-    observe = {
-        "v": Final(quantity=Velocity()),
-        "l": Trace(quantity=AngularMomentum()),
-        "x": Final(quantity=Position()),
-    }
+    observe = finals(v=Velocity(), x=Position()) | traces(l=AngularMomentum())
     result = simulate(Scene(bodies=bodies), time_step=h, duration=0.4, observe=observe)
     normal = np.array((math.sqrt(0.75), 0.5, 0.0))
     given = 3.0 * normal[0] * normal
@@ -256,7 +249,7 @@ def test_a_seam_of_two_faces_is_no_obstacle(h: float, shape: Sphere | Box) -> No
         Scene(bodies=(*tiles, slider), gravity=GRAVITY),
         time_step=h,
         duration=0.4,
-        observe={"v": Trace(quantity=Velocity("slider")), "z": Trace(quantity=Position("slider"))},
+        observe=traces(v=Velocity("slider"), z=Position("slider")),
     )
 
     assert np.abs(result["v"] - (5.0, 0.0, 0.0)).max() < 1e-12
@@ -300,9 +293,7 @@ def test_iterations_see_no_step_where_tiles_go_on(sweeps: int, seed: int) -> Non
     h = float(rng.choice((1 / 60, 1 / 240)))
     scene = Scene(bodies=(*tiles, slider), gravity=tuple(frame @ GRAVITY))
     method = Method(solver="iterative", iterations=sweeps)
-    result = simulate(
-        scene, time_step=h, duration=0.35, method=method, observe={"v": Trace(quantity=Velocity("slider"))}
-    )
+    result = simulate(scene, time_step=h, duration=0.35, method=method, observe=traces(v=Velocity("slider")))
 
     off = 1e-6 if sweeps == 50 else method.residual_of("unsettled_residual", scene)
     assert np.abs(result["v"] - speed).max() < off
@@ -329,7 +320,7 @@ def test_what_is_set_in_motion_by_a_plastic_impact_rebounds_in_the_same_step(
         time_step=H,
         steps=3,
         method=Method(solver=solver),
-        observe={"v": Trace(quantity=Velocity()), "deep": Maximum(quantity=Penetration())},
+        observe=traces(v=Velocity()) | maxima(deep=Penetration()),
     )
 
     assert run["v"][-1, :, 0] == pytest.approx([speed / 4, speed / 4, speed / 2], rel=1e-9)

@@ -5,20 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spook_tracker.engine import (
-    Box,
-    Final,
-    Lock,
-    Material,
-    Method,
-    RigidBody,
-    Scene,
-    Sphere,
-    Velocity,
-    simulate,
-)
+from spook_tracker.engine import Box, Lock, Material, Method, RigidBody, Scene, Sphere, Velocity, simulate
 from tests.engine.contacts.test_impacts import meetings
 from tests.scenes.corpus import fixed, solid
+from tests.scenes.seen import finals
 
 ELASTIC = Material(restitution=1.0)
 GRAVITY = 9.81  # m/s²
@@ -80,7 +70,7 @@ def test_a_kinematic_body_hits_a_row_as_a_ball_of_any_mass_would(seed: int, solv
         time_step=h,
         steps=8,
         method=Method(impacts="successive", solver=solver),  # type: ignore[arg-type]
-        observe={"v": Final(quantity=Velocity())},
+        observe=finals(v=Velocity()),
     )
     after = meetings(places, speeds, masses, SIZE, 8 * h)
     assert np.abs(run["v"][:, 0] - after).max() < 1e-6 * np.abs(after).max()
@@ -105,7 +95,7 @@ def test_impacts_at_both_ends_of_a_locked_pair_come_in_their_order(solver: str, 
         time_step=h,
         steps=4,
         method=Method(impacts="successive", solver=solver, iterations=500),  # type: ignore[arg-type]
-        observe={"v": Final(quantity=Velocity())},
+        observe=finals(v=Velocity()),
     )
     line = places - np.array((0.0, 0.0, SIZE))  # the pair is one ball
     after = meetings(line, speeds, masses, SIZE, 4 * h)

@@ -14,7 +14,6 @@ from spook_tracker.engine import (
     Box,
     Capsule,
     ConstraintForce,
-    Final,
     Material,
     Maximum,
     Method,
@@ -35,6 +34,7 @@ from spook_tracker.scalar_tests.beam.scene import scene as beam
 from tests.engine.test_symmetries import heap
 from tests.scenes.contact import DOWN, TIME_STEP, cube, ground
 from tests.scenes.corpus import solid
+from tests.scenes.seen import finals, traces
 
 
 def stack(count: int) -> Scene:
@@ -107,7 +107,7 @@ def test_few_joints_are_right_by_iterations_whatever_these_leave(degrees: float)
     """A lift of one stage at 2 degrees pulled with minus its force and sank by .15 m in a second: each step left little."""
     angle = math.radians(degrees)
     method = Method(solver="iterative", iterations=50)
-    observe = {"pull": Final(quantity=ConstraintForce("actuator"))}
+    observe = finals(pull=ConstraintForce("actuator"))
     run = simulate(scissor_lift.scene(1, angle), time_step=1 / 60, steps=60, method=method, observe=observe)
 
     exact = scissor_lift.holding_force(1, angle, scissor_lift.LOAD, scissor_lift.ARM)
@@ -264,11 +264,7 @@ def test_what_merely_lies_near_pays_for_no_gain(seed: int, solver: str) -> None:
         time_step=1 / 60,
         steps=45,
         method=Method(solver=solver, iterations=1),
-        observe={
-            "x": Trace(quantity=Position()),
-            "v": Trace(quantity=Velocity()),
-            "w": Trace(quantity=AngularVelocity()),
-        },
+        observe=traces(x=Position(), v=Velocity(), w=AngularVelocity()),
     )
     x, v, w = (result[key].reshape(-1, 6, 3) for key in "xvw")
     alone = np.abs(x[:, 5] - start)[:, :2].max(axis=1).cumsum() == 0.0

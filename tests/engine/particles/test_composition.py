@@ -15,7 +15,6 @@ from spook_tracker.engine import (
     ConstraintForce,
     Distance,
     Energy,
-    Final,
     Hinge,
     JointSpring,
     Load,
@@ -25,11 +24,11 @@ from spook_tracker.engine import (
     RigidBody,
     Run,
     Scene,
-    Trace,
     Velocity,
     simulate,
     start,
 )
+from tests.scenes.seen import finals, traces
 
 G = 9.81
 ORDERS = {"order4": 4, "order6": 6, "order8": 8}
@@ -84,7 +83,7 @@ def error(scene: Scene, body: str, reference: np.ndarray, time: float, time_step
         time_step=time_step,
         duration=time,
         method=Method(composition=name),
-        observe={"x": Final(quantity=Position(body))},
+        observe=finals(x=Position(body)),
     )
     return float(np.abs(result["x"] - reference).max())
 
@@ -112,11 +111,7 @@ def test_velocities_are_those_of_the_sample_and_lie_along_the_circle() -> None:
         time_step=1 / 100,
         duration=3.0,
         method=Method(composition="order6"),
-        observe={
-            "x": Trace(quantity=Position("0")),
-            "v": Trace(quantity=Velocity("0")),
-            "force": Trace(quantity=ConstraintForce("row 0")),
-        },
+        observe=traces(x=Position("0"), v=Velocity("0"), force=ConstraintForce("row 0")),
     )
     x, v = result["x"], result["v"]
 
@@ -190,7 +185,7 @@ def test_what_cannot_be_read_is_no_answer(steps: int) -> None:
         Distance(name="other", between=(places[1], "far")),
     )
     scene = Scene(bodies=(far,), constraints=rows, gravity=(0.0, 0.0, -9.81))
-    observe = {"f": Trace(quantity=ConstraintForce()), "e": Trace(quantity=Energy())}
+    observe = traces(f=ConstraintForce(), e=Energy())
     run = simulate(scene, time_step=1e-9, steps=steps, method=Method(composition="order4"), observe=observe)
 
     assert run.status == "not_finite" and "'far'" in run.failure

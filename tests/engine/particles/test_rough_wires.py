@@ -26,12 +26,12 @@ from spook_tracker.engine import (
     Scene,
     SceneError,
     Sphere,
-    Trace,
     Velocity,
     Wire,
     simulate,
 )
 from tests.scenes.coupling import H, Y, masses
+from tests.scenes.seen import finals, traces
 
 GRAVITY = 10.0  # m/s²
 
@@ -65,7 +65,7 @@ def hung(
 def test_a_wire_that_slips_pulls_e_to_the_mu_phi_times_as_hard_behind(
     one: float, two: float, eyes: int, friction: Any, turns: Any
 ) -> None:
-    observe = {"v": Trace(quantity=Velocity("two")), "pull": Trace(quantity=ConstraintForce("wire"))}
+    observe = traces(v=Velocity("two"), pull=ConstraintForce("wire"))
     result = simulate(hung(one, two, eyes, friction, turns), time_step=H, steps=20, observe=observe)
     bends = [math.pi] if eyes == 1 else [0.5 * math.pi, *[0.0] * (eyes - 2), 0.5 * math.pi]
     each = [value if isinstance(value, tuple) else (value,) * eyes for value in (friction, turns)]
@@ -85,7 +85,7 @@ def test_a_wire_that_slips_pulls_e_to_the_mu_phi_times_as_hard_behind(
 def test_it_holds_up_to_that(over: float, holds: bool, heavier: str) -> None:
     heavy = over * math.exp(0.4 * 3.0 * math.pi)
     one, two = (heavy, 1.0) if heavier == "one" else (1.0, heavy)
-    observe = {"v": Final(quantity=Velocity("one"))}
+    observe = finals(v=Velocity("one"))
     result = simulate(hung(one, two, friction=0.4, turns=1.0), time_step=H, steps=20, observe=observe)
 
     slid = abs(float(result["v"][2]))
@@ -93,7 +93,7 @@ def test_it_holds_up_to_that(over: float, holds: bool, heavier: str) -> None:
 
 
 def test_without_friction_nothing_of_it_is_there() -> None:
-    smooth, observe = masses(), {"v": Trace(quantity=Velocity())}
+    smooth, observe = masses(), traces(v=Velocity())
     rough = replace(smooth, constraints=(replace(smooth.constraints[0], friction=0.0, turns=2.0),))
     results = [simulate(scene, time_step=H, steps=10, observe=observe) for scene in (smooth, rough)]
 
@@ -115,12 +115,12 @@ def test_a_body_that_hangs_in_the_bight_is_held_by_both_sides() -> None:
         friction=5.0,
     )
     scene = Scene(bodies=(ring,), constraints=(rope,), gravity=(0.0, 0.0, -GRAVITY))
-    held = simulate(scene, time_step=H, steps=20, observe={"v": Final(quantity=Velocity("ring"))})
+    held = simulate(scene, time_step=H, steps=20, observe=finals(v=Velocity("ring")))
     free = simulate(
         replace(scene, constraints=(replace(rope, friction=0.1),)),
         time_step=H,
         steps=20,
-        observe={"v": Final(quantity=Velocity("ring"))},
+        observe=finals(v=Velocity("ring")),
     )
 
     assert float(np.abs(held["v"]).max()) < 1e-9
@@ -138,7 +138,7 @@ def test_iterations_and_contacts_come_to_the_same_a_step_late(compliance: float)
         (touching, Method()),
         (scene, Method(solver="iterative", iterations=2000, residual_tolerance=1e-13)),
     ):
-        observe = {"v": Trace(quantity=Velocity("two"))}
+        observe = traces(v=Velocity("two"))
         result = simulate(asked, time_step=H, steps=40, method=method, observe=observe)
 
         assert result.completed
@@ -180,11 +180,7 @@ def winch(**changes: Any) -> Scene:
 
 
 def test_a_winch_lifts_with_radius_times_speed_and_stalls_where_its_torque_ends() -> None:
-    observe = {
-        "v": Final(quantity=Velocity("load")),
-        "pull": Final(quantity=ConstraintForce("wire")),
-        "x": Final(quantity=Position("load")),
-    }
+    observe = finals(v=Velocity("load"), pull=ConstraintForce("wire"), x=Position("load"))
     lifts = simulate(winch(), time_step=H, steps=100, observe=observe)
     stalls = simulate(winch(max_force=20.0), time_step=H, steps=100, observe=observe)
     weak = simulate(winch(max_force=15.0), time_step=H, steps=100, observe=observe)

@@ -27,6 +27,7 @@ from spook_tracker.engine import (
 )
 from tests.oracles.particles import Oracle
 from tests.scenes.particle import KINDS
+from tests.scenes.seen import traces
 
 GRAVITY = 9.81  # m/s²
 H = 1 / 60  # s
@@ -146,11 +147,7 @@ def test_the_first_step_knows_the_tension(ratio: float, offset: float, half: boo
 def test_string_stiffness_is_the_averaged_law_across_the_rows(kind: str) -> None:
     """The dense solve with (h²/4) (T/l) (I − u uᵀ) beside M, from the state after a first step on."""
     h, scene = 0.002, KINDS[kind](np.random.default_rng(1))
-    observe = {
-        "x": Trace(quantity=Position()),
-        "v": Trace(quantity=Velocity()),
-        "f": Trace(quantity=ConstraintForce()),
-    }
+    observe = traces(x=Position(), v=Velocity(), f=ConstraintForce())
     run = simulate(scene, time_step=h, steps=30, method=STRINGS, observe=observe)
     dense = Oracle(scene, h, STRINGS)
     dense.x, dense.v, dense.impulse = run["x"][1], run["v"][1], -h * run["f"][1]
@@ -165,7 +162,7 @@ def test_string_stiffness_costs_next_to_nothing_where_it_is_not_needed() -> None
     bob = Particle(name="bob", mass=1.0, position=(1.0, 0.0, 0.0))
     rod = Distance(name="rod", between=((0.0, 0.0, 0.0), "bob"), compliance=1e-13)
     scene = Scene(bodies=(bob,), constraints=(rod,), gravity=(0.0, 0.0, -GRAVITY))
-    observe = {"x": Trace(quantity=Position("bob")), "e": Trace(quantity=Energy())}
+    observe = traces(x=Position("bob"), e=Energy())
     plain, strings = (
         simulate(scene, time_step=1e-3, duration=5.0, method=method, observe=observe)
         for method in (Method(), STRINGS)

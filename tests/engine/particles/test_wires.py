@@ -20,18 +20,18 @@ from spook_tracker.engine import (
     Prismatic,
     RigidBody,
     Scene,
-    Trace,
     Velocity,
     Violation,
     Wire,
     simulate,
 )
 from tests.scenes.coupling import H, Z, masses
+from tests.scenes.seen import finals, traces
 
 
 @pytest.mark.parametrize("solver", ["direct", "iterative"])
 def test_atwood(solver: Any) -> None:
-    observe = {"pull": Trace(quantity=ConstraintForce("wire")), "v": Trace(quantity=Velocity())}
+    observe = traces(pull=ConstraintForce("wire"), v=Velocity())
     result = simulate(
         masses(), time_step=H, steps=60, method=Method(solver=solver, iterations=500), observe=observe
     )
@@ -65,7 +65,7 @@ def test_a_tackle_holds_n_times_its_pull() -> None:
         )
         if "block" in (first, second)
     )
-    observe = {"pull": Final(quantity=ConstraintForce("wire"))}
+    observe = finals(pull=ConstraintForce("wire"))
     result = simulate(scene, time_step=1e-4, steps=1, observe=observe)
     # M a = n S − M g, m n a = m g − S: one degree of freedom.
     a = (slope * 10.0 * 10.0 - 40.0 * 10.0) / (40.0 + 10.0 * slope**2)
@@ -83,8 +83,7 @@ def test_a_slack_rope_is_not_there() -> None:
     )
     free = Scene(bodies=scene.bodies, gravity=scene.gravity)
     seen = [
-        simulate(s, time_step=H, steps=100, observe={"x": Trace(quantity=Position("stone"))})["x"]
-        for s in (scene, free)
+        simulate(s, time_step=H, steps=100, observe=traces(x=Position("stone")))["x"] for s in (scene, free)
     ]
 
     np.testing.assert_allclose(seen[0], seen[1], rtol=0, atol=1e-12)
@@ -110,12 +109,7 @@ def test_a_rope_that_snaps_taut_is_an_impact(restitution: float, phase: float) -
             ),
         ),
     )
-    observe = {
-        "v": Trace(quantity=Velocity()),
-        "p": Trace(quantity=Momentum()),
-        "E": Trace(quantity=Energy()),
-        "g": Trace(quantity=Violation("rope")),
-    }
+    observe = traces(v=Velocity(), p=Momentum(), E=Energy(), g=Violation("rope"))
     result = simulate(scene, time_step=H, steps=30, observe=observe)
     v, reduced = result["v"], one * two / (one + two)
     apart = v[:, 1, 0] - v[:, 0, 0]

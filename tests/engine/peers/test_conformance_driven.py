@@ -30,7 +30,6 @@ from spook_tracker.engine import (
     Scene,
     Sphere,
     Spring,
-    Trace,
     Velocity,
 )
 from tests.engine.peers.test_conformance import (
@@ -61,6 +60,7 @@ from tests.engine.peers.test_conformance import (
 )
 from tests.scenes import peer as peer_scenes
 from tests.scenes.corpus import solid
+from tests.scenes.seen import finals, traces
 
 G = 9.81  # m/s²
 Z = (0.0, 0.0, 1.0)
@@ -118,7 +118,7 @@ def test_a_motor_drives_what_its_gears_and_rods_drive(asked: Asked, owed: float)
     )
     parts = body("crank", 0.1, 0.001, 0.0), body("block", 50.0, 1.0, 2.0)
     loop = Scene(bodies=parts, constraints=(hinge("A", "world", "crank", 0.0, 3.0), slide, rod))
-    turned = {"turned": Final(quantity=JointCoordinate("A"))}
+    turned = finals(turned=JointCoordinate("A"))
     found = simulate(loop, time_step=STEP, duration=1.0, observe=turned)
     assert float(found["turned"]) == pytest.approx(3.0, rel=owed)
 
@@ -139,7 +139,7 @@ def test_a_motor_keeps_its_speed_under_gravity(asked: Asked, owed: float) -> Non
         name="j", between=("world", "arm"), at=(0.0,) * 3, axis=(0.0, 0.6, 0.8), motor=Motor(speed=3.0),
         compliance=0.0,
     )  # fmt: skip
-    seen = {"turned": Final(quantity=JointCoordinate("j"))}
+    seen = finals(turned=JointCoordinate("j"))
     scene = Scene(bodies=(arm,), constraints=(joint,), gravity=(0.0, 0.0, -G))
     found = engine(asked)(scene, time_step=STEP, duration=2.0, observe=seen)
 
@@ -165,7 +165,7 @@ def test_a_damper_without_stiffness_brakes(asked: Asked, owed: float) -> None:
     """A mass of 1 kg by 2 N s/m for half a second: to 1/e of its speed."""
     weight = Particle(name="p", mass=1.0, position=(2.0, 0.0, 0.0), velocity=(1.0, 0.0, 0.0))
     damper = Spring(name="s", between=((0.0, 0.0, 0.0), "p"), stiffness=0.0, rest_length=1.0, viscosity=2.0)
-    seen = {"v": Final(quantity=Velocity("p"))}
+    seen = finals(v=Velocity("p"))
     found = engine(asked)(
         Scene(bodies=(weight,), forces=(damper,)), time_step=1e-3, duration=0.5, observe=seen
     )
@@ -176,7 +176,7 @@ def test_a_damper_without_stiffness_brakes(asked: Asked, owed: float) -> None:
 @rows(dict.fromkeys((MUJOCO, DART, BULLET, BOX, BOX_AS_IT_COMES, RAPIER, RAPIER_MANY), 1e-5))
 def test_what_is_fast_goes_as_far_as_it_is_fast(asked: Asked, owed: float) -> None:
     bullet = Particle(name="p", mass=1.0, position=(0.0, 0.0, 0.0), velocity=(600.0, 0.0, 0.0))
-    seen = {"x": Final(quantity=Position("p"))}
+    seen = finals(x=Position("p"))
     found = engine(asked)(Scene(bodies=(bullet,)), time_step=1 / 60, duration=1.0, observe=seen)
 
     assert float(found["x"][0]) == pytest.approx(600.0, rel=owed)
@@ -203,7 +203,7 @@ def test_belts_carry_along_their_own_direction(asked: Asked, owed: float) -> Non
             orientation=turn, material=ROUGH,
         )  # fmt: skip
         scene = Scene(bodies=(belt, cube), gravity=tuple(-G * x for x in normal))
-        seen = {"v": Final(quantity=Velocity("cube"))}
+        seen = finals(v=Velocity("cube"))
         found = engine(asked)(scene, time_step=STEP, duration=1.5, observe=seen)
         assert found["v"] == pytest.approx(np.array(expected), abs=owed)
 
@@ -217,11 +217,7 @@ def test_a_compound_spins_about_its_own_centre_of_mass(asked: Asked, owed: float
         angular_velocity=(0.0, 2.0, 0.0),
     )  # fmt: skip
     ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
-    seen = {
-        "x": Final(quantity=Position("d")),
-        "v": Final(quantity=Velocity("d")),
-        "w": Final(quantity=AngularVelocity("d")),
-    }
+    seen = finals(x=Position("d"), v=Velocity("d"), w=AngularVelocity("d"))
     scene = Scene(bodies=(ground, dumbbell), gravity=(0.0, 0.0, -G))
     found = engine(asked)(scene, time_step=1e-3, duration=0.5, observe=seen)
 
@@ -262,7 +258,7 @@ def test_pairs_kept_apart_pass_through_each_other(asked: Asked, owed: float) -> 
         gravity=(0.0, 0.0, -G),
         no_contact=(("high", "low"), ("ground", "through")),
     )
-    seen = {"z": Final(quantity=Position())}
+    seen = finals(z=Position())
     found = engine(asked)(scene, time_step=STEP, duration=1.0, observe=seen)["z"][1:, 2]
 
     assert found[:2] == pytest.approx([0.5, 0.5], abs=owed)
@@ -278,7 +274,7 @@ def test_a_smaller_step_stops_helping_where_single_precision_does(asked: Asked, 
 @rows(dict.fromkeys((CANNON, MUJOCO, JOLT, BOX, RAPIER_JS), 1e-2))
 def test_equal_runs_are_equal(asked: Asked, owed: float) -> None:
     """To the bit, of a box that friction holds against a tenth of its weight."""
-    seen = {"place": Final(quantity=Position("box"))}
+    seen = finals(place=Position("box"))
     one, two = (
         engine(asked)(peer_scenes.box_on_ground(0.1), time_step=STEP, duration=2.0, observe=seen)
         for _ in range(2)
@@ -307,7 +303,7 @@ def test_forces_act_at_every_step(asked: Asked, owed: tuple[float, float, float 
     simulate, (round_, lift, swing) = engine(asked), owed
     moon = Particle(name="moon", mass=3.0, position=(2.0, 0.0, 0.0), velocity=(0.0, math.sqrt(0.5), 0.0))
     orbit = Scene(bodies=(moon,), forces=(CentralGravity(name="pull", strength=1.0),))
-    path = {"path": Trace(quantity=Position("moon"))}
+    path = traces(path=Position("moon"))
     found = simulate(orbit, time_step=0.001, duration=5.0, observe=path)
     assert np.abs(np.linalg.norm(found["path"], axis=1) - 2.0).max() < round_
 
@@ -317,14 +313,14 @@ def test_forces_act_at_every_step(asked: Asked, owed: tuple[float, float, float 
         forces=(Load(name="lift", body="box", force=(0.0, 0.0, 4.0 * G)),),
         gravity=peer_scenes.GRAVITY,
     )
-    speed = {"speed": Final(quantity=Velocity("box"))}
+    speed = finals(speed=Velocity("box"))
     found = simulate(lifted, time_step=0.01, steps=100, observe=speed)
     assert found["speed"][2] == pytest.approx(G, rel=lift)
 
     if swing is not None:
         weight = Particle(name="weight", mass=3.0, position=(2.0, 0.0, 0.0))
         spring = Spring(name="spring", between=((0.0, 0.0, 0.0), "weight"), stiffness=30.0, rest_length=1.0)
-        end = {"end": Final(quantity=Position("weight"))}
+        end = finals(end=Position("weight"))
         found = simulate(
             Scene(bodies=(weight,), forces=(spring,)), time_step=0.001, duration=1.0, observe=end
         )

@@ -36,6 +36,7 @@ from tests.engine.peers.test_conformance import (
 )
 from tests.scenes import peer as peer_scenes
 from tests.scenes import peer_joints
+from tests.scenes.seen import finals
 
 
 @pytest.mark.parametrize("backwards", [False, True])
@@ -50,11 +51,7 @@ def test_gears_share_what_turns_them_by_their_ratio(
 
 @rows(dict.fromkeys((BULLET, JOLT, BOX, MUJOCO), 0.02))
 def test_the_torque_of_a_hinge_has_what_brakes_it_and_what_turns_its_body(asked: Asked, owed: float) -> None:
-    seen = {
-        "f": Final(quantity=ConstraintForce("j")),
-        "w": Final(quantity=AngularVelocity("b")),
-        "q": Final(quantity=Orientation("b")),
-    }
+    seen = finals(f=ConstraintForce("j"), w=AngularVelocity("b"), q=Orientation("b"))
     found = engine(asked)(peer_joints.spun(3.0), time_step=1e-3, steps=100, observe=seen)
     exact = peer_joints.load_on_spun(found["q"], float(found["w"][2]), 3.0)
 

@@ -6,9 +6,10 @@ from functools import partial
 
 import pytest
 
-from spook_tracker.engine import Final, Plane, Position, RigidBody, Scene, Sphere
+from spook_tracker.engine import Plane, Position, RigidBody, Scene, Sphere
 from spook_tracker.engine.find import find
 from tests.scenes import peer as peer_scenes
+from tests.scenes.seen import finals
 
 pytest.importorskip("mujoco.mjx", reason="the extra mjx is not installed: pip install 'spook-tracker[mjx]'")
 
@@ -37,11 +38,7 @@ def test_a_ball_that_nothing_rubs_lies_where_mujoco_s_does() -> None:
     scene = Scene(bodies=(ball, floor), gravity=(0.0, 0.0, -10.0))
     heights = [
         find(engine).simulate(
-            scene,
-            time_step=1 / 60,
-            steps=20,
-            configuration="rk4",
-            observe={"height": Final(quantity=Position("ball"))},
+            scene, time_step=1 / 60, steps=20, configuration="rk4", observe=finals(height=Position("ball"))
         )["height"][2]
         for engine in ("mjx", "mujoco")
     ]

@@ -6,20 +6,11 @@ from typing import Any
 
 import pytest
 
-from spook_tracker.engine import (
-    ContactForce,
-    Final,
-    Material,
-    Particle,
-    Plane,
-    Position,
-    Scene,
-    Sphere,
-    Trace,
-)
+from spook_tracker.engine import ContactForce, Material, Particle, Plane, Position, Scene, Sphere
 from spook_tracker.engine.find import EngineMissing, find
 from spook_tracker.engine.protocol import NotSupported
 from tests.scenes.corpus import fixed, solid
+from tests.scenes.seen import finals, traces
 
 try:
     RAPIER = find("rapier")
@@ -42,12 +33,11 @@ def lying(friction: float) -> Scene:
 
 
 def test_the_force_of_a_contact_is_told_of_either_body_and_of_every_step() -> None:
-    observe = {
-        "up": Trace(quantity=ContactForce("ball 1", "plane")),
-        "down": Final(quantity=ContactForce("plane", "ball 1")),
-        "light": Final(quantity=ContactForce("ball 0")),
-        "between": Final(quantity=ContactForce("ball 0", "ball 1")),
-    }
+    observe = traces(up=ContactForce("ball 1", "plane")) | finals(
+        down=ContactForce("plane", "ball 1"),
+        light=ContactForce("ball 0"),
+        between=ContactForce("ball 0", "ball 1"),
+    )
     run = RAPIER.simulate(lying(0.0), time_step=STEP, duration=2.0, observe=observe)
 
     assert run["up"][-1] == pytest.approx([0.0, 0.0, 3.0 * 9.81], rel=1e-4)
@@ -60,7 +50,7 @@ def test_the_force_of_a_contact_is_told_of_either_body_and_of_every_step() -> No
 def test_what_is_faster_than_its_bound_is_not_supported() -> None:
     def end(speed: float) -> Any:
         ball = Particle(name="ball", mass=1.0, position=(0.0, 0.0, 0.0), velocity=(speed, 0.0, 0.0))
-        seen = {"x": Final(quantity=Position("ball"))}
+        seen = finals(x=Position("ball"))
         return RAPIER.simulate(Scene(bodies=(ball,)), time_step=STEP, steps=60, observe=seen)["x"][0]
 
     assert end(390.0) == pytest.approx(390.0, rel=1e-3)

@@ -8,19 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spook_tracker.engine import (
-    Box,
-    ContactForce,
-    Final,
-    Material,
-    Plane,
-    Position,
-    RigidBody,
-    Scene,
-    Velocity,
-)
+from spook_tracker.engine import Box, ContactForce, Material, Plane, Position, RigidBody, Scene, Velocity
 from spook_tracker.engine.find import find
 from tests.scenes import peer as peer_scenes
+from tests.scenes.seen import finals
 
 rapier = pytest.importorskip(
     "rapier3d", reason="the extra rapier3d is not installed: pip install 'spook-tracker[rapier3d]'"
@@ -45,7 +36,7 @@ def test_a_contact_with_friction_shows_all_that_holds_a_box_on_any_slope(up: Any
         orientation=upright_to(normal), material=rough,
     )  # fmt: skip
     scene = Scene(bodies=(ground, ball), gravity=tuple(pull))
-    force = {"f": Final(quantity=ContactForce("box"))}
+    force = finals(f=ContactForce("box"))
     found = run("coulomb")(scene, time_step=1 / 60, duration=1.0, observe=force)
     assert found["f"] == pytest.approx(-pull, abs=5e-3)
 
@@ -61,7 +52,7 @@ def test_two_bodies_that_must_not_touch_fall_through_each_other() -> None:
         for name, z in (("low", 0.5), ("high", 1.5))
     )
     ground = RigidBody(name="ground", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0))
-    end = {"z": Final(quantity=Position("high"))}
+    end = finals(z=Position("high"))
     scene = Scene(bodies=(ground, *boxes), gravity=(0.0, 0.0, -9.81), no_contact=(("low", "high"),))
     assert run(MANY)(scene, time_step=1 / 60, duration=2.0, observe=end)["z"][2] == pytest.approx(
         0.5, abs=2e-3
@@ -83,7 +74,7 @@ def test_a_stranger_s_ten_lines_give_the_same_numbers() -> None:
         world.step()
     theirs = world.rigid_bodies[box]
 
-    observe = {"place": Final(quantity=Position("box")), "speed": Final(quantity=Velocity("box"))}
+    observe = finals(place=Position("box"), speed=Velocity("box"))
     ours = run(DEFAULTS)(peer_scenes.box_on_ground(0.7), time_step=1 / 60, steps=120, observe=observe)
     assert tuple(ours["place"]) == tuple(theirs.translation)
     assert tuple(ours["speed"]) == tuple(theirs.linvel)

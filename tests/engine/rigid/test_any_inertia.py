@@ -18,7 +18,6 @@ from spook_tracker.engine import (
     Compound,
     ConvexHull,
     Energy,
-    Final,
     Hinge,
     Method,
     Orientation,
@@ -29,10 +28,10 @@ from spook_tracker.engine import (
     Scene,
     SceneError,
     Sphere,
-    Trace,
     simulate,
 )
 from tests.oracles.rigid import product, rotation
+from tests.scenes.seen import finals, traces
 
 H = 0.01  # s
 MOMENTS = (1.0, 2.0, 2.5)  # kg m²
@@ -93,12 +92,9 @@ def test_a_tensor_moves_as_its_principal_axes_do(scene: str, method: str) -> Non
     joint coordinates where a body's own axes are principal, and rows where they are not: steps of one order, h⁴ apart."""
     step, steps, apart = (H / 10.0, 500, 1e-12) if method == "order 4" and scene != "free" else (H, 50, 1e-10)
     shape = {"shape": Sphere(0.5)} if scene == "on a floor" else {}
-    observe: dict[str, Any] = {
-        "w": Trace(quantity=AngularVelocity("body")),
-        "x": Trace(quantity=Position("body")),
-        "l": Trace(quantity=AngularMomentum()),
-        "energy": Trace(quantity=Energy()),
-    }
+    observe: dict[str, Any] = traces(
+        w=AngularVelocity("body"), x=Position("body"), l=AngularMomentum(), energy=Energy()
+    )
     runs = [
         simulate(
             SCENES[scene](body(p, **shape)),
@@ -114,7 +110,7 @@ def test_a_tensor_moves_as_its_principal_axes_do(scene: str, method: str) -> Non
 
 
 def test_orientations_are_those_of_the_body_not_of_its_principal_axes() -> None:
-    observe = {"q": Final(quantity=Orientation("body"))}
+    observe = finals(q=Orientation("body"))
     one, two = (
         simulate(SCENES["free"](body(p)), time_step=H, steps=30, observe=observe)["q"] for p in (True, False)
     )
@@ -210,7 +206,7 @@ def test_a_free_turn_does_not_depend_on_the_unit_of_mass(principal: bool, expone
             position=(0.0, 0.0, 0.0),
             angular_velocity=SPIN,
         )
-        observe = {"q": Final(quantity=Orientation("it"))}
+        observe = finals(q=Orientation("it"))
         ends.append(simulate(Scene(bodies=(free,)), time_step=H, steps=100, observe=observe)["q"])
 
     np.testing.assert_array_equal(*ends)

@@ -29,12 +29,12 @@ from spook_tracker.engine import (
     RigidBody,
     Scene,
     Sphere,
-    Trace,
     Velocity,
     simulate,
     start,
 )
 from tests.scenes.corpus import solid
+from tests.scenes.seen import finals, traces
 
 HALF = Method(half_step_velocities=True)
 CORRECTED = Method(half_step_velocities=True, corrections=2)
@@ -69,7 +69,7 @@ def test_a_pendulum_falls_by_the_sum_of_its_inertias(method: Method, order: floa
     ).y[0, -1]
     errors = []
     for steps in (100, 200):
-        seen = {"angle": Final(quantity=JointCoordinate("joint"))}
+        seen = finals(angle=JointCoordinate("joint"))
         run = simulate(
             pendulum(floor, armature=ROTOR), time_step=1 / steps, duration=1.0, method=method, observe=seen
         )
@@ -79,7 +79,7 @@ def test_a_pendulum_falls_by_the_sum_of_its_inertias(method: Method, order: floa
 
 
 def test_its_energy_is_kept_and_counted() -> None:
-    seen = {"energy": Trace(quantity=Energy())}
+    seen = traces(energy=Energy())
     run = simulate(pendulum(armature=ROTOR), time_step=1e-3, duration=2.0, method=HALF, observe=seen)
     assert np.ptp(run["energy"]) < 1e-4 * MASS * 9.81 * ARM
 
@@ -188,7 +188,7 @@ def bar_and_ball(
 @pytest.mark.parametrize("rotor", [0.0, 0.3, 5.0])
 def test_an_elastic_ball_meets_the_bar_and_its_rotor(method: Method, rotor: float) -> None:
     scene, ball, bar = bar_and_ball(rotor, spin=0.0, ball_speed=-3.0, gap=0.3)
-    seen = {"ball": Final(quantity=Velocity("ball")), "bar": Final(quantity=AngularVelocity("bar"))}
+    seen = finals(ball=Velocity("ball"), bar=AngularVelocity("bar"))
     run = simulate(scene, time_step=1 / 240, duration=0.3, method=method, observe=seen)
     assert float(run["ball"][2]) == pytest.approx(ball, rel=1e-10)
     assert -float(run["bar"][1]) == pytest.approx(bar, rel=5e-4)  # it turns on: order 1
@@ -226,7 +226,7 @@ def test_compositions_take_it_and_a_spring_of_the_coordinate(
         method="DOP853",
     ).y[:, -1]
     scene = pendulum(armature=rotor, spring=JointSpring(stiffness=9.0, rest=0.3, damping=0.0))
-    seen = {"angle": Final(quantity=JointCoordinate("joint")), "spin": Final(quantity=AngularVelocity("bob"))}
+    seen = finals(angle=JointCoordinate("joint"), spin=AngularVelocity("bob"))
     errors = []
     for steps in (20, 40):
         run = simulate(
@@ -261,7 +261,7 @@ def test_a_composition_refuses_a_spring_that_loses_energy() -> None:
 @pytest.mark.parametrize("rotor", [0.0, 5.0])
 def test_a_rotor_that_turns_gives_its_momentum_to_what_is_met(method: Method, rotor: float) -> None:
     scene, ball, bar = bar_and_ball(rotor, spin=2.0, ball_speed=-1.0)
-    seen = {"ball": Final(quantity=Velocity("ball")), "bar": Final(quantity=AngularVelocity("bar"))}
+    seen = finals(ball=Velocity("ball"), bar=AngularVelocity("bar"))
     run = simulate(scene, time_step=1e-3, duration=2e-3, method=method, observe=seen)
     assert float(run["ball"][2]) == pytest.approx(ball, rel=1e-8)
     assert -float(run["bar"][1]) == pytest.approx(bar, rel=1e-5)
@@ -277,7 +277,7 @@ def test_no_sample_lies_in_the_middle_of_an_impact(method: Method, rotor: float)
         time_step=1e-3,
         duration=8e-3,
         method=method,
-        observe={"energy": Trace(quantity=Energy()), "ball": Final(quantity=Velocity("ball"))},
+        observe=traces(energy=Energy()) | finals(ball=Velocity("ball")),
     )
     assert float(run["ball"][2]) > 2.0
     assert np.ptp(run["energy"]) < 1e-5 * run["energy"][0]
@@ -291,7 +291,7 @@ def test_an_overlap_at_the_start_is_parted_as_without_a_rotor() -> None:
             name="rail", between=(WORLD, "box"), axis=(0.0, 0.0, 1.0), compliance=0.0, armature=rotor
         )
         scene = Scene(bodies=(floor, box), constraints=(rail,), gravity=(0.0, 0.0, -9.81))
-        seen = {"at": Final(quantity=Position("box"))}
+        seen = finals(at=Position("box"))
         return float(simulate(scene, time_step=0.01, duration=1.0, observe=seen)["at"][2])
 
     assert height(1e4) == pytest.approx(height(0.0), abs=1e-9)
@@ -333,10 +333,7 @@ def test_what_slept_goes_on_as_if_it_had_lain_awake() -> None:
 def test_a_rotor_may_turn_by_more_than_half_a_turn_a_step(method: Method) -> None:
     wheel = solid("wheel", None, (0.0, 0.0, 0.0), spin=(0.0, 0.0, 500.0), inertia=(0.1, 0.1, 0.1))
     axle = Hinge(name="axle", between=(WORLD, "wheel"), axis=(0.0, 0.0, 1.0), compliance=0.0, armature=0.3)
-    seen = {
-        "angle": Final(quantity=JointCoordinate("axle")),
-        "spin": Final(quantity=AngularVelocity("wheel")),
-    }
+    seen = finals(angle=JointCoordinate("axle"), spin=AngularVelocity("wheel"))
     run = simulate(
         Scene(bodies=(wheel,), constraints=(axle,)),
         time_step=1 / 60,
@@ -354,6 +351,6 @@ def test_the_rotor_of_a_joint_that_breaks_keeps_its_energy() -> None:
         name="rail", between=(WORLD, "box"), axis=(0.0, 0.0, 1.0), compliance=0.0, armature=2.0, strength=1.0
     )
     scene = Scene(bodies=(box,), constraints=(rail,), gravity=(5.0, 0.0, -9.81))
-    run = simulate(scene, time_step=1e-3, duration=1.0, observe={"energy": Trace(quantity=Energy())})
+    run = simulate(scene, time_step=1e-3, duration=1.0, observe=traces(energy=Energy()))
     assert run.broken
     assert np.ptp(run["energy"]) < 0.1  # J, of 60 that it falls by: order 1

@@ -13,7 +13,6 @@ from spook_tracker.engine import (
     WORLD,
     AngularMomentum,
     AngularVelocity,
-    Final,
     Hinge,
     JointCoordinate,
     KineticEnergy,
@@ -22,12 +21,12 @@ from spook_tracker.engine import (
     Motor,
     Orientation,
     Scene,
-    Trace,
     simulate,
 )
 from tests.oracles.particles import Array
 from tests.oracles.rigid import free_turn, product, rotation
 from tests.scenes.corpus import solid
+from tests.scenes.seen import finals, traces
 
 MOMENTS = np.array([0.9144, 1.098, 1.66])  # kg m²
 TILTED = np.array([0.9, 0.2, -0.3, 0.25]) / np.linalg.norm([0.9, 0.2, -0.3, 0.25])
@@ -71,12 +70,7 @@ def run(start: Array, h: float, duration: float) -> tuple[Array, Array, Array, A
         inertia=tuple(MOMENTS),
         orientation=tuple(TILTED),
     )
-    observe = {
-        "w": Trace(quantity=AngularVelocity("body")),
-        "l": Trace(quantity=AngularMomentum()),
-        "e": Trace(quantity=KineticEnergy()),
-        "q": Trace(quantity=Orientation("body")),
-    }
+    observe = traces(w=AngularVelocity("body"), l=AngularMomentum(), e=KineticEnergy(), q=Orientation("body"))
     result = simulate(Scene(bodies=(body,)), time_step=h, duration=duration, observe=observe)
     local = np.array([rotation(q).T @ w for q, w in zip(result["q"], result["w"], strict=True)])
     return result.sample_times["w"], local, result["l"], result["e"], result["q"]
@@ -148,7 +142,7 @@ def test_the_flip_of_the_middle_axis_has_its_period() -> None:
 def test_a_symmetric_top_precesses_as_it_must(h: float) -> None:
     """Body-frame rate (1 − I3/I1) w3 of the transverse spin, and the axis circles the momentum at |L|/I1."""
     body = solid("top", None, (0.0, 0.0, 0.0), spin=(0.4, 0.0, 1.5), inertia=(2.0, 2.0, 3.0))
-    observe = {"q": Trace(quantity=Orientation("top"))}
+    observe = traces(q=Orientation("top"))
     spin = np.array([0.8, 0.0, 4.5])
     rate, along = np.linalg.norm(spin) / 2.0, spin / np.linalg.norm(spin)
     start = np.array([0.0, 0.0, 1.0])
@@ -167,7 +161,7 @@ def test_a_symmetric_top_precesses_as_it_must(h: float) -> None:
 def steady(inertia: tuple[float, float, float], rate: float, h: float, steps: int, **method: Any) -> Array:
     """Orientations of a body that spins about its z-axis."""
     body = solid("b", None, (0.0, 0.0, 0.0), spin=(0.0, 0.0, rate), inertia=inertia)
-    observe = {"q": Trace(quantity=Orientation("b"))}
+    observe = traces(q=Orientation("b"))
     return np.asarray(
         simulate(Scene(bodies=(body,)), time_step=h, steps=steps, observe=observe, **method)["q"]
     )
@@ -193,7 +187,7 @@ def test_a_body_locked_to_a_driven_one_turns_with_it(turn: float) -> None:
     driven = solid("driven", None, (0.0, 0.0, 0.0), None, spin=(0.0, 0.0, turn / h), motion="kinematic")
     held = solid("held", None, (0.0, 0.0, 0.0), spin=(0.0, 0.0, turn / h), inertia=(0.3, 0.4, 0.5))
     scene = Scene(bodies=(driven, held), constraints=(Lock(name="lock", between=("driven", "held")),))
-    q = simulate(scene, time_step=h, steps=steps, observe={"q": Trace(quantity=Orientation())})["q"]
+    q = simulate(scene, time_step=h, steps=steps, observe=traces(q=Orientation()))["q"]
 
     assert np.abs(np.abs(np.sum(q[:, 0] * q[:, 1], axis=1)) - 1.0).max() < 1e-12
 
@@ -206,7 +200,7 @@ def test_a_motor_turns_its_wheel_by_its_speed_times_the_time(turn: float, method
     wheel = solid("wheel", None, (0.0, 0.0, 0.0), spin=(0.0, 0.0, turn / h), inertia=(0.3, 0.4, 0.5))
     drive = {"motor": Motor(speed=turn / h)} if method == Method() else {}
     axle = Hinge(name="axle", between=(WORLD, "wheel"), axis=(0.0, 0.0, 1.0), compliance=0.0, **drive)
-    observe = {"angle": Final(quantity=JointCoordinate("axle"))}
+    observe = finals(angle=JointCoordinate("axle"))
     result = simulate(
         Scene(bodies=(wheel,), constraints=(axle,)), time_step=h, steps=steps, method=method, observe=observe
     )
@@ -216,7 +210,7 @@ def test_a_motor_turns_its_wheel_by_its_speed_times_the_time(turn: float, method
 
 def test_what_tumbles_faster_than_a_thousand_radians_a_step_keeps_its_energy() -> None:
     body = solid("b", None, (0.0, 0.0, 0.0), spin=(3e5, 1e5, 2e5), inertia=tuple(MOMENTS))
-    observe = {"e": Trace(quantity=KineticEnergy()), "l": Trace(quantity=AngularMomentum())}
+    observe = traces(e=KineticEnergy(), l=AngularMomentum())
     for h in (1e-4, 0.1):
         result = simulate(Scene(bodies=(body,)), time_step=h, steps=50, observe=observe)
         assert np.ptp(result["e"]) < 1e-11 * result["e"][0]

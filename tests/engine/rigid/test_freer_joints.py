@@ -11,7 +11,6 @@ from spook_tracker.engine import (
     WORLD,
     ConstraintForce,
     Cylindrical,
-    Final,
     Hinge,
     Load,
     Lock,
@@ -23,7 +22,6 @@ from spook_tracker.engine import (
     RigidBody,
     Scene,
     SceneError,
-    Trace,
     Violation,
     recorded_joints,
     simulate,
@@ -31,6 +29,7 @@ from spook_tracker.engine import (
 from spook_tracker.engine.protocol import Capabilities, unsupported
 from tests.scenes.corpus import solid
 from tests.scenes.coupling import H, Z, hung, masses, pair
+from tests.scenes.seen import finals, traces
 
 FREE: dict[
     type, tuple[tuple[int, ...], tuple[int, ...]]
@@ -53,7 +52,7 @@ def test_each_holds_what_it_says_and_leaves_the_rest_free(kind: Any) -> None:
         ):
             load = Load(name="push", body="body", **{field: push})
             scene = Scene(bodies=(body,), constraints=(joint,), forces=(load,))
-            observe = {"f": Final(quantity=ConstraintForce("joint")), "g": Final(quantity=Violation("joint"))}
+            observe = finals(f=ConstraintForce("joint"), g=Violation("joint"))
             result = simulate(scene, time_step=H, steps=50, observe=observe)
             speed = result.final_state["body"][at + k]
             held = result["f"][k + (0 if field == "force" else 3)]
@@ -78,11 +77,7 @@ def test_a_recording_reads_the_same_violations(kind: Any) -> None:
         name="joint", between=("one", "two"), at=(0.4, 0.1, 0.3), axis=(1.0, 2.0, 2.0), compliance=0.1
     )
     scene = Scene(bodies=bodies, constraints=(joint,))
-    observe = {
-        "g": Trace(quantity=Violation("joint")),
-        "x": Trace(quantity=Position()),
-        "q": Trace(quantity=Orientation()),
-    }
+    observe = traces(g=Violation("joint"), x=Position(), q=Orientation())
     result = simulate(scene, time_step=H, steps=100, observe=observe)
 
     assert np.abs(result["g"][-1]).min() > 1e-4

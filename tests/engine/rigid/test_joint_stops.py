@@ -22,16 +22,12 @@ from spook_tracker.engine import (
     Motor,
     RigidBody,
     Scene,
-    Trace,
     simulate,
 )
+from tests.scenes.seen import traces
 
 BEYOND = 0.2  # rad or m
-WATCH = {
-    "kinetic": Trace(quantity=KineticEnergy()),
-    "energy": Trace(quantity=Energy()),
-    "at": Trace(quantity=JointCoordinate("joint")),
-}
+WATCH = traces(kinetic=KineticEnergy(), energy=Energy(), at=JointCoordinate("joint"))
 
 
 def test_a_stop_holds_while_its_joint_comes_back() -> None:
@@ -83,10 +79,7 @@ def test_a_stop_without_restitution_is_met_where_it_is(rate: int, speed: float, 
         Scene(bodies=(body,), constraints=(hinge,)),
         time_step=h,
         steps=free + 2,
-        observe={
-            "angle": Trace(quantity=JointCoordinate("hinge")),
-            "w": Trace(quantity=AngularVelocity("b")),
-        },
+        observe=traces(angle=JointCoordinate("hinge"), w=AngularVelocity("b")),
     )
 
     assert result["angle"].ravel()[free + 1] == pytest.approx(upper, abs=1e-12)

@@ -9,12 +9,10 @@ from spook_tracker.engine import (
     WORLD,
     Box,
     Capsule,
-    Final,
     Hinge,
     JointSpring,
     Limit,
     Material,
-    Maximum,
     Method,
     Motor,
     Penetration,
@@ -23,7 +21,6 @@ from spook_tracker.engine import (
     Prismatic,
     RigidBody,
     Scene,
-    Trace,
     Velocity,
     simulate,
     start,
@@ -32,6 +29,7 @@ from spook_tracker.scalar_tests import loose_bearing
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.heavier import heavier
 from tests.scenes.corpus import solid
+from tests.scenes.seen import finals, maxima, traces
 
 STEP = 1 / 60
 G = 9.81
@@ -89,9 +87,7 @@ def legged(seed: int) -> Scene:
 
 @pytest.mark.parametrize("seed", range(12))
 def test_what_stands_on_legs_is_solved_at_every_step(seed):
-    run = simulate(
-        legged(seed), duration=1.5, time_step=STEP, observe={"deepest": Maximum(quantity=Penetration())}
-    )
+    run = simulate(legged(seed), duration=1.5, time_step=STEP, observe=maxima(deepest=Penetration()))
     steps = round(1.5 / STEP)
     assert run.status == "completed"
     assert run["deepest"] <= 1e-6  # m
@@ -115,7 +111,7 @@ def test_what_was_solved_directly_after_iterations_overlaps_no_more_than_before(
         duration=0.7,
         time_step=STEP,
         method=Method(solver="iterative"),
-        observe={"deepest": Maximum(quantity=Penetration())},
+        observe=maxima(deepest=Penetration()),
     )
     assert run.status == "completed"
     assert run["deepest"] <= 1e-6  # m
@@ -206,10 +202,7 @@ def test_two_hinged_bars_stand_while_the_floor_rubs_enough(share, stands):
     half = 0.4
     need = 0.5 * math.sin(half) / (math.cos(half) + 0.02)
     run = simulate(
-        frame(share * need, half),
-        duration=1.0,
-        time_step=STEP,
-        observe={"v": Final(quantity=Velocity("left"))},
+        frame(share * need, half), duration=1.0, time_step=STEP, observe=finals(v=Velocity("left"))
     )
     speed = float(np.linalg.norm(run["v"]))
     assert run.status == "completed"
@@ -240,7 +233,7 @@ def test_a_driven_slide_pushes_a_box_as_statics_say():
         gravity=(0.0, 0.0, -G),
         no_contact=(("floor", "pusher"),),
     )
-    run = simulate(scene, duration=1.0, time_step=STEP, observe={"v": Final(quantity=Velocity("box"))})
+    run = simulate(scene, duration=1.0, time_step=STEP, observe=finals(v=Velocity("box")))
     speed = run["v"]
     assert run.status == "completed"
     assert speed[0] == pytest.approx((force - mu * box * G) / (pusher + box), rel=1e-9)
@@ -255,7 +248,7 @@ def test_a_motor_moves_any_load_alike_where_it_turns_back(rate: int) -> None:
             heavier(loose_bearing.scene(1 / rate), mass / loose_bearing.SLIDER, "slider"),
             time_step=1 / rate,
             duration=loose_bearing.DURATION,
-            observe={"x": Trace(quantity=Position("slider"))},
+            observe=traces(x=Position("slider")),
         )["x"][:, 0]
         for mass in (10.0, 1e9)
     )

@@ -16,7 +16,6 @@ from spook_tracker.engine import (
     WORLD,
     ConstraintForce,
     Distance,
-    Final,
     Hinge,
     JointSpring,
     Method,
@@ -27,13 +26,13 @@ from spook_tracker.engine import (
     RigidBody,
     Scene,
     Sinusoid,
-    Trace,
     simulate,
 )
 from spook_tracker.scalar_tests import scissor_lift
 from spook_tracker.scalar_tests.door import scene as door
 from spook_tracker.scalar_tests.multibody import bricard
 from spook_tracker.scalar_tests.multibody.library import turned
+from tests.scenes.seen import finals, traces
 
 G = 9.81  # m/s²
 H = 1 / 240  # s
@@ -43,7 +42,7 @@ CURVED = Method(half_step_velocities=True, corrections=1)
 
 def third_after_a_second(compliance: float, h: float, scene: Scene | None = None) -> tuple[Result, float]:
     """Bricard's mechanism, and how far its third point is from its place [m]."""
-    observe = {"centre": Trace(quantity=Position("rod 3")), "turn": Trace(quantity=Orientation("rod 3"))}
+    observe = traces(centre=Position("rod 3"), turn=Orientation("rod 3"))
     built = scene or bricard.scene(h, compliance)
     run = simulate(built, time_step=h, duration=1.0, observe=observe)
     if not run.completed:
@@ -209,9 +208,7 @@ def crank_end(time: float) -> tuple[float, float]:
 
 
 def end_of(scene: Scene, body: str, h: float, duration: float, method: Method = CURVED) -> np.ndarray:
-    run = simulate(
-        scene, time_step=h, duration=duration, method=method, observe={"x": Final(quantity=Position(body))}
-    )
+    run = simulate(scene, time_step=h, duration=duration, method=method, observe=finals(x=Position(body)))
     return np.asarray(run["x"])
 
 
@@ -266,7 +263,7 @@ def test_a_structure_at_rest_is_not_called_locked() -> None:
 def test_a_lift_that_lies_nearly_flat_is_held(stages: int, degrees: float) -> None:
     """Its rows resist at first order by the sine of that angle; what they resist grows as it moves."""
     angle = math.radians(degrees)
-    observe = {"pull": Final(quantity=ConstraintForce("actuator"))}
+    observe = finals(pull=ConstraintForce("actuator"))
     run = simulate(scissor_lift.scene(stages, angle), time_step=1 / 60, steps=20, observe=observe)
 
     exact = scissor_lift.holding_force(stages, angle, scissor_lift.LOAD, scissor_lift.ARM)

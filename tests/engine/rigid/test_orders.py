@@ -17,7 +17,6 @@ from spook_tracker.engine import (
     Box,
     CentralGravity,
     ConstraintForce,
-    Final,
     Hinge,
     JointCoordinate,
     Limit,
@@ -31,7 +30,6 @@ from spook_tracker.engine import (
     RigidBody,
     Scene,
     Spring,
-    Trace,
     Universal,
     Velocity,
     Violation,
@@ -42,6 +40,7 @@ from spook_tracker.scalar_tests import spinning_top, swinging_door
 from tests.oracles.rigid_composition import assert_dense_steps, oracle_of
 from tests.scenes.corpus import solid
 from tests.scenes.rigid import EVERY_JOINT, one_joint
+from tests.scenes.seen import finals, traces
 
 HALF = Method(half_step_velocities=True)
 CURVED = Method(half_step_velocities=True, corrections=1)
@@ -102,19 +101,13 @@ def box_at(time: float) -> np.ndarray:
 
 
 def box_error(h: float, method: Method) -> float:
-    end = simulate(
-        free_box(),
-        time_step=h,
-        duration=4.0,
-        method=method,
-        observe={"q": Final(quantity=Orientation("box"))},
-    )
+    end = simulate(free_box(), time_step=h, duration=4.0, method=method, observe=finals(q=Orientation("box")))
     exact = box_at(4.0)
     return float(np.abs(end["q"] * np.sign(end["q"] @ exact) - exact).max())
 
 
 def rods_error(h: float, method: Method) -> float:
-    observe = {"x": Final(quantity=Position("lower"))}
+    observe = finals(x=Position("lower"))
     end = simulate(rods(), time_step=h, duration=1.0, method=method, observe=observe)
     return float(np.abs(end["x"] - rods_at(1.0)).max())
 
@@ -168,11 +161,7 @@ def test_a_composition_is_the_dense_one_for_every_joint(kind: str, bodies: int) 
 def test_half_steps_are_of_order_two_for_every_joint(kind: str) -> None:
     """Against the composition of order 8, after a start its rows allow."""
     scene = held(kind, 2)
-    ends = {
-        "x": Final(quantity=Position()),
-        "v": Final(quantity=Velocity()),
-        "w": Final(quantity=AngularVelocity()),
-    }
+    ends = finals(x=Position(), v=Velocity(), w=AngularVelocity())
     order8 = Method(composition="order8")
     allowed = simulate(scene, time_step=1e-9, steps=1, method=order8, observe=ends)
     bodies = tuple(
@@ -193,7 +182,7 @@ def test_half_steps_are_of_order_two_for_every_joint(kind: str) -> None:
 
 def test_the_force_on_the_tip_carries_the_top_round() -> None:
     """Weight upwards, m r Ω² inwards; order 8 gives it at the sample itself."""
-    observe = {"force": Trace(quantity=ConstraintForce("tip")), "x": Trace(quantity=Position("top"))}
+    observe = traces(force=ConstraintForce("tip"), x=Position("top"))
     run = simulate(
         spinning_top.scene(),
         time_step=1 / 120,
@@ -221,7 +210,7 @@ def test_a_body_without_joints_goes_round_its_circle_in_time(pull: str, name: st
         "centre": CentralGravity(name="pull", strength=rate**2 * radius**3),
     }
     scene = Scene(bodies=(free, rod), constraints=(swing,), forces=(forces[pull],))
-    ends = {"x": Trace(quantity=Position("free")), "v": Trace(quantity=Velocity("free"))}
+    ends = traces(x=Position("free"), v=Velocity("free"))
 
     def error(steps: int) -> float:
         run = simulate(scene, time_step=2.0 / steps, steps=steps, method=method, observe=ends)
@@ -252,7 +241,7 @@ def test_a_joint_started_against_its_stop_is_lost_not_wrong() -> None:
     """A velocity the joint forbids is taken away, as a blow against it would: however large it is in joint
     coordinates. Where rows are solved (a universal joint) one that leads farther than its arm even in the smallest part
     of a step, 0.1 s/2¹¹, finds no way back: named, not a number."""
-    order4, place = Method(composition="order4"), {"x": Final(quantity=Position("lower"))}
+    order4, place = Method(composition="order4"), finals(x=Position("lower"))
 
     def run(speed: float, scene: Scene) -> Result:
         fast = dataclasses.replace(scene.bodies[0], velocity=(speed, 0.0, 0.0))
@@ -311,10 +300,7 @@ def test_a_composition_refuses_what_goes_back_in_time_badly() -> None:
 
 def test_a_motor_turns_at_its_speed_with_half_steps() -> None:
     driven = Hinge(name="driven", between=(WORLD, "a"), axis=(0.0, 0.0, 1.0), motor=Motor(speed=2.0))
-    observe = {
-        "angle": Final(quantity=JointCoordinate("driven")),
-        "spin": Final(quantity=AngularVelocity("a")),
-    }
+    observe = finals(angle=JointCoordinate("driven"), spin=AngularVelocity("a"))
     end = simulate(
         Scene(bodies=(box("a", 0.0),), constraints=(driven,)),
         time_step=0.01,

@@ -14,7 +14,6 @@ from spook_tracker.engine import (
     AngularVelocity,
     Ball,
     Box,
-    Final,
     Hinge,
     Material,
     Method,
@@ -27,12 +26,12 @@ from spook_tracker.engine import (
     SceneError,
     Sinusoid,
     Table,
-    Trace,
     Velocity,
     Violation,
     simulate,
     start,
 )
+from tests.scenes.seen import finals, traces
 
 H = 0.01  # s
 STEPS = 120
@@ -45,12 +44,7 @@ def told(**motion: Any) -> RigidBody:
 
 
 def followed(body: RigidBody, **method: Any) -> Any:
-    observe = {
-        "x": Trace(quantity=Position("told")),
-        "v": Trace(quantity=Velocity("told")),
-        "q": Trace(quantity=Orientation("told")),
-        "w": Trace(quantity=AngularVelocity("told")),
-    }
+    observe = traces(x=Position("told"), v=Velocity("told"), q=Orientation("told"), w=AngularVelocity("told"))
     return simulate(Scene(bodies=(body,)), time_step=H, steps=STEPS, observe=observe, method=Method(**method))
 
 
@@ -101,7 +95,7 @@ def test_a_path_carries_what_hangs_on_it_and_what_lies_on_it() -> None:
         constraints=(Ball(name="pin", between=("hook", "load"), at=(0.0, 0.0, 0.0), compliance=0.0),),
         gravity=(0.0, 0.0, -9.81),
     )
-    observe = {"x": Final(quantity=Position("load")), "hook": Final(quantity=Position("hook"))}
+    observe = finals(x=Position("load"), hook=Position("hook"))
     result = simulate(scene, time_step=1e-3, steps=1500, observe=observe)
     assert math.dist(result["x"], result["hook"]) == pytest.approx(1.0, abs=1e-6)
 
@@ -125,7 +119,7 @@ def test_a_path_carries_what_hangs_on_it_and_what_lies_on_it() -> None:
         Scene(bodies=(box, table), gravity=(0.0, 0.0, -9.81)),
         time_step=H,
         steps=80,
-        observe={"x": Final(quantity=Position("box"))},
+        observe=finals(x=Position("box")),
     )
     np.testing.assert_allclose(result["x"], (0.0, 0.0, 0.2 + lift(0.8)), atol=1e-9)
 
@@ -168,7 +162,7 @@ def shaken(h: float, method: Method, by_path: bool) -> tuple[float, float]:
         time_step=h,
         duration=2.0,
         method=method,
-        observe={"x": Trace(quantity=Position("rod")), "open": Trace(quantity=Violation("hinge"))},
+        observe=traces(x=Position("rod"), open=Violation("hinge")),
     )
     times = result.sample_times["x"]
     right = [SHAKE(t) - AHEAD for t in times] + 0.5 * ROD * np.sin(rod_angle(tuple(times)))

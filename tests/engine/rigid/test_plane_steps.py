@@ -17,7 +17,6 @@ from spook_tracker.engine import (
     Box,
     ConstraintForce,
     Energy,
-    Final,
     Hinge,
     Load,
     Lock,
@@ -38,6 +37,7 @@ from spook_tracker.engine.observe import Observable
 from spook_tracker.scalar_tests.multibody import four_bars
 from tests.oracles.rigid import RigidOracle
 from tests.scenes.plane import mechanism
+from tests.scenes.seen import finals, traces
 
 HALF = Method(half_step_velocities=True)
 METHODS = {
@@ -76,11 +76,7 @@ def test_steps_are_those_of_the_dense_oracle(seed: int, loops: int) -> None:
     """Trees of every joint and chains of hinges held at both ends; steps so long that another map would show."""
     rng, h, steps = np.random.default_rng(seed), 0.1, 4
     scene = mechanism(rng, 3, 0) if not loops else mechanism(rng, 4, loops, chain=True, joints=(Hinge,))
-    observe: dict[str, Observable] = {
-        "x": Trace(quantity=Position()),
-        "v": Trace(quantity=Velocity()),
-        "w": Trace(quantity=AngularVelocity()),
-    }
+    observe: dict[str, Observable] = traces(x=Position(), v=Velocity(), w=AngularVelocity())
     for row in scene.constraints:
         observe[f"force {row.name}"] = Trace(quantity=ConstraintForce(row.name))
         observe[f"off {row.name}"] = Trace(quantity=Violation(row.name))
@@ -274,7 +270,7 @@ def test_more_refinements_are_heard() -> None:
     """Of locks as small as a millimetre the sums of one pass keep eleven digits."""
     lock = Lock(name="lock", between=("rod 0", "rod 1"), at=(1.0, 0.0, 0.0))
     scene = replace(rods(2), constraints=(rods(2).constraints[0], lock))
-    observe: dict[str, Observable] = {"x": Final(quantity=Position())}
+    observe: dict[str, Observable] = finals(x=Position())
     ends = [
         simulate(scene, time_step=0.1, steps=20, method=Method(refinements=r), observe=observe)["x"]
         for r in (0, 1, 2)

@@ -21,7 +21,6 @@ from spook_tracker.engine import (
     ConstraintForce,
     Cylindrical,
     Distance,
-    Final,
     Fluid,
     Hinge,
     JointCoordinate,
@@ -40,7 +39,6 @@ from spook_tracker.engine import (
     Scene,
     Spring,
     Table,
-    Trace,
     Universal,
     Velocity,
     simulate,
@@ -49,15 +47,11 @@ from spook_tracker.engine import (
 from tests.engine.rigid.test_joint_trees import floating, hung, rigid
 from tests.scenes import rigid as rigid_scenes
 from tests.scenes.corpus import solid
+from tests.scenes.seen import finals, traces
 
 RK8 = Method(runge_kutta="order8")
 ORDER8 = Method(composition="order8")
-STATE = {
-    "x": Final(quantity=Position()),
-    "q": Final(quantity=Orientation()),
-    "v": Final(quantity=Velocity()),
-    "w": Final(quantity=AngularVelocity()),
-}
+STATE = finals(x=Position(), q=Orientation(), v=Velocity(), w=AngularVelocity())
 
 
 def within(tolerance: float) -> Method:
@@ -150,7 +144,7 @@ def test_a_body_alone_turns_as_euler_has_it() -> None:
 
 def test_what_floats_keeps_its_momentum_as_well_as_its_tolerance_says() -> None:
     pair = dataclasses.replace(floating("ball", "hinge"), gravity=(0.0, 0.0, 0.0))
-    seen = {"turning": Trace(quantity=AngularMomentum())}
+    seen = traces(turning=AngularMomentum())
     for tolerance, kept in ((1e-6, 1e-4), (1e-12, 1e-10)):
         turning = simulate(pair, time_step=0.1, steps=100, method=within(tolerance), observe=seen)["turning"]
         assert np.abs(turning - turning[0]).max() < kept * np.abs(turning).max()
@@ -207,7 +201,7 @@ def test_forces_that_compositions_refuse_are_forces(name: str) -> None:
     if name != "a rest that moves":
         with pytest.raises(MethodError):
             simulate(scene, time_step=0.1, steps=1, method=ORDER8)
-    seen = {"x": Final(quantity=Position("cart")), "v": Final(quantity=Velocity("cart"))}
+    seen = finals(x=Position("cart"), v=Velocity("cart"))
     for step, method in ((0.05, RK8), (1.0, within(1e-12))):
         run = simulate(scene, time_step=step, duration=1.0, method=method, observe=seen)
         assert [float(run["x"][0]), float(run["v"][0])] == pytest.approx(there, abs=1e-10), method
@@ -234,7 +228,7 @@ def test_armature_and_springs_of_joints_either_way_round(backwards: bool) -> Non
         spring=JointSpring(stiffness=12.0, rest=0.5, damping=0.0),
     )  # fmt: skip
     scene = dataclasses.replace(scene, constraints=(scene.constraints[0], hinge))
-    seen = {"f": Trace(quantity=ConstraintForce("elbow")), "a": Trace(quantity=JointCoordinate("elbow"))}
+    seen = traces(f=ConstraintForce("elbow"), a=JointCoordinate("elbow"))
     runs = [
         simulate(scene, time_step=0.005, steps=100, method=method, observe=seen) for method in (RK8, ORDER8)
     ]
@@ -270,7 +264,7 @@ def test_what_rests_takes_a_part_a_step_and_a_load_that_begins_or_jumps_is_follo
     spring = Spring(name="s", between=((0.0, 0.0, 0.0), "a"), stiffness=50.0, rest_length=1.0, viscosity=2.0)
     hung_still = Scene(bodies=(weight,), forces=(spring,), gravity=(0.0, 0.0, -9.81), contacts=False)
     ball = RigidBody(name="p", mass=1.0, inertia=(0.1,) * 3, position=(0.0, 0.0, 0.0))
-    end = {"x": Final(quantity=Position("p"))}
+    end = finals(x=Position("p"))
 
     still = simulate(hung_still, time_step=1 / 60, steps=60, method=within(1e-6))
     assert still.completed and still.counters["newton_iterations"] <= 70
@@ -306,7 +300,7 @@ def test_turns_are_counted_however_long_the_step(step: float) -> None:
     ):
         scene = Scene(bodies=(body,), constraints=(joint,), contacts=False, gravity=(0.0, 0.0, 0.0))
         run = simulate(
-            scene, time_step=step, duration=4.0, method=within(1e-10), observe={"c": Trace(quantity=JointCoordinate("h"))}
+            scene, time_step=step, duration=4.0, method=within(1e-10), observe=traces(c=JointCoordinate("h"))
         )  # fmt: skip
         times = step * np.arange(len(run["c"]))
         assert np.ravel(run["c"]) == pytest.approx(exact(times), abs=2e-6)

@@ -12,7 +12,6 @@ import pytest
 from spook_tracker.engine import (
     WORLD,
     Energy,
-    Final,
     Hinge,
     JointCoordinate,
     JointSpring,
@@ -27,11 +26,11 @@ from spook_tracker.engine import (
     RigidBody,
     Scene,
     Sphere,
-    Trace,
     Violation,
     compile,
     simulate,
 )
+from tests.scenes.seen import finals, traces
 
 SPIN, ARM, SECONDS = 20.0, 0.1, 10.0
 CURVED = Method(corrections=2)
@@ -80,11 +79,7 @@ SCENES = {
 
 def kept(scene: Scene, method: Method, h: float = 1 / 60) -> float:
     run = simulate(
-        scene,
-        time_step=h,
-        duration=SECONDS,
-        method=method,
-        observe={"energy": Trace(quantity=KineticEnergy())},
+        scene, time_step=h, duration=SECONDS, method=method, observe=traces(energy=KineticEnergy())
     )
     assert run.completed
     return float(run["energy"][-1] / run["energy"][0])
@@ -110,7 +105,7 @@ def test_it_turns_as_far_as_its_spin_says(name: str) -> None:
     scene, method, _ = SCENES[name]
 
     def wrong(h: float) -> float:
-        observe = {"angle": Final(quantity=JointCoordinate("axle"))}
+        observe = finals(angle=JointCoordinate("axle"))
         return (
             float(simulate(scene, time_step=h, duration=SECONDS, method=method, observe=observe)["angle"])
             / (SPIN * SECONDS)
@@ -206,7 +201,7 @@ GIVEN = {
 
 @pytest.mark.parametrize("name", GIVEN)
 def test_energy_that_is_given_does_not_come_out_of_nothing(name: str) -> None:
-    observe = {"energy": Trace(quantity=Energy())}
+    observe = traces(energy=Energy())
     run = simulate(GIVEN[name], time_step=1 / 60, duration=1.0, method=CURVED, observe=observe)
 
     assert run.completed

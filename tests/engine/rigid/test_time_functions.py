@@ -26,11 +26,11 @@ from spook_tracker.engine import (
     SceneError,
     Sinusoid,
     Table,
-    Trace,
     Velocity,
     simulate,
     start,
 )
+from tests.scenes.seen import traces
 
 H = 0.01
 WAVE = Sinusoid(amplitude=1.5, frequency=0.7, phase=0.3, offset=-0.2)
@@ -64,9 +64,7 @@ def test_a_load_is_taken_at_the_beginning_of_each_step(name: str, substeps: int)
     still = Load(name="still", body="body", force=(0.0, 0.0, 0.5))
     scene = Scene(bodies=(body,), forces=(push, still), gravity=(0.0, 0.0, -9.81))
     method = Method(substeps=substeps)
-    seen = simulate(
-        scene, time_step=H, steps=150, method=method, observe={"v": Trace(quantity=Velocity("body"))}
-    )["v"]
+    seen = simulate(scene, time_step=H, steps=150, method=method, observe=traces(v=Velocity("body")))["v"]
     h = H / substeps
     kicks = reference(function, h * np.arange(150 * substeps))
     sums = np.concatenate([[0.0], np.cumsum(h * kicks)])[::substeps]
@@ -79,7 +77,7 @@ def test_a_load_is_taken_at_the_beginning_of_each_step(name: str, substeps: int)
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_a_motor_has_the_speed_of_the_end_of_its_step(name: str) -> None:
     function = FUNCTIONS[name]
-    observe = {"v": Trace(quantity=Velocity("block"))}
+    observe = traces(v=Velocity("block"))
     seen = simulate(slider(motor=Motor(speed=function)), time_step=H, steps=150, observe=observe)["v"]
 
     np.testing.assert_allclose(seen[1:, 0], reference(function, H * np.arange(1, 151)), rtol=0, atol=1e-12)
@@ -89,7 +87,7 @@ def test_a_motor_at_mid_step_leads_its_joint_with_order_two() -> None:
     errors = []
     for steps in (100, 200, 400):
         scene = slider(motor=Motor(speed=WAVE))
-        observe = {"x": Trace(quantity=JointCoordinate("rail"))}
+        observe = traces(x=JointCoordinate("rail"))
         seen = simulate(
             scene,
             time_step=1.0 / steps,
@@ -123,9 +121,7 @@ def test_a_spring_follows_its_rest_as_the_averaged_law_says(name: str) -> None:
         x += H * v
         right.append(x)
     scene = slider(spring=JointSpring(stiffness=k, rest=function, damping=tau))
-    seen = simulate(scene, time_step=H, steps=150, observe={"x": Trace(quantity=JointCoordinate("rail"))})[
-        "x"
-    ]
+    seen = simulate(scene, time_step=H, steps=150, observe=traces(x=JointCoordinate("rail")))["x"]
 
     np.testing.assert_allclose(seen, right, rtol=0, atol=1e-11)
 
@@ -137,7 +133,7 @@ def test_a_kinematic_body_goes_as_the_middle_of_each_step_says(name: str) -> Non
         name="floor", motion="kinematic", position=(0.0, 0.0, 0.0), velocity=(0.0, 2.0, 0.0), pace=function
     )
     scene = Scene(bodies=(floor,))
-    seen = simulate(scene, time_step=H, steps=150, observe={"x": Trace(quantity=Position("floor"))})["x"]
+    seen = simulate(scene, time_step=H, steps=150, observe=traces(x=Position("floor")))["x"]
     right = np.concatenate([[0.0], np.cumsum(2.0 * H * reference(function, H * (np.arange(150) + 0.5)))])
 
     np.testing.assert_allclose(seen[:, 1], right, rtol=0, atol=1e-12)
