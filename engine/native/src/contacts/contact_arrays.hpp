@@ -38,24 +38,28 @@ void order_by_key(Items& items, Items& rest, std::vector<std::pair<std::uint64_t
 
 /// A depth [m] by pair of colliders, in one array.
 struct DepthOfPair {
-    using Item = std::pair<std::uint64_t, double>;
+    struct Item {
+        std::uint64_t pair = 0;
+        double depth = 0.0;
+        bool jammed = false;  // nothing parts it where it is
+    };
     using Iterator = std::vector<Item>::const_iterator;
     bool empty() const noexcept { return items.empty(); }
     void clear() noexcept { items.clear(); }
     Iterator end() const noexcept { return items.end(); }
     Iterator find(std::uint64_t pair) const noexcept {
         const auto at = std::lower_bound(items.begin(), items.end(), pair, before);
-        return at != items.end() && at->first == pair ? at : items.end();
+        return at != items.end() && at->pair == pair ? at : items.end();
     }
     bool contains(std::uint64_t pair) const noexcept { return find(pair) != end(); }
-    double at(std::uint64_t pair) const noexcept { return find(pair)->second; }
-    double& operator[](std::uint64_t pair) {
+    double at(std::uint64_t pair) const noexcept { return find(pair)->depth; }
+    Item& operator[](std::uint64_t pair) {
         auto at = std::lower_bound(items.begin(), items.end(), pair, before);
-        if (at == items.end() || at->first != pair) at = items.insert(at, {pair, 0.0});
-        return at->second;
+        if (at == items.end() || at->pair != pair) at = items.insert(at, {pair});
+        return *at;
     }
 
-    static bool before(const Item& item, std::uint64_t pair) noexcept { return item.first < pair; }
+    static bool before(const Item& item, std::uint64_t pair) noexcept { return item.pair < pair; }
     std::vector<Item> items;  // in order of pairs
 };
 

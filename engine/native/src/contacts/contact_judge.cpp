@@ -178,7 +178,7 @@ void blame_sunk(SolveQuality& quality, const JudgedStep& step) {
         if (point.toi >= 0.0 || point.before < 0.0) continue;
         const auto given = step.initial_penetration.find(pair_of(point.contact));
         const double known =
-            elastic_depth(bodies, point) + (given == step.initial_penetration.end() ? 0.0 : given->second);
+            elastic_depth(bodies, point) + (given == step.initial_penetration.end() ? 0.0 : given->depth);
         const double share = (-point.contact.point.gap - known) / bodies.moving_size(point.contact);
         if (!(share > worst)) continue;
         worst = share;

@@ -18,7 +18,7 @@ void note_initial_penetrations(const ContactModel& model, const ContactPoints& p
     for (const StepContact& point : points.all) {
         const double excess = -point.contact.point.gap - elastic_depth(model.bodies, point);
         if (!(excess > 0.0)) continue;
-        double& given = state.initial_penetration[pair_of(point.contact)];
+        double& given = state.initial_penetration[pair_of(point.contact)].depth;
         given = std::max(given, excess);
     }
 }
@@ -215,6 +215,10 @@ const PositionProjection* ContactStage::project_positions(const MixedSystem& sys
                       search_.margins().search(), state_.cache,  state_.initial_penetration};
     return projector_.project({system, joints, pgs_.solver()}, end, motion_.drive, again,
                               state_.initial_penetration, state_.counters, search_.woken);
+}
+
+bool ContactStage::parts_first_overlaps(int island, double share, const std::vector<Pose>& poses) {
+    return projector_.parts(island, share, poses, search_.detection, state_.initial_penetration);
 }
 
 void ContactStage::apply_balancing_impulse(const Islands& islands, int island, Vec3 momentum) noexcept {

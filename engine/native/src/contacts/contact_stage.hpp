@@ -108,6 +108,8 @@ public:
     /// `system` is that of solve(), with `joints` rows of joints. To be asked `again` when bodies are displaced.
     const PositionProjection* project_positions(const MixedSystem& system, std::size_t joints,
                                                 const std::vector<Pose>& poses, bool again);
+    /// Whether an island's first overlaps have parted where its bodies have been displaced to; PositionProjector::parts().
+    bool parts_first_overlaps(int island, double share, const std::vector<Pose>& poses);
 
     /// Books the momentum [N s] that an island of a projection lost when it paid for its displacement as an impulse at the first
     /// pushing contact with what does not move by itself, so that forces add up to the momentum, if not moments to the angular one.

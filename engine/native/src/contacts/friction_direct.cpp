@@ -410,6 +410,8 @@ bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, Fr
 /// over contacts alone, in turns with more iterations each from the best so far, which is the answer. Newton's method on the
 /// whole, which knows no friction of turning and costs a factor of all bodies an iteration, shares loads of redundant points
 /// evenly: it comes before where these are many, and no few for so many bodies, else after the first turn, from the start.
+/// Joints that are led back against a jam ask for what no impulse gives: where the first turn does not settle and one with them as far
+/// open as they are does, they stay so for the step.
 /// `kept`: work() has a copy of the system already.
 void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points, DirectSolver& direct,
                          bool kept, FrictionReport& report) {
@@ -433,11 +435,11 @@ void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points
         report.rounds += found.iterations;
         take(found.residual);
     };
-    const auto reduced = [&](int turn) {
+    const auto reduced = [&](int turn, double most = unbounded) {
         const ReducedContacts::Report found =
             direct.reduced.solve(system, points, first_iterations << (2 * turn));
         report.rounds += found.newton_steps, report.pgs_iterations += found.iterations;
-        take(found.residual);
+        take(found.residual <= most ? found.residual : unbounded);
     };
     const bool newton = is_for_newton(system, points, FrictionModel::cone);
     const bool redundant = newton && is_redundant(system);
@@ -450,6 +452,7 @@ void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points
     const double enough = points.size() < few_points ? fair : near;
     for (int turn = 0; turn < turns && !(report.residual <= (turn == 0 ? fair : enough)); ++turn) {
         reduced(turn);
+        if (turn == 0 && !(report.residual <= near)) ReducedContacts::leave_open(system), reduced(0, near);
         if (later && turn == 0 && !(report.residual <= (redundant ? fair : near)))
             system = start, by_newton();
     }

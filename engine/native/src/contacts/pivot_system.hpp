@@ -58,7 +58,8 @@ struct RowBlock {
     Vec6 multiplier{};  // z: the start of an iteration, then the result
     std::array<RowState, 6> state{};
     bool is_contact =
-        false;  // rows after the normal are friction: the law bounds them, whatever is said here
+        false;           // rows after the normal are friction: the law bounds them, whatever is said here
+    bool leads = false;  // its right sides lead back to where the rows hold, which may wait for a step
     StopRow stop;
     int rotor =
         -1;  // the row of a geared rotor: its softness is that of an inertia, its right side a speed, in impacts too

@@ -21,7 +21,8 @@ PositionProjector::PositionProjector(std::shared_ptr<const ContactModel> model, 
 }
 
 void PositionProjector::begin_step() {
-    for (std::vector<char>* flags : {&projection_.grounded, &projection_.externally_driven, &far_islands_})
+    for (std::vector<char>* flags :
+         {&projection_.grounded, &projection_.externally_driven, &projection_.first_overlaps, &far_islands_})
         flags->reserve(model_->bodies.count());
     for (std::vector<double>* depths : {&projection_.overlap, &projection_.overlap_before})
         depths->reserve(model_->bodies.count());
@@ -73,13 +74,17 @@ void PositionProjector::update_initial_penetrations(const ContactCache& cache,
     for (const CachedContact& cached : cache.sleeping)
         if (const auto given = initial_penetration.find(pair_of(cached.contact));
             given != initial_penetration.end())
-            left_[given->first] = given->second;
+            left_[given->pair] = *given;
     for (const PenetrationRecord& record : search_.records) {
         const auto given = initial_penetration.find(pair_of(record.contact));
         if (!(record.depth > 0.0) || given == initial_penetration.end()) continue;
-        double& depth = left_[given->first];
-        depth = std::max(depth, std::min(record.depth, given->second));
+        double& depth = left_[given->pair].depth;
+        depth = std::max(depth, std::min(record.depth, given->depth));
     }
+    for (DepthOfPair::Item& left : left_.items)
+        if (const auto given = initial_penetration.find(left.pair);
+            given->jammed && left.depth > still_jammed * given->depth)
+            left = *given;
     initial_penetration = left_;
 }
 
@@ -161,8 +166,37 @@ double PositionProjector::separation_speed(const PenetrationRecord& record, cons
     const double h = model_->options.time_step, excess = record.depth;
     const auto given = initial.find(pair_of(record.contact));
     if (again || !(excess > 0.0) || given == initial.end()) return excess / h;
-    const double slow = std::min(excess, given->second);
-    return regularise(0.0, record.damping, h).violation_gain * slow + (excess - slow) / h;
+    const double slow = std::min(excess, given->depth);
+    const double gain = given->jammed ? 0.0 : regularise(0.0, record.damping, h).violation_gain;
+    return gain * slow + (excess - slow) / h;
+}
+
+/// Whether an overlap is one that the run began with, no deeper, and is pushed: something may do work on it.
+bool PositionProjector::is_pushed_first(const PenetrationRecord& record, const DepthOfPair& initial) const {
+    const auto given = initial.find(pair_of(record.contact));
+    return record.depth > 0.0 && given != initial.end() && !given->jammed &&
+           record.depth <= given->depth + model_->bodies.slack(record.contact);
+}
+
+bool PositionProjector::parts(int island, double share, const std::vector<Pose>& poses,
+                              const Detection& detection, DepthOfPair& initial) {
+    bool all = true;
+    for (const PenetrationRecord& record : search_.records) {
+        if (projection_.islands.of_body[model_->bodies.solver_body(record.contact)] != island) continue;
+        if (!is_pushed_first(record, initial)) continue;
+        const std::uint64_t key = pair_of(record.contact);
+        met_.clear();
+        detection.collide_pair({static_cast<int>(key >> 24), static_cast<int>(key & 0xffffff)},
+                               poses[record.contact.first], poses[record.contact.second], 0.0, met_);
+        const double way = share * model_->options.time_step * separation_speed(record, initial, false);
+        const bool parts = std::all_of(met_.begin(), met_.end(), [&](const Contact& contact) {
+            return contact.key != record.contact.key ||
+                   contact.point.gap >= record.contact.point.gap + least_parted * way;
+        });
+        initial[key].jammed = !parts;
+        all = all && parts;
+    }
+    return all;
 }
 
 /// Which bodies are to be seen as one: contacts that pushed aside are known; contacts that push, whose laws a turn of some of
@@ -180,6 +214,7 @@ void PositionProjector::note_projected(const StepEnd& end, const ExternalDrive& 
             projection_.grounded[projection_.islands.of_body[body]] = 1;
     }
     projection_.externally_driven.assign(projection_.islands.count, 0);
+    projection_.first_overlaps.assign(projection_.islands.count, 0);
     projection_.overlap.assign(projection_.islands.count, 0.0);
     projection_.overlap_before.assign(projection_.islands.count, 0.0);
     const auto island = [this](const Contact& contact) {
@@ -194,7 +229,8 @@ void PositionProjector::note_projected(const StepEnd& end, const ExternalDrive& 
     for (const PenetrationRecord& record : search_.records) {
         const int k = island(record.contact);
         if (!(record.depth > 0.0) || k < 0) continue;
-        if (end.initial_penetration.contains(pair_of(record.contact))) projection_.externally_driven[k] = 1;
+        if (is_pushed_first(record, end.initial_penetration))
+            projection_.externally_driven[k] = projection_.first_overlaps[k] = 1;
         projection_.overlap[k] = std::max(projection_.overlap[k], record.depth);
     }
 }

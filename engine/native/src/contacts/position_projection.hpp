@@ -21,6 +21,7 @@ struct PositionProjection {
     Islands islands;                      // of bodies that push each other, or are connected by joints
     std::vector<char> grounded;           // per island: something that does not move by itself took part
     std::vector<char> externally_driven;  // per island: what moves it, or a first overlap, may do work on it
+    std::vector<char> first_overlaps;     // per island: it is to part some of those that the run began with
     std::vector<double> overlap,
         overlap_before;  // per island: deepest where the step ends, and began, m
 };
@@ -45,6 +46,11 @@ public:
                                       bool again, DepthOfPair& initial_penetration, ContactCounters& counters,
                                       std::vector<int>& woken);
 
+    /// Whether bodies of an island at `poses`, displaced by a share of what was asked, have parted as far as first overlaps were to:
+    /// what has not is jammed, between joints, and left alone until it is moved.
+    bool parts(int island, double share, const std::vector<Pose>& poses, const Detection& detection,
+               DepthOfPair& initial);
+
     IslandSolver& solver() noexcept { return solver_; }
     const IslandSolver& solver() const noexcept { return solver_; }
 
@@ -53,6 +59,7 @@ private:
     double compliance_of(const Contact& contact) const noexcept;
     void hold_joints(MixedSystem& projection, double least);
     double separation_speed(const PenetrationRecord& record, const DepthOfPair& given, bool again) const;
+    bool is_pushed_first(const PenetrationRecord& record, const DepthOfPair& initial) const;
     bool project_directly(const DepthOfPair& given, bool again, ContactCounters& counters);
     bool project_by_pgs(const PgsSolver& beside, const DepthOfPair& given, bool again,
                         ContactCounters& counters);
@@ -82,6 +89,7 @@ private:
     std::vector<char> answered_, far_islands_;
     std::vector<std::pair<std::uint64_t, std::size_t>> places_, projected_places_;  // of points, by key
     DepthOfPair left_;
+    std::vector<Contact> met_;
 };
 
 }  // namespace spook

@@ -50,6 +50,13 @@ bool ReducedContacts::takes(const MixedSystem& system, const std::vector<Frictio
     return reduces && bounded > 0 && bounded <= most_bounded_rows && (turning || touching <= most_rows);
 }
 
+void ReducedContacts::leave_open(MixedSystem& system) noexcept {
+    for (RowBlock& block : system.rows) {
+        block.multiplier = {};
+        if (block.leads) block.right = {};
+    }
+}
+
 void ReducedContacts::analyse(const MixedSystem& system) {
     std::vector<Pattern> pattern;
     std::vector<std::pair<int, int>> further;

@@ -40,6 +40,9 @@ public:
     /// Whether the system has joints to eliminate, or friction of turning, and few enough rows between bounds.
     static bool takes(const MixedSystem& system, const std::vector<FrictionPoint>& points);
 
+    /// Joints that are led back stay as far open as they are; impulses met so far, which a jam multiplies, are forgotten.
+    static void leave_open(MixedSystem& system) noexcept;
+
     /// Starts from the multipliers of bounded rows in `system`; fills velocities and all multipliers. Points obey the cone.
     /// `iterations`: between tries of Newton's method.
     Report solve(MixedSystem& system, const std::vector<FrictionPoint>& points, int iterations);

@@ -187,6 +187,8 @@ inline constexpr double min_joint_compliance =
 inline constexpr double parted = 0.01;           // of the slack: what a projection leaves is rounding
 inline constexpr double over_relaxation = 1.25;  // of PGS that separates balls, not boxes
 inline constexpr double same_place = 0.1;        // of the larger body's radius: one point, seen again
+inline constexpr double least_parted = 0.1;      // of what a first overlap was to part: less is none
+inline constexpr double still_jammed = 0.9;      // of its depth when it did not: less is another place
 }  // namespace tolerances::position_projection
 
 // reduced_contacts.cpp

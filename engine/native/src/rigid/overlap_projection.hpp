@@ -25,6 +25,7 @@ private:
     bool sleeps(const std::vector<int>& members) const;
     double affordable_share(int island) const;
     bool project_island(int island, double share);
+    bool parts_first_overlaps(int island, double share);
     bool take_back(int island);
     bool keep_energy(int island);
     double hold_row(int k, int row, double now, RowBlock& block) const;

@@ -209,11 +209,26 @@ void OverlapProjection::project_bodies() {
         const double left = (1.0 - share) * projection_->overlap[island];
         if (left > projection_->overlap_before[island] && take_back(island)) continue;
         for (int halving = 0; halving < most_halvings; ++halving) {
-            if (project_island(island, std::ldexp(share, -halving))) break;
+            const double tried = std::ldexp(share, -halving);
+            const bool moved = project_island(island, tried);
+            if (moved && parts_first_overlaps(island, tried)) break;
             for (const int k : scratch_.island_members[island])
                 live_.bodies[model_.constrained[k]] = scratch_.before_projection[model_.constrained[k]];
+            if (moved) break;  // jammed, which no part of the way is to be tried for
         }
     }
+}
+
+/// Whether an island's overlaps that the run began with are less for its displacement: where joints jam them they are not, and
+/// would be pushed at, and give energy, for ever.
+bool OverlapProjection::parts_first_overlaps(int island, double share) {
+    if (projection_->first_overlaps[island] == 0) return true;
+    for (const int k : scratch_.island_members[island]) {
+        const int i = model_.constrained[k];
+        scratch_.end_poses[i] = {model_.position(i, live_.bodies),
+                                 axes(model_.constants[i], live_.bodies[i])};
+    }
+    return mixed_.contacts()->parts_first_overlaps(island, share, scratch_.end_poses);
 }
 
 bool OverlapProjection::project_island(int island, double share) {

@@ -426,6 +426,7 @@ void MixedRows::fill_rows(bool solved) {
             numbers.right[i] -=
                 scratch_.left_open[k] ? 0.0 : curvature_.taken(at + static_cast<std::size_t>(i));
         if (const int i = rows.rotor; i >= 0) numbers.right[i] -= rows.softness[i] * scratch_.impulses[k][i];
+        rows.leads = joints_.always_holds(blocks[k]) && !is_driven(blocks[k]);
         rows.right = numbers.right;
         rows.lower = numbers.lower;
         rows.upper = numbers.upper;
