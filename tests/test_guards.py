@@ -216,7 +216,8 @@ def test_help_is_quick_because_it_imports_nothing_heavy() -> None:
     )
 
     assert done.returncode == 0
-    for heavy in ("numpy", "pandas", "scipy", "sqlalchemy", "plotly", "rich", "jinja2", "engine"):
+    assert re.search(r"\| +click\b", done.stderr)
+    for heavy in ("numpy", "pandas", "scipy", "sqlalchemy", "plotly", "rich", "jinja2", "msgspec", "engine"):
         assert not re.search(rf"\| +(spook_tracker\.)?{heavy}\b", done.stderr), heavy
 
 

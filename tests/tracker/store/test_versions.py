@@ -23,23 +23,15 @@ def commit(git_hash, **changes):
 
 def runs_of(*versions) -> list[RunInfo]:
     """A run of each version, in this order in time and in the order of commits."""
+    gates = [int(version.name not in SHOWN) for version in versions]
     return [
         RunInfo(
-            id=f"{number:08x}-0000-7000-8000-000000000000",
-            started="",
-            finished="",
-            trigger="test",
-            engine=version,
-            machine=machine(),
-            tracker_version="",
-            ci_address="",
-            key=number,
+            id=f"{number:08x}-0000-7000-8000-000000000000", started="", finished="", trigger="test", engine=version,
+            machine=machine(), tracker_version="", ci_address="", key=number, gates=asked, gates_passed=asked,
             started_at=datetime(2026, 11, 21, tzinfo=UTC) + timedelta(days=number),
-            gates=int(version.name not in SHOWN),
-            gates_passed=int(version.name not in SHOWN),
         )
-        for number, version in enumerate(versions, start=1)
-    ]
+        for number, (version, asked) in enumerate(zip(versions, gates, strict=True), start=1)
+    ]  # fmt: skip
 
 
 def found(runs: Sequence[RunInfo], name: str, **commits: str) -> RunInfo:
@@ -47,77 +39,76 @@ def found(runs: Sequence[RunInfo], name: str, **commits: str) -> RunInfo:
     return resolve(runs, name, commits.get)
 
 
-@pytest.fixture
-def three() -> list[RunInfo]:
-    return runs_of(commit(A), commit(B), commit(C))
+def other(name: str, version: str = "3.0", git_hash: str = ""):
+    return commit(git_hash, name=name, version=version)
 
 
-@pytest.mark.parametrize(
-    ("name", "expected"),
-    [
-        ("latest", C), ("previous", B), ("last-green", C),
-        ("1.0.dev2", B), ("1a1a", A), (A, A), ("2B2B2B", B),
-        ("spook@1.0.dev1", A), ("spook@latest", C),
-    ],
-)  # fmt: skip
-def test_names_of_a_version(three, name, expected):
-    assert found(three, name).engine.git_hash == expected
-
-
-def test_a_run_is_named_by_its_id_or_the_start_of_it(three):
-    first = three[0]
-
-    assert found(three, first.id) == first
-    assert found(three, first.id[:12]) == first
-
-
-@pytest.mark.parametrize(
-    "name", ["nothing", "", "1a", "--help", "a\0b", "deadbeef", "unreal@latest", "💥" * 500]
+THREE = commit(A), commit(B), commit(C)
+DIRTY, ONLY, PEERS = (
+    commit(A, dirty=True),
+    commit(A),
+    [other("zeta", "1", A), other("alpha", "1", B), other("zeta", "1", C)],
 )
-def test_an_unknown_name_says_so_and_names_what_there_is(three, name):
-    with pytest.raises(UnknownName, match=r"no run of a(n engine| version)") as caught:
-        found(three, name)
+MIXED = other("spook", git_hash=A), other("mujoco"), other("rapier", "0.3")
+STANDS_FOR = [  # versions in the order of time, a name, and the place of the one it stands for
+    (THREE, "latest", 2), (THREE, "previous", 1), (THREE, "last-green", 2), (THREE, "1.0.dev2", 1), (THREE, "1a1a", 0),
+    (THREE, A, 0), (THREE, "2B2B2B", 1), (THREE, "spook@1.0.dev1", 0), (THREE, "spook@latest", 2),
+    (THREE, "00000001-0000-7000-8000-000000000000", 0), (THREE, "00000001-000", 0),
+    # our own engine, unless another is named; words are of one engine
+    (MIXED, "latest", 0), (MIXED, "3.0", 0), (MIXED, "spook@3.0", 0), (MIXED, "mujoco@3.0", 1), (MIXED, "0.3", 2), (PEERS, "previous", 0),
+    ([commit(C), *PEERS[:2]], "latest", 0),
+    # without commits they follow in time
+    ([other("mujoco", v) for v in ("3.1", "3.2", "3.3")], "mujoco@latest", 2),
+    ([other("mujoco", v) for v in ("3.1", "3.2", "3.3")], "mujoco@previous", 1),
+    # of several runs the last clean one; a build with local changes is the latest until something else has run
+    ([ONLY, ONLY, DIRTY], A, 1), ([ONLY, DIRTY], "latest", 1), ([ONLY, DIRTY], "previous", 0),
+]  # fmt: skip
+STANDS_FOR_NOTHING = [
+    *((THREE, name, r"no run of a(n engine| version)") for name in ("nothing", "", "1a", "--help", "a\0b", "deadbeef", "unreal@latest", "💥" * 500, "un" * 200 + "@latest")),
+    (THREE, "1.0.dev9", r"did you mean 1\.0\.dev"),
+    ([commit("abcd1" + "0" * 35), commit("abcd2" + "0" * 35)], "abcd", "could be abcd10000000, abcd20000000"),
+    ([], "latest", "no runs are stored yet; record one with: tracker run"),
+    ([ONLY], "previous", "there is only one run, and so no previous one"), ([commit(C), *PEERS[:2]], "previous", "only one run"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("versions", "name", "place"), STANDS_FOR)
+def test_a_name_stands_for_a_run(versions, name, place):
+    runs = runs_of(*versions)
+
+    assert found(runs, name) == runs[place]
+
+
+@pytest.mark.parametrize(("versions", "name", "words"), STANDS_FOR_NOTHING)
+def test_a_name_of_none_says_so_and_names_what_there_is(versions, name, words):
+    with pytest.raises(UnknownName, match=words) as caught:
+        found(runs_of(*versions), name)
 
     assert caught.value.exit_code == 2
-    assert caught.value.near
     assert len(str(caught.value)) < 300
+    assert caught.value.near or "no run of" not in words
 
 
-def test_a_typing_error_is_answered_with_the_version_meant(three):
-    with pytest.raises(UnknownName, match=r"did you mean 1\.0\.dev"):
-        found(three, "1.0.dev9")
+def test_runs_of_local_changes_stand_behind_those_of_commits_however_old_they_are():
+    dirty, first, last = runs_of(DIRTY, commit(A), commit(B))
+
+    assert found([first, last, dirty], "latest") == last
+    assert found([first, last, dirty], "previous") == first
+    with pytest.raises(UnknownName, match=r"'v9'; the newest is 1\.0\.dev2"):
+        found([last, dirty], "v9")
 
 
-def test_an_ambiguous_hash_is_refused():
-    runs = runs_of(commit("abcd1" + "0" * 35), commit("abcd2" + "0" * 35))
-
-    with pytest.raises(UnknownName, match="could be abcd10000000, abcd20000000"):
-        found(runs, "abcd")
-
-
-def test_our_own_engine_is_meant_unless_another_is_named():
-    runs = runs_of(
-        commit(A, version="3.0"),
-        commit("", name="mujoco", version="3.0"),
-        commit("", name="rapier", version="0.3"),
-    )
-
-    assert found(runs, "latest").engine.name == "spook"
-    assert found(runs, "3.0").engine.name == "spook"
-    assert found(runs, "mujoco@3.0").engine.name == "mujoco"
-    assert found(runs, "0.3").engine.name == "rapier"
+def test_git_is_asked_last():
+    assert found(runs_of(*THREE), "release", release=B).engine.git_hash == B
+    assert found(runs_of(*THREE), "1.0.dev1", **{"1.0.dev1": C}).engine.git_hash == A
 
 
 def test_an_engine_that_is_only_shown_never_takes_our_place() -> None:
     """Asked after the night, without gates: commands and website still tell of the engine that has them."""
-    ours, theirs, imported = runs_of(
+    ours, theirs, brought = runs_of(
         commit(A, name="pebble"), commit("", name="mujoco"), commit(B, name="bullet")
     )
-    runs = [
-        replace(ours, gates=3),
-        replace(theirs, gates=0),
-        replace(imported, gates=5, trigger="import"),
-    ]
+    runs = [replace(ours, gates=3), replace(theirs, gates=0), replace(brought, gates=5, trigger="import")]
 
     assert found(runs, "latest").engine.name == "pebble"
     assert [line[0].engine.name for line in lines(runs)] == ["pebble", "mujoco", "bullet"]
@@ -125,61 +116,6 @@ def test_an_engine_that_is_only_shown_never_takes_our_place() -> None:
     assert found([replace(runs[1], gates=1), *runs[:1]], "latest").engine.name == "mujoco", (
         "gating, and newer"
     )
-
-
-def test_the_newest_version_that_a_refusal_names_is_the_latest():
-    """Runs of local changes stand behind those of commits, however old they are."""
-    dirty, clean = runs_of(commit(A, dirty=True), commit(B))
-
-    with pytest.raises(UnknownName, match=r"'v9'; the newest is 1\.0\.dev2"):
-        found([clean, dirty], "v9")
-
-
-def test_a_dirty_build_is_the_latest_until_something_else_has_run():
-    runs = runs_of(commit(A), commit(A, dirty=True))
-    assert found(runs, "latest").engine.dirty
-    assert not found(runs, "previous").engine.dirty
-
-    first, dirty, last = runs_of(commit(A), commit(A, dirty=True), commit(B))
-    assert found([first, last, dirty], "latest") == last  # dirty builds come last in the commit order
-    assert found([first, last, dirty], "previous") == first
-
-
-def test_an_engine_without_commits_has_a_latest_and_a_previous_run():
-    runs = runs_of(*(commit("", name="mujoco", version=version) for version in ("3.1", "3.2", "3.3")))
-
-    assert found(runs, "mujoco@latest").engine.version == "3.3"
-    assert found(runs, "mujoco@previous").engine.version == "3.2"
-
-
-def test_no_runs_at_all_are_explained():
-    with pytest.raises(UnknownName, match="no runs are stored yet; record one with: tracker run"):
-        found([], "latest")
-
-
-def test_one_run_has_no_previous_one():
-    with pytest.raises(UnknownName, match="there is only one run, and so no previous one"):
-        found(runs_of(commit(A)), "previous")
-
-
-def test_git_is_asked_last(three):
-    assert found(three, "release", release=B).engine.git_hash == B
-    assert found(three, "1.0.dev1", **{"1.0.dev1": C}).engine.git_hash == A
-
-
-def test_of_several_runs_of_a_version_the_last_clean_one_is_meant():
-    runs = runs_of(commit(A), commit(A), commit(A, dirty=True))
-
-    assert found(runs, A) == runs[1]
-
-
-def test_words_are_of_one_engine():
-    peers = [commit(A, name="zeta"), commit(B, name="alpha"), commit(C, name="zeta")]
-
-    assert found(runs_of(*peers), "previous").engine.git_hash == A
-    assert found(runs_of(commit(C), *peers[:2]), "latest").engine.git_hash == C
-    with pytest.raises(UnknownName, match="only one run"):
-        found(runs_of(commit(C), *peers[:2]), "previous")
 
 
 def test_an_imported_engine_is_not_the_one_a_word_means_while_another_was_measured():
