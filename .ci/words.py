@@ -20,6 +20,7 @@ RETIRED = {
     r"[Bb]lows?|\w+_blows?\w*": "impact",
     r"[Ss]eams?|\w+_seams?\w*": "internal edge",
     r"[Pp]artings?|\w+_parting\w*": "position projection; rate of separation",
+    r"Parting[A-Z]\w*|parting_\w+": "separating axis",
     r"[Ll]aps?|laps?_": "penetration record",
     r"[Rr]ous(e|es|ed|ing)": "wake",
     r"keeps?_off|let_pass|let past": "occludes; skipped",

@@ -129,7 +129,7 @@ double most_along(double value, double slope, SineCosine turn) noexcept {
 template <class Gap> struct Search {
     Gap gap;
     const Triangle* sheet = nullptr;
-    PartingAxes found{};
+    SeparatingAxes found{};
 
     void flat(Vec3 n) noexcept { improve(found.flat, n, -1); }
     void curved(Vec3 n, int edge = -1) noexcept { improve(found.curved, n, edge); }
@@ -137,7 +137,7 @@ template <class Gap> struct Search {
     double least() const noexcept { return std::max(found.flat.gap, found.curved.gap); }
 
 private:
-    void improve(PartingAxis& best, Vec3 n, int edge) noexcept {
+    void improve(SeparatingAxis& best, Vec3 n, int edge) noexcept {
         const double along = gap(n);
         if (along > found.all.gap) found.all = {along, n, edge};
         if (along > best.gap && (!sheet || sheet->genuine(-n))) best = {along, n, edge};
@@ -419,8 +419,8 @@ double Facets::lowest(Vec3 n) const noexcept {
     return least;
 }
 
-PartingAxes parting_axes(const Frustum& frustum, const Facets& other, double margin,
-                         const Triangle* sheet) noexcept {
+SeparatingAxes separating_axes(const Frustum& frustum, const Facets& other, double margin,
+                               const Triangle* sheet) noexcept {
     Search search{[&](Vec3 n) noexcept { return other.lowest(n) - frustum.reach(n) - other.radius; }, sheet};
     search.flat(frustum.axis);
     search.flat(-frustum.axis);
@@ -437,7 +437,7 @@ PartingAxes parting_axes(const Frustum& frustum, const Facets& other, double mar
     return search.found;
 }
 
-PartingAxes parting_axes(const Frustum& one, const Frustum& two, double margin) noexcept {
+SeparatingAxes separating_axes(const Frustum& one, const Frustum& two, double margin) noexcept {
     Search search{[&](Vec3 n) noexcept { return -two.reach(-n) - one.reach(n); }};
     for (const double side : {1.0, -1.0}) {
         search.flat(side * one.axis);

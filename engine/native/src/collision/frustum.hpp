@@ -50,7 +50,7 @@ struct Triangle;
 
 /// A direction in which two shapes may part, from the frustum to the other; the gap along it is a lower bound of their
 /// distance, and the largest over all directions is that distance, or minus the least overlap.
-struct PartingAxis {
+struct SeparatingAxis {
     double gap = -1e300;  // m
     Vec3 normal;
     int edge = -1;  // of the other, where one is met
@@ -59,13 +59,13 @@ struct PartingAxis {
 /// The best axis normal to something flat, and the best of all others: normals of the side at a corner, an edge or
 /// another side, and of rims with corners, edges, sides and rims. The maximum over all directions is among them, as it
 /// is a stationary point of the gap that some pair of features gives. Stops where one exceeds `margin` [m].
-struct PartingAxes {
-    PartingAxis flat, curved, all;
-    const PartingAxis& best() const noexcept { return curved.gap > flat.gap ? curved : flat; }
+struct SeparatingAxes {
+    SeparatingAxis flat, curved, all;
+    const SeparatingAxis& best() const noexcept { return curved.gap > flat.gap ? curved : flat; }
 };
 /// Of a triangle only its genuine axes count for `flat` and `curved`; `all` holds the best of any kind.
-PartingAxes parting_axes(const Frustum& frustum, const Facets& other, double margin,
-                         const Triangle* sheet = nullptr) noexcept;
-PartingAxes parting_axes(const Frustum& frustum, const Frustum& other, double margin) noexcept;
+SeparatingAxes separating_axes(const Frustum& frustum, const Facets& other, double margin,
+                               const Triangle* sheet = nullptr) noexcept;
+SeparatingAxes separating_axes(const Frustum& frustum, const Frustum& other, double margin) noexcept;
 
 }  // namespace spook

@@ -14,11 +14,11 @@ constexpr std::uint32_t beside = 128;  // features beyond those of an overlay
 template <class Other, class Facing, class Line>
 Manifold meet(const Frustum& frustum, const Other& other, double radius, double thickness, double margin,
               Facing facing_of, Line line_of) noexcept {
-    const PartingAxes axes = parting_axes(frustum, other, margin);
+    const SeparatingAxes axes = separating_axes(frustum, other, margin);
     if (axes.best().gap > margin) return {};
     const double smallest = std::min(frustum.thickness, thickness), slop = overlay_slop * smallest;
     const double tie = prefer_flat * smallest;
-    const auto lines_along = [&](const PartingAxis& axis) noexcept {
+    const auto lines_along = [&](const SeparatingAxis& axis) noexcept {
         const Segment theirs = line_of(axis, slop);
         Manifold met =
             lines(farthest_line(frustum, axis.normal, slop), theirs, axis.normal, axis.gap, radius, margin);
@@ -29,7 +29,7 @@ Manifold meet(const Frustum& frustum, const Other& other, double radius, double 
         return met;
     };
     if (axes.curved.gap <= axes.flat.gap + tie) {
-        const PartingAxis& axis = axes.flat;
+        const SeparatingAxis& axis = axes.flat;
         const Patch theirs = facing_of(axis.normal);
         const Patch ours = facing(frustum, axis.normal, theirs.normal);
         double least;
@@ -77,7 +77,7 @@ Manifold facets_frustum(const Primitive& facets, const Pose& at, const Primitive
     return meet(
         Frustum(frustum, at_frustum), other, other.radius, other.thickness, margin,
         [&](Vec3 n) { return facing(other, -n); },
-        [&](const PartingAxis& axis, double slop) {
+        [&](const SeparatingAxis& axis, double slop) {
             return lowest_line(other, axis.normal, axis.edge, slop);
         });
 }
@@ -91,7 +91,7 @@ Manifold frustum_frustum(const Primitive& first, const Pose& at_first, const Pri
             const Patch plain = facing(one, n, {});
             return facing(two, -n, plain.normal);
         },
-        [&](const PartingAxis& axis, double slop) { return farthest_line(two, -axis.normal, slop); }));
+        [&](const SeparatingAxis& axis, double slop) { return farthest_line(two, -axis.normal, slop); }));
 }
 
 }  // namespace spook

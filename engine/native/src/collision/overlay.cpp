@@ -66,7 +66,7 @@ constexpr std::uint32_t side_feature(int k) noexcept {
 
 class Overlay {
 public:
-    Overlay(const Patch& first, const Patch& second, const PartingAxis& axis, double radius, double margin,
+    Overlay(const Patch& first, const Patch& second, const SeparatingAxis& axis, double radius, double margin,
             double slop) noexcept
         : first_(first),
           second_(second),
@@ -201,7 +201,7 @@ private:
 
 }  // namespace
 
-Manifold overlay(const Patch& first, const Patch& second, const PartingAxis& axis, double radius,
+Manifold overlay(const Patch& first, const Patch& second, const SeparatingAxis& axis, double radius,
                  double margin, double slop, double& least) noexcept {
     const Overlay found(first, second, axis, radius, margin, slop);
     least = found.least;

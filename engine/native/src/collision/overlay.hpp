@@ -27,7 +27,7 @@ Patch facing(const Facets& facets, Vec3 n) noexcept;
 
 /// Points of both patches that lie before each other along the axis (from first to second), with the gaps there.
 /// `radius` is that of the second, `least` the least of the gaps.
-Manifold overlay(const Patch& first, const Patch& second, const PartingAxis& axis, double radius,
+Manifold overlay(const Patch& first, const Patch& second, const SeparatingAxis& axis, double radius,
                  double margin, double slop, double& least) noexcept;
 
 /// The line or the point of a shape that is farthest along `n`, or lowest: the edge that is named, if any.

@@ -138,19 +138,20 @@ Separation separation(const Primitive& first, const Pose& at_first, const Primit
     if (second.kind == ShapeKind::triangle) {
         if (first.kind == ShapeKind::plane) return {1e300, {0.0, 0.0, 1.0}};  // both are fixed
         if (first.has_rims()) {  // from the first, and of neighbours nothing is asked
-            const PartingAxis best =
-                parting_axes(Frustum(first, at_first), Facets(second, at_second), far).all;
+            const SeparatingAxis best =
+                separating_axes(Frustum(first, at_first), Facets(second, at_second), far).all;
             return {best.gap, -best.normal};
         }
-        const PartingAxis best = parting_axes(Triangle(second, at_second), Facets(first, at_first), far).all;
+        const SeparatingAxis best =
+            separating_axes(Triangle(second, at_second), Facets(first, at_first), far).all;
         return {best.gap, best.normal};
     }
     if (second.kind == ShapeKind::plane) return from_plane(first, at_first, second, at_second);
     if (second.has_rims() && !(first.kind == ShapeKind::sphere && second.kind == ShapeKind::cylinder)) {
         const Frustum frustum(second, at_second);
-        const PartingAxis best = first.has_rims()
-                                     ? parting_axes(frustum, Frustum(first, at_first), far).best()
-                                     : parting_axes(frustum, Facets(first, at_first), far).best();
+        const SeparatingAxis best = first.has_rims()
+                                        ? separating_axes(frustum, Frustum(first, at_first), far).best()
+                                        : separating_axes(frustum, Facets(first, at_first), far).best();
         return {best.gap, best.normal};
     }
     if (second.kind == ShapeKind::cylinder) {

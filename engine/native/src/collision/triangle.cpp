@@ -73,10 +73,10 @@ unsigned Triangle::hidden(Vec3 n) const noexcept {
     return found;
 }
 
-TriangleAxes parting_axes(const Triangle& triangle, const Facets& other, double margin) noexcept {
+TriangleAxes separating_axes(const Triangle& triangle, const Facets& other, double margin) noexcept {
     const Facets& own = triangle.facets;
     TriangleAxes axes;
-    const auto consider = [&](Vec3 n, PartingAxis& best, int edge = -1) noexcept {
+    const auto consider = [&](Vec3 n, SeparatingAxis& best, int edge = -1) noexcept {
         const double gap = other.lowest(n) + own.lowest(-n) - other.radius;
         if (gap > axes.all.gap) axes.all = {gap, n, edge};
         if (gap > best.gap && triangle.genuine(n)) best = {gap, n, edge};
@@ -112,9 +112,9 @@ TriangleAxes parting_axes(const Triangle& triangle, const Facets& other, double 
     return axes;
 }
 
-TriangleAxes parting_axes(const Triangle& triangle, const Frustum& other, double margin) noexcept {
-    const PartingAxes found = parting_axes(other, triangle.facets, margin, &triangle);
-    const auto turned = [](PartingAxis axis) noexcept {
+TriangleAxes separating_axes(const Triangle& triangle, const Frustum& other, double margin) noexcept {
+    const SeparatingAxes found = separating_axes(other, triangle.facets, margin, &triangle);
+    const auto turned = [](SeparatingAxis axis) noexcept {
         axis.normal = -axis.normal;
         return axis;
     };

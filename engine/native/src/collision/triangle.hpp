@@ -28,9 +28,9 @@ private:
 /// Axes from a triangle to the other. `all` holds the best of any kind, the others genuine ones only. Stops where one exceeds
 /// `margin` [m].
 struct TriangleAxes {
-    PartingAxis all, flat, curved;
+    SeparatingAxis all, flat, curved;
 };
-TriangleAxes parting_axes(const Triangle& triangle, const Facets& other, double margin) noexcept;
-TriangleAxes parting_axes(const Triangle& triangle, const Frustum& other, double margin) noexcept;
+TriangleAxes separating_axes(const Triangle& triangle, const Facets& other, double margin) noexcept;
+TriangleAxes separating_axes(const Triangle& triangle, const Frustum& other, double margin) noexcept;
 
 }  // namespace spook

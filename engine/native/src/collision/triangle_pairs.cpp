@@ -25,12 +25,12 @@ template <class Other, class Facing, class Line>
 Manifold meet(const Triangle& triangle, const Other& other, Vec3 centre, double radius, double thickness,
               double margin, Facing facing_of, Line line_of) noexcept {
     if (!(dot(triangle.normal, centre - triangle.facets.corners[0]) > 0.0)) return {};
-    const TriangleAxes axes = parting_axes(triangle, other, margin);
+    const TriangleAxes axes = separating_axes(triangle, other, margin);
     if (axes.all.gap > margin) return {};
     const double slop = overlay_slop * thickness;
     // Apart, only what is nearest counts: else another point of the two would arrive before those named here.
     const double nearest = axes.all.gap > slop ? axes.all.gap + slop : 1e300;
-    const PartingAxis& axis = axes.curved;
+    const SeparatingAxis& axis = axes.curved;
     if (axis.gap <= axes.flat.gap + prefer_flat * thickness) {
         double least;
         const Vec3 n = axes.flat.normal;
@@ -55,7 +55,7 @@ Manifold facets_triangle(const Primitive& facets, const Pose& at, const Primitiv
     return meet(
         Triangle(triangle, at_triangle), other, at.position, other.radius, other.thickness, margin,
         [&](Vec3 n) { return facing(other, -n); },
-        [&](const PartingAxis& axis, double slop) {
+        [&](const SeparatingAxis& axis, double slop) {
             return lowest_line(other, axis.normal, axis.edge, slop);
         });
 }
@@ -67,7 +67,7 @@ Manifold frustum_triangle(const Primitive& frustum, const Pose& at, const Primit
     return meet(
         face, other, at.position, 0.0, other.thickness, margin,
         [&](Vec3 n) { return facing(other, -n, face.normal); },
-        [&](const PartingAxis& axis, double slop) { return farthest_line(other, -axis.normal, slop); });
+        [&](const SeparatingAxis& axis, double slop) { return farthest_line(other, -axis.normal, slop); });
 }
 
 }  // namespace spook
