@@ -53,7 +53,8 @@
 
 namespace spook {
 
-/// All state from one step to the next is in plain members: copy the stage to save it.
+/// What later steps depend on is in Snapshot, with which bodies sleep; all else is of one step, or memory that is kept for the next.
+/// A copy goes on alike.
 class ContactStage {
 public:
     /// One material and one solver index per body of the scene; `joints` are the pairs of bodies that rows of joints tie;

@@ -76,7 +76,7 @@ void BlockRows::assemble() {
     const auto blocks = joints_.blocks();
     const int row_blocks = static_cast<int>(blocks.size());
     double* to = right.data();
-    last_rows_ = LastRows::block;
+    live_.last_rows = LastRows::block;
     for (int k = 0; k < row_blocks; ++k) {
         const JointBlock& block = blocks[k];
         const Place& place = places_[k];

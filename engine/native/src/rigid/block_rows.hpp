@@ -20,9 +20,8 @@ namespace spook {
 
 class BlockRows {
 public:
-    BlockRows(const RigidModel& model, RigidState& live, JointSet& joints, const Forces& forces,
-              LastRows& last_rows) noexcept
-        : model_(model), live_(live), joints_(joints), forces_(forces), last_rows_(last_rows) {}
+    BlockRows(const RigidModel& model, RigidState& live, JointSet& joints, const Forces& forces) noexcept
+        : model_(model), live_(live), joints_(joints), forces_(forces) {}
 
     BlockLdlt matrix;  // blocks of rows, then bodies
     LargeArray<double> right, solution;
@@ -94,7 +93,6 @@ private:
     RigidState& live_;
     JointSet& joints_;
     const Forces& forces_;
-    LastRows& last_rows_;
     RedundantRows redundant_;
     std::vector<Place> places_;
     LargeArray<double> spare_;  // Jacobians with nowhere else to go, per block 2 × rows × 6

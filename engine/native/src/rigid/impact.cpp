@@ -49,7 +49,7 @@ void MixedRows::impact() {
         if (contacts_->toi_fraction(i) > 0.0 && !live_.asleep(i))
             forces_.set_share(i, 1.0 - contacts_->toi_fraction(i));
     take_velocities(true, [this](int k) { return !contacts_->has_rows(k); });
-    add_to_before(-1.0);  // less what it has changed: see read_half_step()
+    add_to_before(-1.0);  // less what it has changed: see HalfStep::read()
     for (std::size_t k = 0; k < model_.constrained.size(); ++k)
         if (contacts_->has_rows(static_cast<int>(k)))
             scratch_.velocities[model_.constrained[k]] = system.velocity[k];

@@ -1,8 +1,10 @@
-// Stage: places. q₊ = q + h v₊, and every orientation by the turn h w₊ of its body (rigid_state.hpp). Bodies of an event went with
+// Stage: integrate. q₊ = q + h v₊, and every orientation by the turn h w₊ of its body (rigid_state.hpp). Bodies of an event went with
 // v₋ until its time: what that makes of their way is added.
 //
-// reads: velocities of bodies, the contact stage's correction(). writes: places and orientations of bodies,
-// speeds of rotors.
+// reads: velocities and momenta of bodies, of a step in a plane its own; the contact stage's correction(); sleepers; the step's
+// coordinates of joints with rotors; touching_ and scratch_.led_by_joints, which say whether whirling is looked for, and for that
+// multipliers of joints. writes: places and orientations of bodies, and what they turn with; rotors of joints; live_.whirling;
+// where a body whirls, multipliers of joints.
 #include "rigid/rigid_system.hpp"
 #include "rigid/rotors.hpp"
 #include "rigid/runaway.hpp"

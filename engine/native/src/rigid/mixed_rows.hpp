@@ -27,8 +27,7 @@ public:
           scratch_(scratch),
           clock_(clock) {}
 
-    MixedSystem system;     // rows of joints first, block by block, then those of a step's contacts
-    double residual = 0.0;  // m/s, the largest an iterative solve stopped at
+    MixedSystem system;  // rows of joints first, block by block, then those of a step's contacts
     std::uint64_t rounds = 0, pgs_iterations = 0;
 
     /// Which stages run here.
@@ -59,7 +58,7 @@ public:
 
     /// Of a block of rows of joints, as the last solve had it, which may have been that of `rows`.
     const double* jacobian(const BlockRows& rows, int block, bool second) const noexcept {
-        if (scratch_.last_rows != LastRows::mixed) return rows.jacobian(block, second);
+        if (live_.last_rows != LastRows::mixed) return rows.jacobian(block, second);
         const RowBlock& of = system.rows[block];
         return (second ? of.second_jacobian : of.first_jacobian)[0].data();
     }

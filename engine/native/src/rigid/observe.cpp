@@ -1,7 +1,9 @@
 // Stage: observing. Samples are taken between steps; what they read and the coming steps do not is brought to where they read it.
 // Velocities that live at mid-step are found ahead, and the state that goes on is put back.
 //
-// reads: everything. writes: the recorder; multipliers of joints; the velocities of the coming step, where they are found ahead.
+// reads: whether velocities or forces are asked for, and what samplers do (RigidReadings): places, velocities, joints and their last
+// rows, points and impulses of contacts. writes: the recorder; multipliers of joints; the velocities of the coming step, where they
+// are found ahead.
 #include <utility>
 
 #include "rigid/rigid_system.hpp"
@@ -38,7 +40,8 @@ void RigidSystem::deliver() {
 /// The velocities of the coming step, before it is begun.
 void RigidSystem::solve_ahead() {
     if (live_.velocity_ready) return;
-    if (mixed_.contacts()) keep(before_solve_ahead_);
+    readings_.tell_kept({});
+    if (mixed_.contacts()) keep_state(before_solve_ahead_);
     find_velocities();
     if (plane_.at_hand()) deliver();
     live_.velocity_ready = true;

@@ -9,13 +9,8 @@ namespace spook {
 class PlanePath {
 public:
     PlanePath(const RigidModel& model, RigidState& live, JointSet& joints, const Forces& forces,
-              LoopWatch& loops, LastRows& last_rows) noexcept
-        : model_(model),
-          live_(live),
-          joints_(joints),
-          forces_(forces),
-          loops_(loops),
-          last_rows_(last_rows) {}
+              LoopWatch& loops) noexcept
+        : model_(model), live_(live), joints_(joints), forces_(forces), loops_(loops) {}
 
     /// Of a scene in which nothing but joints, steady forces and steps of the plain kind bears on the bodies.
     void take();
@@ -45,7 +40,6 @@ private:
     JointSet& joints_;
     const Forces& forces_;
     LoopWatch& loops_;
-    LastRows& last_rows_;
     PlaneStep plane_;
     bool used_ = false, at_hand_ = false;
     std::uint64_t solves_ = 0;

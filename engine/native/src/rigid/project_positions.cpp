@@ -1,4 +1,5 @@
-// Overlapping bodies are parted by positions, and nothing else is to be seen of it.
+// Stage: project positions. Overlapping bodies are parted by positions, and nothing else is to be seen of it; joints that stand
+// beyond a limit return to it.
 //
 // The contact stage gives displacements d, of the order of an overlap whatever the time step. What is linear in d its
 // rows take care of; the rest is done here, island by island:

@@ -37,32 +37,56 @@ std::vector<double> RigidReadings::states(bool velocities) const {
 }
 
 void RigidReadings::wrench(int joint, double* out) const noexcept {
-    std::fill_n(out, 6, 0.0);
-    const JointState& state = joints_.states[joint];
-    if (scratch_.last_rows == LastRows::plane) {
-        plane_.step().wrench(joint, state, out);
-        for (int k = 0; k < 6; ++k) out[k] /= model_.h;
-        return;
-    }
-    if (bilateral_.by_links() &&
-        scratch_.last_rows != LastRows::mixed) {  // along the world's axes, at the joint
-        for (int k = 0; k < 6; ++k) out[k] = state.multiplier[k] / model_.h;
-        return;
-    }
-    const auto blocks = joints_.blocks();
+    if (!kept_wrenches_.empty()) return static_cast<void>(std::copy_n(kept_wrenches_[joint].data(), 6, out));
+    if (!by_rows()) return find_wrench(joint, out);
     Vec3 force, torque;
-    for (std::size_t k = 0; k < blocks.size(); ++k) {
-        if (blocks[k].joint != joint) continue;
-        const double* rows = mixed_.jacobian(rows_, static_cast<int>(k), true);
-        const double* multiplier = state.multipliers(blocks[k].axial);
-        for (int i = 0; i < blocks[k].size; ++i) {
-            const double f = multiplier[i] / model_.h;
-            force += f * Vec3{rows[6 * i], rows[6 * i + 1], rows[6 * i + 2]};
-            torque += f * Vec3{rows[6 * i + 3], rows[6 * i + 4], rows[6 * i + 5]};
-        }
-    }
-    torque -= cross(state.second_reach, force);
+    for (std::size_t k = 0; k < joints_.blocks().size(); ++k)
+        if (joints_.blocks()[k].joint == joint) add_rows(k, force, torque);
+    torque -= cross(joints_.states[joint].second_reach, force);
     for (int k = 0; k < 3; ++k) out[k] = force[k], out[3 + k] = torque[k];
+}
+
+std::vector<Vec6> RigidReadings::wrenches() const {
+    if (!kept_wrenches_.empty()) return kept_wrenches_;
+    std::vector<Vec6> all(joints_.states.size(), Vec6{});
+    if (!by_rows()) {
+        for (std::size_t joint = 0; joint < all.size(); ++joint)
+            find_wrench(static_cast<int>(joint), all[joint].data());
+        return all;
+    }
+    std::vector<Vec3> force(all.size()), torque(all.size());
+    for (std::size_t k = 0; k < joints_.blocks().size(); ++k)
+        add_rows(k, force[joints_.blocks()[k].joint], torque[joints_.blocks()[k].joint]);
+    for (std::size_t joint = 0; joint < all.size(); ++joint) {
+        const Vec3 at = torque[joint] - cross(joints_.states[joint].second_reach, force[joint]);
+        for (int k = 0; k < 3; ++k) all[joint][k] = force[joint][k], all[joint][3 + k] = at[k];
+    }
+    return all;
+}
+
+/// Steps in a plane, and links that are solved along their tree, have no rows but the wrenches themselves.
+bool RigidReadings::by_rows() const noexcept {
+    return live_.last_rows == LastRows::mixed ||
+           (live_.last_rows == LastRows::block && !bilateral_.by_links());
+}
+
+void RigidReadings::find_wrench(int joint, double* out) const noexcept {
+    const JointState& state = joints_.states[joint];
+    std::fill_n(out, 6, 0.0);
+    if (live_.last_rows == LastRows::plane) plane_.step().wrench(joint, state, out);
+    else std::copy_n(state.multiplier.data(), 6, out);  // along the world's axes, at the joint
+    for (int k = 0; k < 6; ++k) out[k] /= model_.h;
+}
+
+void RigidReadings::add_rows(std::size_t block, Vec3& force, Vec3& torque) const noexcept {
+    const JointBlock& of = joints_.blocks()[block];
+    const double* rows = mixed_.jacobian(rows_, static_cast<int>(block), true);
+    const double* multiplier = joints_.states[of.joint].multipliers(of.axial);
+    for (int i = 0; i < of.size; ++i) {
+        const double f = multiplier[i] / model_.h;
+        force += f * Vec3{rows[6 * i], rows[6 * i + 1], rows[6 * i + 2]};
+        torque += f * Vec3{rows[6 * i + 3], rows[6 * i + 4], rows[6 * i + 5]};
+    }
 }
 
 Vec3 RigidReadings::contact_force(int body, int other) const noexcept {

@@ -14,7 +14,7 @@ class RigidReadings {
 public:
     RigidReadings(const RigidModel& model, const RigidState& live, const JointSet& joints,
                   const Forces& forces, const BlockRows& rows, const BilateralSolve& bilateral,
-                  const PlanePath& plane, const MixedRows& mixed, const StepScratch& scratch) noexcept
+                  const PlanePath& plane, const MixedRows& mixed) noexcept
         : model_(model),
           live_(live),
           joints_(joints),
@@ -22,8 +22,7 @@ public:
           rows_(rows),
           bilateral_(bilateral),
           plane_(plane),
-          mixed_(mixed),
-          scratch_(scratch) {}
+          mixed_(mixed) {}
 
     int bodies() const noexcept { return model_.bodies(); }
     const BodyConstants& constants(int body) const noexcept { return model_.constants[body]; }
@@ -42,6 +41,9 @@ public:
     double coordinate(int joint) const { return joints_.coordinate(joint, live_.bodies); }
     /// Force and torque on the second body at the joint in the last step [N, N m], world axes.
     void wrench(int joint, double* out) const noexcept;
+    /// Of all joints, for a snapshot, since the rows they are made of are in none; those kept are told until the next solve.
+    std::vector<Vec6> wrenches() const;
+    void tell_kept(const std::vector<Vec6>& wrenches) { kept_wrenches_ = wrenches; }
     /// Tension of a distance in the last step [N], positive where it pulls.
     double tension(int joint) const noexcept { return -joints_.states[joint].multiplier[0] / model_.h; }
 
@@ -52,6 +54,10 @@ public:
     double penetration() const noexcept;
 
 private:
+    bool by_rows() const noexcept;
+    void find_wrench(int joint, double* out) const noexcept;
+    void add_rows(std::size_t block, Vec3& force, Vec3& torque) const noexcept;
+
     const RigidModel& model_;
     const RigidState& live_;
     const JointSet& joints_;
@@ -60,7 +66,7 @@ private:
     const BilateralSolve& bilateral_;
     const PlanePath& plane_;
     const MixedRows& mixed_;
-    const StepScratch& scratch_;
+    std::vector<Vec6> kept_wrenches_;
 };
 
 }  // namespace spook

@@ -12,9 +12,6 @@
 
 namespace spook {
 
-/// Which rows hold the Jacobians of the last solve.
-enum class LastRows { block, mixed, plane };
-
 /// How a step's rows are solved: block is one factorisation, for bilateral rows; pivot and iterative know bounds.
 enum class RigidSolver { none, block, pivot, iterative };
 

@@ -55,7 +55,7 @@ bool PlanePath::solve() {
         return false;
     }
     plane_.take_velocities();
-    last_rows_ = LastRows::plane;
+    live_.last_rows = LastRows::plane;
     ++solves_;
     return true;
 }
@@ -63,7 +63,7 @@ bool PlanePath::solve() {
 void PlanePath::deliver() {
     if (!at_hand_) return;
     write();
-    if (last_rows_ == LastRows::plane) plane_.deliver(joints_.states);
+    if (live_.last_rows == LastRows::plane) plane_.deliver(joints_.states);
 }
 
 void PlanePath::give_up() {

@@ -32,7 +32,7 @@ void BilateralSolve::take(int body, const Twist& v) noexcept {
 }
 
 bool BilateralSolve::find_by_links(bool ahead) {
-    scratch_.last_rows = LastRows::block;
+    live_.last_rows = LastRows::block;
     LockedLoads loads{model_.h,
                       model_.stages.runs(Stage::apply_gravity) ? model_.gravity : Vec3{},
                       model_.constants,

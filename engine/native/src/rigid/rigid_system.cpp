@@ -45,18 +45,18 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     : model_(std::move(stages), scene.gravity, scene.method),
       joints_(scene, model_.h),
       forces_(model_, live_, joints_, clock_),
-      rows_(model_, live_, joints_, forces_, scratch_.last_rows),
+      rows_(model_, live_, joints_, forces_),
       curvature_(model_, live_, joints_, rows_),
       mixed_(model_, live_, joints_, forces_, curvature_, scratch_, clock_),
       bilateral_(model_, live_, joints_, forces_, rows_, mixed_, curvature_, scratch_, clock_),
-      plane_(model_, live_, joints_, forces_, bilateral_.loops, scratch_.last_rows),
+      plane_(model_, live_, joints_, forces_, bilateral_.loops),
       composition_(model_, live_, joints_, forces_, rows_, clock_),
       runge_kutta_(model_, live_, joints_, forces_, clock_),
       half_step_(model_, live_, joints_, forces_, rows_),
       sleeping_(model_, live_, joints_, forces_, rows_, mixed_, scratch_),
       projection_(model_, live_, joints_, forces_, mixed_, scratch_),
       energy_(model_, live_, joints_, forces_),
-      readings_(model_, live_, joints_, forces_, rows_, bilateral_, plane_, mixed_, scratch_) {
+      readings_(model_, live_, joints_, forces_, rows_, bilateral_, plane_, mixed_) {
     take_stages(scene);
     take_bodies(scene);
     forces_.take(scene);
@@ -163,6 +163,7 @@ void RigidSystem::reset(StageClock* clock) {
     clock_ = StageTimer(clock);
     live_ = {};
     live_.bodies = model_.start;
+    readings_.tell_kept({});
     replaying_ = false;
     early_joints_.clear();
     plane_.forget();
@@ -192,6 +193,7 @@ void RigidSystem::reset(StageClock* clock) {
 }
 
 void RigidSystem::advance(std::int64_t steps) {
+    readings_.tell_kept({});
     if (model_.method.runge_kutta) return runge_kutta_.advance(steps * model_.method.substeps);
     if (model_.composed) return composition_.compose(steps * model_.method.substeps);
     for (std::int64_t n = steps * model_.method.substeps; n > 0; --n) step();
@@ -309,7 +311,7 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     put("stopped_impacts", live_.stopped);
     put("contacts", 0);  // the same names with and without a collision stage, so that runs can be compared
     report.counters["force_evaluations"] = substeps * forces_.evaluations();
-    report.residual = mixed_.residual;
+    report.residual = live_.residual;
     if (const Unsettled& left = live_.unsettled; left.body >= 0) {
         report.residual = std::max(report.residual, left.residual);
         if (report.status == Status::completed) {

@@ -56,7 +56,7 @@ public:
 
     struct Snapshot;
     /// All that the coming steps depend on, drives apart; going back to it gives the bits of going on from it. Where velocities
-    /// were looked ahead for with contacts, it is what was before.
+    /// were looked ahead for with contacts, it is what was before. keep() has what can be read at once as well.
     void keep(Snapshot& kept) const;
     void go_back(const Snapshot& kept);
 
@@ -95,9 +95,11 @@ public:
         JointStates joints;
         WarmStart warm;
         ContactStage::Snapshot contacts;
+        std::vector<Vec6> wrenches;  // of joints in the step before, where they may be read before the next
     };
 
 private:
+    void keep_state(Snapshot& kept) const;
     void take_stages(const RigidScene& scene);
     void take_bodies(const RigidScene& scene);
     void step();
@@ -140,9 +142,8 @@ private:
     EnergyMade energy_;
     RigidReadings readings_;
 
-    Snapshot saved_, before_solve_ahead_;  // the latter: before solve_ahead(), with contacts
-    Snapshot before_waking_;               // before the velocities of a step in which some body may wake
-    double residual_before_waking_ = 0.0;
+    Snapshot saved_, before_solve_ahead_;       // the latter: before solve_ahead(), with contacts
+    Snapshot before_waking_;                    // before the velocities of a step in which some body may wake
     bool replaying_ = false;                    // a block that ended unfit
     LargeArray<JointSet::State> early_joints_;  // then: as its first step left them
     bool velocities_seen_ = false;

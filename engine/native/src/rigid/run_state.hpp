@@ -27,6 +27,9 @@ struct Unsettled {
     bool sunk = false;      // no row is off, but the body was left in another
 };
 
+/// Which rows hold the Jacobians of the last solve.
+enum class LastRows { block, mixed, plane };
+
 /// Changes from step to step; copying it back goes back.
 struct RigidState {
     LargeArray<BodyState> bodies;
@@ -67,6 +70,8 @@ struct RigidState {
     int parts = 1;                  // of a step, each of which tension allows
     std::int64_t tension_look = 0;  // steps until the next look at it
     double part = 0.0;              // s: of a Runge–Kutta step within its tolerance, the next
+    double residual = 0.0;          // m/s: the largest that an iterative solve has stopped at
+    LastRows last_rows = LastRows::block;
 
     bool asleep(int body) const noexcept { return sleep.sleepers > 0 && sleep.island[body] != 0; }
     void note_unsettled(int body, double residual, bool sunk = false) {

@@ -166,7 +166,7 @@ void Sleeping::sleep() {
     }
     if (tired.empty()) return;
     sleep.sleepers += tired.size();
-    if (scratch_.last_rows != LastRows::mixed) keep_jacobians();
+    if (live_.last_rows != LastRows::mixed) keep_jacobians();
     mixed_.contacts()->put_to_sleep(tired);
 }
 

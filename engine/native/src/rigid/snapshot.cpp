@@ -7,7 +7,7 @@
 namespace spook {
 
 void RigidSystem::save() {
-    keep(saved_);
+    keep_state(saved_);
     work_kept_ = work_done();
 }
 
@@ -19,6 +19,14 @@ void RigidSystem::restore() {
 }
 
 void RigidSystem::keep(Snapshot& kept) const {
+    keep_state(kept);
+    kept.wrenches
+        .clear();  // found by a solve of their own where steps have velocities elsewhere than samples
+    if (!model_.half_step && !model_.composed && !model_.method.runge_kutta)
+        kept.wrenches = readings_.wrenches();
+}
+
+void RigidSystem::keep_state(Snapshot& kept) const {
     if (mixed_.contacts() && live_.velocity_ready) {
         kept = before_solve_ahead_;
         return;
@@ -47,6 +55,7 @@ void RigidSystem::go_back(const Snapshot& kept) {
     mixed_.system = kept.warm.mixed;
     rows_.restore(kept.warm.redundancy);
     if (mixed_.contacts()) mixed_.contacts()->go_back(kept.contacts);
+    readings_.tell_kept(kept.wrenches);
     if (!model_.stiff) return;
     const auto blocks = joints_.blocks();
     const double* rows = kept.warm.jacobians.data();

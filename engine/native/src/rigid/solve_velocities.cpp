@@ -83,13 +83,12 @@ void MixedRows::begin() {
     pivot_ = PivotSolver{};
     pivot_.floor = model_.method.floor;
     pivot_.refinements = model_.method.refinements;
-    scratch_.last_rows = model_.solver == RigidSolver::block ? LastRows::block : LastRows::mixed;
+    live_.last_rows = model_.solver == RigidSolver::block ? LastRows::block : LastRows::mixed;
     begin_again();
 }
 
 void MixedRows::begin_again() {
     rounds = pgs_iterations = 0;
-    residual = 0.0;
     contacts_ = fresh_contacts_;
     system = MixedSystem{};
     if (!contacts_ && model_.solver != RigidSolver::pivot && model_.solver != RigidSolver::iterative) return;
@@ -108,7 +107,7 @@ void MixedRows::begin_again() {
 }
 
 void MixedRows::solve(bool touching) {
-    scratch_.last_rows = LastRows::mixed;
+    live_.last_rows = LastRows::mixed;
     const auto blocks = joints_.blocks();
     fill_masses();
     if (touching) act_before_events();
@@ -357,7 +356,7 @@ double MixedRows::pgs_tolerance() const {
 void MixedRows::judge_pgs() {
     if (model_.solver != RigidSolver::iterative) return;
     const RowsResidual worst = rows_residual(system, {}, model_.method.friction);
-    residual = std::max(residual, worst.residual);
+    live_.residual = std::max(live_.residual, worst.residual);
     if (!(worst.residual > pgs_tolerance())) return;
     const int blocks = static_cast<int>(joints_.blocks().size());
     live_.note_unsettled(
@@ -369,7 +368,7 @@ void MixedRows::judge_pgs() {
 /// Takes over what the contact stage has found of its last solve.
 void MixedRows::judge_contacts() {
     const SolveQuality& found = contacts_->quality();
-    residual = std::max(residual, found.residual);
+    live_.residual = std::max(live_.residual, found.residual);
     if (found.body >= 0) live_.note_unsettled(found.body, found.by, found.sunk);
 }
 
@@ -473,7 +472,7 @@ bool MixedRows::solve_joints() {
         double most = 0.0;
         for (int i = 0; i < rows.size; ++i) most = std::max(most, std::abs(rows.multiplier[i]));
         const double missed = off * most / model_.constants[body].mass;
-        residual = std::max(residual, missed);
+        live_.residual = std::max(live_.residual, missed);
         if (missed > model_.method.unsettled_residual) live_.note_unsettled(body, missed);
         return true;
     }

@@ -1,4 +1,6 @@
-// The order of a step of h: what step() calls, each stage in the file of its name. What a step writes first is StepScratch::begin().
+// The order of a step of h: what step() calls, each stage in the file of its name. A step first writes that it has begun,
+// RigidState::step, and where bodies may sleep it notes where they are; then, unless a sample has asked for the velocities already,
+// begin_velocities() begins the StepScratch.
 //
 //   wake               wake.cpp               what moving bodies touch or hold is awake; again, with all that follows, for what is met
 //   apply forces       apply_forces.cpp       dv_ext = h M⁻¹ f
@@ -12,6 +14,8 @@
 //
 // Steps of mechanisms that stay in a plane do the same by numbers of that plane (rigid_plane.cpp). Compositions of higher order
 // (rigid_composition.cpp) have stages of their own.
+#include <cstring>
+
 #include "rigid/rigid_system.hpp"
 #include "rigid/tolerances.hpp"
 
@@ -67,8 +71,7 @@ void RigidSystem::begin_velocities() {
 /// Sleepers get no part of their forces; the state is kept, since the velocities may show that some are met.
 void RigidSystem::leave_out_sleepers() {
     if (live_.sleep.sleepers == 0) return;
-    keep(before_waking_);
-    residual_before_waking_ = mixed_.residual;
+    keep_state(before_waking_);
     forces_.begin_shares();
     forces_.leave_out_sleepers();
 }
@@ -80,7 +83,6 @@ bool RigidSystem::wake_met() {
     if (mixed_.contacts()->woken().empty()) return false;
     const std::vector<int> woken = mixed_.contacts()->woken();
     go_back(before_waking_);
-    mixed_.residual = residual_before_waking_;
     sleeping_.wake(woken);
     return true;
 }
@@ -109,5 +111,21 @@ void RigidSystem::end_step() {
     if (plane_.at_hand()) plane_.write();
     energy_.note(live_.moved == 1 ? readings_.penetration() : 0.0);
 }
+
+#ifndef NDEBUG
+/// A stage that reads what the step before has left reads NaN, or the index −1. No memory is given back or taken.
+void StepScratch::spoil() noexcept {
+    const auto all_ones = [](auto&... arrays) {
+        (std::memset(static_cast<void*>(arrays.data()), 0xff, arrays.size() * sizeof(arrays[0])), ...);
+    };
+    other_ends.clear(), led_by_joints = false;
+    all_ones(poses, velocities, free_velocities, next, start_of_contacts, impulses, left_open, anew, rows,
+             answered, end_poses, before_projection, dissipated, overstep, overstep_at, place, joint_states,
+             beyond);
+    for (auto* nested : {&island_members, &island_blocks})
+        for (std::vector<int>& each : *nested) each.clear();
+    holding.rows.clear();
+}
+#endif
 
 }  // namespace spook

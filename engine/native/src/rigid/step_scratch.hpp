@@ -1,7 +1,7 @@
-// What a step of rigid bodies fills anew: no stage reads of it what another step has left. Memory is kept.
+// What a step of rigid bodies fills anew: no stage reads of it what another step has left, which debug builds show (begin()).
+// Memory is kept.
 #pragma once
 
-#include <limits>
 #include <vector>
 
 #include "contacts/contact_islands.hpp"
@@ -14,7 +14,6 @@
 namespace spook {
 
 struct StepScratch {
-    LastRows last_rows = LastRows::block;  // stays, for those that read joints between steps
     // detect(), per body of the scene:
     std::vector<Pose> poses;
     std::vector<Vec6> velocities, free_velocities, next;  // at the start; with forces; with joints as well
@@ -46,18 +45,15 @@ struct StepScratch {
     LargeArray<JointState> joint_states;  // as they were before
     std::vector<char> beyond;             // project_limits(): islands beyond their limits
     IslandFinder finder;                  // of whatever is asked for
-
-    /// As a step begins: in a debug build nothing of the step before can be taken for this one's.
-    void begin() {
-        other_ends.clear();
 #ifndef NDEBUG
-        constexpr double nan = std::numeric_limits<double>::quiet_NaN();
-        Vec6 none;
-        none.fill(nan);
-        for (auto* each : {&velocities, &free_velocities, &next}) each->assign(each->size(), none);
-        for (Begun& each : start_of_contacts) each = {{nan, nan, nan}, {nan, nan, nan, nan}, nan};
-        dissipated.assign(dissipated.size(), nan);
-        overstep.assign(overstep.size(), nan);
+    void spoil() noexcept;  // step.cpp: what the step before has left is no number and no index
+#endif
+    void begin() {
+#ifdef NDEBUG
+        other_ends.clear();
+        led_by_joints = false;
+#else
+        spoil();
 #endif
     }
 };

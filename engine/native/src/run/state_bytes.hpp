@@ -59,9 +59,10 @@ template <class Record, class Visit> void each(Record& record, Visit visit) {
     } else if constexpr (N == 8) {
         auto& [a, b, c, d, e, f, g, h] = record;
         all(a, b, c, d, e, f, g, h);
-    } else if constexpr (N == 27) {
-        auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v, w, x, y, z, more] = record;
-        all(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v, w, x, y, z, more);
+    } else if constexpr (N == 29) {
+        auto& [a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v, w, x, y, z, aa, ab, ac] =
+            record;
+        all(a, b, c, d, e, f, g, h, i, j, k, l, m, n, o, p, q, r, s, t, u, v, w, x, y, z, aa, ab, ac);
     } else {
         static_assert(N == 0, "a record of so many fields needs a line here");
     }
