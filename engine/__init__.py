@@ -72,7 +72,6 @@ from spook_tracker.engine.joints import (
 )
 from spook_tracker.engine.meshes import HeightField, TriangleMesh
 from spook_tracker.engine.method import PLAIN, Method
-from spook_tracker.engine.misuse import explain_misuse
 from spook_tracker.engine.observe import (
     AngularMomentum,
     AngularVelocity,
@@ -118,6 +117,7 @@ from spook_tracker.engine.simulation import Prepared, prepare, simulate
 from spook_tracker.engine.snapshot import Snapshot
 from spook_tracker.engine.time_functions import Ramp, Sinusoid, Table, TimeFunction
 from spook_tracker.engine.tyres import Tyre
+from spook_tracker.misuse import explain_misuse
 
 __all__ = [
     "PLAIN",

@@ -17,10 +17,12 @@ from spook_tracker.engine.particle_program import compile_particles
 from spook_tracker.engine.program import Program, StageChoice
 from spook_tracker.engine.rigid_program import compile_rigid
 from spook_tracker.engine.scene import Scene
+from spook_tracker.misuse import explained
 
 NOTHING: Mapping[str, Observable] = MappingProxyType({})
 
 
+@explained
 def compile(
     scene: Scene,
     *,

@@ -40,12 +40,14 @@ from spook_tracker.engine.result import Array, Result, SimulationFailed
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.snapshot import Snapshot
 from spook_tracker.engine.time_functions import at_start
+from spook_tracker.misuse import explained
 
 A_LITTLE = 0.04  # s: to read a run in whose time is over
 ROUNDING = 1e-12  # of the length of a quaternion that came out of a run
 NOTHING_READ: Mapping[str, Quantity] = MappingProxyType({})
 
 
+@explained
 def start(
     scene: Scene,
     *,

@@ -22,6 +22,7 @@ from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Origin, Result
 from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.watch import until
+from spook_tracker.misuse import explained
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +37,7 @@ class Prepared:
         return self.program.run(self.steps, time_limit, time_stages)
 
 
+@explained
 def prepare(
     scene: Scene,
     *,
@@ -64,6 +66,7 @@ def prepare(
     return Prepared(program, check.step_count(steps))
 
 
+@explained
 def simulate(
     scene: Scene,
     *,

@@ -12,10 +12,10 @@ from dataclasses import dataclass, field
 from typing import Any, Literal, Protocol
 
 from spook_tracker.engine.method import PLAIN, Method
-from spook_tracker.engine.misuse import explain_misuse
 from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.result import Result
 from spook_tracker.engine.scene import Scene
+from spook_tracker.misuse import explain_misuse
 
 
 class Simulate(Protocol):

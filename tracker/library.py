@@ -15,6 +15,7 @@ from datetime import timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
+from spook_tracker.misuse import explain_misuse, explained
 from spook_tracker.tracker.document.collection import no_collection
 from spook_tracker.tracker.document.run_document import RunDocument, SeriesHistory
 from spook_tracker.tracker.judge.accepted import Accepted
@@ -61,6 +62,9 @@ class History(StoredHistory):
         from spook_tracker.tracker.notebook import ladder_figure, trend_figure
 
         return ladder_figure(self, test) if ladder else trend_figure(self, test, metric)
+
+
+explain_misuse([SiteOptions])
 
 
 class RunOptions(TypedDict, total=False):
@@ -115,25 +119,22 @@ def time_again(
 
 def _asked(tests: Iterable[str], asked: RunOptions) -> tuple[Questions, Request]:
     """What is asked, and how: fields of Questions, and those of a Request, told apart."""
-    import difflib
     from dataclasses import fields
 
+    from spook_tracker.engine.check import nearest
     from spook_tracker.tracker.measure.questions import Questions
     from spook_tracker.tracker.measure.request import Request
 
     for name in asked:
         if name not in RunOptions.__annotations__:
-            near = difflib.get_close_matches(name, RunOptions.__annotations__, n=1)
-            hint = (
-                f"did you mean {near[0]!r}?" if near else f"there are {', '.join(RunOptions.__annotations__)}"
-            )
-            raise TypeError(f"a run has no option {name!r}; {hint}")
+            raise TypeError(f"a run has no option {name!r}; {nearest(name, RunOptions.__annotations__)}")
     whose = {field.name for field in fields(Questions)}
     where: dict[str, Any] = {name: value for name, value in asked.items() if name in whose}
     how: dict[str, Any] = {name: value for name, value in asked.items() if name not in whose}
     return Questions(**where), Request(tests=tuple(tests), **how)
 
 
+@explained
 def record(document: RunDocument, database: str) -> bool:
     """Store a run; False if it was there already."""
     from spook_tracker.tracker.store.database import session_on
@@ -215,6 +216,7 @@ def _by_id(name: str, run: RunInfo) -> bool:
     return run.id.startswith(word) and word != run.engine.version
 
 
+@explained
 @no_collection()
 def compare(
     history: StoredHistory,
@@ -259,6 +261,7 @@ def compare(
     return joined(documents, [machine_of(later[0]) for _, later in found.pairs], found.left_out)
 
 
+@explained
 @no_collection()
 def judge_run(history: StoredHistory, run: str, accepted: Sequence[Accepted] = ()) -> list[Finding]:
     """What became of a recorded run, against everything measured before it; red first.
@@ -346,6 +349,7 @@ def trend_of_maps(
     return []
 
 
+@explained
 def publish(
     history: StoredHistory,
     out: Path,

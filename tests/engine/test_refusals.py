@@ -53,7 +53,7 @@ from spook_tracker.engine import (
     compile,
     simulate,
 )
-from spook_tracker.engine.misuse import explain_misuse
+from spook_tracker.misuse import explain_misuse
 from spook_tracker.scalar_tests.case import Metric
 
 ORIGIN = (0.0, 0.0, 0.0)

@@ -1,13 +1,15 @@
-"""A class that is called wrongly says so in one sentence with the way out: for all public classes at once."""
+"""What is called wrongly says so in one sentence with the way out: public classes at once, functions one by one."""
 
 from __future__ import annotations
 
 import functools
 import inspect
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import is_dataclass
+from typing import ParamSpec, TypeVar
 
-from spook_tracker.engine.check import nearest
+Given = ParamSpec("Given")
+Result = TypeVar("Result")
 
 
 def explain_misuse(kinds: Iterable[object]) -> None:
@@ -17,23 +19,35 @@ def explain_misuse(kinds: Iterable[object]) -> None:
             _explain(kind)
 
 
+def explained(function: Callable[Given, Result]) -> Callable[Given, Result]:
+    """The same function, which names the culprit where values do not fit its parameters; still a TypeError."""
+    return _explained(function, function)
+
+
 def _explain(kind: type) -> None:
     construct = kind.__init__  # type: ignore[misc]  # a dataclass has one of its own
+    kind.__init__ = _explained(construct, kind)  # type: ignore[misc]
 
-    @functools.wraps(construct)
-    def explained(self: object, *given: object, **named: object) -> None:
+
+def _explained(function: Callable[Given, Result], whose: Callable[..., object]) -> Callable[Given, Result]:
+    @functools.wraps(function)
+    def call(*given: Given.args, **named: Given.kwargs) -> Result:
         try:
-            construct(self, *given, **named)
+            return function(*given, **named)
         except TypeError:
-            sentence = _sentence(kind, given, named)
+            sentence = _sentence(whose, given if whose is function else given[1:], named)  # without self
             if sentence is None:  # the values fit: it is from within
                 raise
             raise TypeError(sentence) from None
 
-    kind.__init__ = explained  # type: ignore[misc]
+    return call
 
 
-def _sentence(kind: type, given: tuple[object, ...], named: Mapping[str, object]) -> str | None:
+def _sentence(
+    kind: Callable[..., object], given: tuple[object, ...], named: Mapping[str, object]
+) -> str | None:
+    from spook_tracker.engine.check import nearest
+
     signature = inspect.signature(kind)
     try:
         signature.bind(*given, **named)
@@ -56,16 +70,19 @@ def _sentence(kind: type, given: tuple[object, ...], named: Mapping[str, object]
         lacks = [name for name in needed if name not in {*named, *by_place[: len(given)]}]
         return f"{kind.__name__} needs {' and '.join(lacks)}: write {_call(kind, needed)}"
     vector = not any(isinstance(value, str) for value in given)  # several names are not the name of one
-    if vector and by_place and _constructs(kind, given, named):
+    if vector and by_place and isinstance(kind, type) and _constructs(kind, given, named):
         return f"{kind.__name__} takes them as one value, {by_place[0]}: write {kind.__name__}({given!r})"
-    if by_place:
+    if by_place and isinstance(kind, type):
         return f"{kind.__name__} takes {' and '.join(by_place)}, not {len(given)} values"
+    if by_place:
+        rest = [name for name in needed if name not in by_place]
+        return f"{kind.__name__} takes only {' and '.join(by_place)} by place: write {_call(kind, [*by_place, *rest])}"
     return (
         f"{kind.__name__} takes its values by name: write {_call(kind, needed or list(fields)[: len(given)])}"
     )
 
 
-def _call(kind: type, names: Iterable[str]) -> str:
+def _call(kind: Callable[..., object], names: Iterable[str]) -> str:
     return f"{kind.__name__}({', '.join(f'{name}=…' for name in names)})"
 
 
