@@ -56,6 +56,7 @@ from spook_tracker.engine.compiler import compile, explain
 from spook_tracker.engine.couplings import Relation, Wire
 from spook_tracker.engine.errors import EngineError, MethodError, SceneError
 from spook_tracker.engine.forces import CentralGravity, Fluid, Load, Spring
+from spook_tracker.engine.helpers import axis_angle, bar, gear_pair
 from spook_tracker.engine.joints import (
     Ball,
     Cylindrical,
@@ -200,9 +201,12 @@ __all__ = [
     "Velocity",
     "Violation",
     "Wire",
+    "axis_angle",
+    "bar",
     "build_info",
     "compile",
     "explain",
+    "gear_pair",
     "prepare",
     "simulate",
     "start",

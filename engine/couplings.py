@@ -35,6 +35,7 @@ class Relation:
     The force that is observed is λ/h: the joint of coefficient c feels c times it along its coordinate [N or N m].
     Reactions go where the joints' other ends are, so a casing feels the difference of the torques. In an epicyclic
     gear take the planet's hinge on the carrier, and the sun's too: what meshes is what turns relative to the carrier.
+    Costs one row.
     """
 
     rows: ClassVar[int] = 1
@@ -83,7 +84,7 @@ class Wire:
     tension is that of its first part. Where surfaces touch, friction follows the pull of the step before.
 
     `wound` are drums at its last end, each a hinge and a radius [m]: a radian of the hinge winds in the radius, less
-    than zero lets out. A motor of the hinge makes it a winch.
+    than zero lets out. A motor of the hinge makes it a winch. Costs one row, and a distance for each part of it.
     """
 
     rows: ClassVar[int] = 1

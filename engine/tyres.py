@@ -14,7 +14,7 @@ from spook_tracker.engine.errors import SceneError
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Tyre:
-    """A wheel's tyre on a flat road; rows: load, force along the wheel's heading, force across.
+    """A wheel's tyre on a flat road; rows: load, force along the wheel's heading, force across [N].
 
     `between` is the road, a body or WORLD, and the wheel; `at` a point of the road and `normal` its upward direction,
     `axis` the wheel's spin axis, all in the world at the start. The hub is the wheel's centre.
@@ -27,6 +27,7 @@ class Tyre:
     There is no camber thrust, no aligning torque and no relaxation length. Below a millimetre a second it creeps. The
     force that is observed is that on the wheel at the footprint. Where surfaces touch, the bound of sliding is that of
     the step before.
+    Costs three rows with bounds.
     """
 
     rows: ClassVar[int] = 3
