@@ -23,6 +23,7 @@ from spook_tracker.tracker.cli.options import (
     example,
     executor_option,
     limit_option,
+    out_option,
     pages_options,
     recorded_runs,
     refuse_unwritable,
@@ -73,7 +74,7 @@ def ci() -> None:
 
 @ci.command(epilog=example("tracker ci night --history history --out public"))
 @HISTORY
-@click.option("--out", metavar="DIR", default="public", show_default=True, type=click.Path(path_type=Path))
+@out_option
 @click.option("--quick", is_flag=True, help="Leave out sweeps and stability studies.")
 @click.option("--site", metavar="URL", default="", help="Address of the website, for links in the summary.")
 @executor_option

@@ -73,6 +73,7 @@ def accepted_levels(file: Path | None = None) -> Sequence[Accepted]:
     type=click.Choice(["table", "markdown", "comment", "annotations", "json", "junit"]),
     default="table",
     show_default=True,
+    help="How it is printed: for terminals, documents, pull requests (comment, annotations) or other tools.",
 )
 @click.option(
     "--fail-on",

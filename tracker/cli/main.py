@@ -28,6 +28,7 @@ from spook_tracker.tracker.cli.options import (
     executor_option,
     limit_option,
     look,
+    out_option,
     pages_options,
     recorded,
     refuse_unwritable,
@@ -172,7 +173,7 @@ def _of_engine(file: Path, name: str, names: list[str]) -> Path:
 
 
 @main.command(epilog=example("tracker nightly --db sqlite:///tracker.db --out public"))
-@click.option("--out", metavar="DIR", default="public", show_default=True, type=click.Path(path_type=Path))
+@out_option
 @click.option("--quick", is_flag=True, help="Leave out sweeps and stability studies.")
 @all_option
 @executor_option

@@ -28,7 +28,13 @@ WORDS = {"model": "·", "runs": "✓", "part": "-", "refused": "✗", "fails": "
 )
 @click.option("--markdown", is_flag=True, help="With several engines: a table for a document.")
 @click.option("--all", "everything", is_flag=True, help="Also list files that are parts of other models.")
-@click.option("--workers", default=2, show_default=True, type=click.IntRange(1, 256))
+@click.option(
+    "--workers",
+    default=2,
+    show_default=True,
+    type=click.IntRange(1, 256),
+    help="Processes that measure models.",
+)
 def models_command(
     packages: tuple[str, ...],
     engines: tuple[str, ...],

@@ -69,6 +69,11 @@ def site_options() -> SiteOptions:
     return SiteOptions(**click.get_current_context().meta.get(SITE, {}))
 
 
+out_option = click.option(
+    "--out", metavar="DIR", default="public", show_default=True, type=click.Path(path_type=Path), help="Folder for the website."
+)  # fmt: skip
+
+
 def with_database_option(command: Command) -> Command:
     """--with-database: let readers of the website load the history."""
     return click.option(

@@ -20,7 +20,15 @@ from spook_tracker.tracker.document.run_document import (
 )
 from spook_tracker.tracker.document.wording import clock
 from spook_tracker.tracker.judge.model_words import first_look
-from spook_tracker.tracker.judge.standing import FOLLOWED, HAVE_VALUES, against_limit, count, is_red, standing
+from spook_tracker.tracker.judge.standing import (
+    FOLLOWED,
+    HAVE_VALUES,
+    Count,
+    against_limit,
+    count,
+    is_red,
+    standing,
+)
 from spook_tracker.tracker.judge.verdict import cell_rank
 from spook_tracker.tracker.judge.vocabulary import CLASSES
 
@@ -309,14 +317,20 @@ def verdict(run: RunDocument) -> str:
             f"can be asked; {shown.count('none')} are not supported"
         )
     if not found.red:
-        words = (
-            f"✓ green: all {found.expected} limits and set points hold; gates (●) among them: {found.gates}"
-        )
+        words = f"✓ green: {_all_hold(found)}; gates (●) among them: {found.gates}"
         return click.style(words, fg="green", bold=True)
     words = f"✗ red: {found.broken} of {found.limits} limits broken"
     words += f", {found.left} set points left" if found.left else ""
     words += f", {found.lost} values missing" if found.lost else ""
     return click.style(words, fg="red", bold=True)
+
+
+def _all_hold(found: Count) -> str:
+    if found.expected > 1:
+        return f"all {found.expected} limits and set points hold"
+    if found.limits and found.set_points:
+        return "the one limit and its set point hold"
+    return f"the one {'limit' if found.limits else 'set point'} holds"
 
 
 def nothing_measured(document: RunDocument) -> str:
