@@ -2,7 +2,8 @@
 
 A line mixes words and formulas: "Sliding: Δv = μ (1 + e) u." A run of words without prose that holds a sign of
 mathematics is set; everything else stays text. A fraction takes the factors that touch its bar: v²/r, h² v²/(4 l).
-What cannot be read as a formula stays as it was written.
+What cannot be read as a formula stays as it was written. No library does this: those that write MathML read LaTeX or
+Python, and a line of theory is one of Unicode, since terminals and logs show it as well.
 """
 
 from __future__ import annotations

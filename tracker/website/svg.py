@@ -1,7 +1,8 @@
 """Pictures of charts without JavaScript: geometry here, markup in the template `chart.svg`.
 
 Colours are classes of the style sheet, so a picture follows light and dark like the page around it. The
-picture has a title and a description and is drawn in fixed units that scale with the page.
+picture has a title and a description and is drawn in fixed units that scale with the page. Plotly makes such pictures
+only by a browser that it starts, and with colours of one theme in them.
 """
 
 from __future__ import annotations
