@@ -10,10 +10,12 @@ from dataclasses import replace
 from typing import Any
 
 import pytest
+from click import unstyle
 
 from spook_tracker.engine import PLAIN, Method, explain, protocol
 from spook_tracker.scalar_tests.case import Configuration, Metric, ScalarTest
-from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.scalar_tests.catalogue import CATALOGUE, TOPICS
+from spook_tracker.tracker.cli.report_catalogue import catalogue_table
 from spook_tracker.tracker.document.run_document import keeps_limit
 from spook_tracker.tracker.measure.others import asked_of
 from tests.places import ROOT
@@ -32,6 +34,21 @@ every_test = pytest.mark.parametrize(("name", "test"), CATALOGUE.items(), ids=li
 
 def metrics(test: ScalarTest) -> list[Metric]:
     return [metric for _, metric in test.metrics()]
+
+
+def test_every_test_is_listed_once_under_its_topic_and_in_that_order() -> None:
+    """The topics are those of a reader, the thesis first; nothing else says an order."""
+    names = [name for tests in TOPICS.values() for name in tests]
+
+    assert next(iter(TOPICS)) == "thesis" and len(TOPICS) == 12
+    assert all(TOPICS.values()) and len(names) == len(set(names))
+    assert names == list(CATALOGUE)
+    rows = [
+        line.split("  ") for line in unstyle(catalogue_table(CATALOGUE)).splitlines() if line[:1].islower()
+    ]
+    listed = [(row[0], next(cell.strip() for cell in row[1:] if cell)) for row in rows[1:]]
+    assert listed == [(name, topic) for topic, tests in TOPICS.items() for name in tests]
+    assert "topic" not in catalogue_table({"of_a_team": CATALOGUE["door"]})
 
 
 @every_test

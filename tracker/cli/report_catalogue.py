@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from spook_tracker.scalar_tests.case import LimitKind, Measurement, Metric, ScalarTest
+from spook_tracker.scalar_tests.catalogue import TOPIC
 from spook_tracker.tracker.cli.console import Column, table, width
 from spook_tracker.tracker.cli.report_sweep import seconds
 from spook_tracker.tracker.cli.report_table import number
@@ -24,13 +25,16 @@ if TYPE_CHECKING:
 
 
 def catalogue_table(tests: Mapping[str, ScalarTest]) -> str:
-    """Every test with its question and its first gate."""
-    rows = []
+    """Every test with its question and its first gate; ours with their topics."""
+    rows: list[tuple[str, ...]] = []
+    topics = {name: TOPIC[name] for name in tests if name in TOPIC}
     for name, test in tests.items():
         gates = [metric for _, metric in test.metrics() if metric.role == "gate"]
         more = f" +{len(gates) - 1}" if len(gates) > 1 else ""
-        rows.append((name, (limit_of(gates[0]) + more) if gates else "-", test.question))
-    columns = (Column("test"), Column("limit"), Column("question", flexible=True))
+        limit = (limit_of(gates[0]) + more) if gates else "-"
+        rows.append((name, *((topics.get(name, ""),) if topics else ()), limit, test.question))
+    topic = (Column("topic"),) if topics else ()
+    columns = (Column("test"), *topic, Column("limit"), Column("question", flexible=True))
     seven = sum(test.seven for test in tests.values())
     footer = (
         f"{len(rows)} tests, {seven} of them the continuous tests of the thesis; more with: tracker show TEST"
