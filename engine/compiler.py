@@ -11,7 +11,7 @@ from spook_tracker.engine.bodies import Particle
 from spook_tracker.engine.errors import MethodError, SceneError
 from spook_tracker.engine.forces import Fluid, Load
 from spook_tracker.engine.joints import Distance
-from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.method import DEFAULT, Method
 from spook_tracker.engine.observe import Observable
 from spook_tracker.engine.particle_program import compile_particles
 from spook_tracker.engine.program import Program, StageChoice
@@ -27,7 +27,7 @@ def compile(
     scene: Scene,
     *,
     time_step: float,
-    method: Method = PLAIN,
+    method: Method = DEFAULT,
     observe: Mapping[str, Observable] = NOTHING,
     held: bool = False,
 ) -> Program:
@@ -57,7 +57,7 @@ def explain(
     scene: Scene,
     *,
     time_step: float,
-    method: Method = PLAIN,
+    method: Method = DEFAULT,
     observe: Mapping[str, Observable] = NOTHING,
 ) -> tuple[StageChoice, ...]:
     """Every stage of the step, kept or left out for this scene, with the reason; nothing is run."""

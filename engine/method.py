@@ -1,7 +1,8 @@
-"""How a scene is simulated: the options of the SPOOK step. The defaults are plain SPOOK, directly solved."""
+"""How a scene is simulated: the options of the SPOOK step. The defaults are plain SPOOK, directly solved, that follows fast turns."""
 
 from __future__ import annotations
 
+import dataclasses
 import math
 import sys
 import warnings
@@ -43,9 +44,12 @@ _OF_THE_SCENE = {
 class Method:
     """Options of the stepper. Anything but the defaults is a separate configuration in every table.
 
-    corrections        curved constraints: 0 (linearised), 1 or 2 extra back-substitutions per step, or solves where contacts or
+    turns              followed: where bodies turn by more than a fiftieth of a radian in a step, joints count in how their rows bend on
+                       the way here and on, for no more solves: what spins steadily off its axle, or is held by what is led,
+                       stays in place and keeps its energy. linear: rows are linear in the turn, as SPOOK has them
+    corrections        curved constraints: 0, 1 or 2 extra back-substitutions per step, or solves where contacts or
                        bounds take part; each takes an order of the violation, and closed loops with redundant joints move
-                       without compliance. What spins off its joint keeps its energy with 2, and loses it with 0: with
+                       without compliance. What spins off its joint keeps its energy with 2, with
                        half_step_velocities to 1 % at a third of a radian a step. Beside contacts or bounds, what steps that are
                        too long make of them, above a twentieth of the largest kinetic energy, is "unsettled"
     correction_cap     largest curvature correction, as a fraction of the rest length or of a joint's arms, or rad
@@ -102,6 +106,9 @@ class Method:
                        general factorisation also where a chain or a mechanism in a plane has a faster way
     """
 
+    turns: Literal["followed", "linear"] = dataclasses.field(
+        default="followed", metadata={"definition": False}
+    )
     corrections: int = 0
     correction_cap: float = 0.3
     half_step_velocities: bool = False
@@ -141,6 +148,8 @@ class Method:
         for field in ("corrections", "substeps", "iterations", "refinements", "threads"):
             if isinstance(getattr(self, field), bool):
                 refuse(field, "a whole number")
+        if not one_of(self.turns, ("followed", "linear")):
+            refuse("turns", '"followed" or "linear"')
         if not isinstance(self.corrections, int) or self.corrections not in (0, 1, 2):
             refuse("corrections", "0, 1 or 2")
         if not 0.0 < self.correction_cap <= 1.0:
@@ -220,4 +229,5 @@ class Method:
                 )
 
 
-PLAIN = Method()
+DEFAULT = Method()
+PLAIN = Method(turns="linear")  # SPOOK with nothing added

@@ -23,7 +23,7 @@ from spook_tracker.engine.compiler import NOTHING
 from spook_tracker.engine.errors import EngineError, MethodError
 from spook_tracker.engine.forces import Force, Spring
 from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Joint, frictions
-from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.method import DEFAULT, Method
 from spook_tracker.engine.model_file import ModelRun
 from spook_tracker.engine.observe import (
     ConstraintForce,
@@ -336,7 +336,7 @@ def run(
     duration: float | None = None,
     steps: int | None = None,
     configuration: str = "",
-    method: Method = PLAIN,
+    method: Method = DEFAULT,
     observe: Mapping[str, Observable] = NOTHING,
     time_limit: float | None = None,
     time_stages: bool = False,

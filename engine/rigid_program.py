@@ -174,6 +174,7 @@ def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> 
             "tolerance": method.tolerance,
             "string_stiffness": method.string_stiffness,
             "half_step_velocities": method.half_step_velocities,
+            "linear_turns": method.turns == "linear",
             "corrections": method.corrections,
             "correction_cap": method.correction_cap,
             "force_collision": "collision" in method.force_stages,

@@ -33,7 +33,7 @@ from spook_tracker.engine.compiler import compile
 from spook_tracker.engine.errors import MethodError, SceneError
 from spook_tracker.engine.forces import Load
 from spook_tracker.engine.joints import AxialJoint, Motor
-from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.method import DEFAULT, Method
 from spook_tracker.engine.observe import Final, Quantity
 from spook_tracker.engine.program import Program
 from spook_tracker.engine.result import Array, Result, SimulationFailed
@@ -52,7 +52,7 @@ def start(
     scene: Scene,
     *,
     time_step: float,
-    method: Method = PLAIN,
+    method: Method = DEFAULT,
     observe: Mapping[str, Quantity] = NOTHING_READ,
     state: Mapping[str, Array] | None = None,
 ) -> Run:

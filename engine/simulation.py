@@ -14,7 +14,7 @@ from spook_tracker.engine import check
 from spook_tracker.engine.books import kept, traces
 from spook_tracker.engine.compiler import NOTHING, compile
 from spook_tracker.engine.errors import MethodError
-from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.method import DEFAULT, Method
 from spook_tracker.engine.model_file import ModelRun
 from spook_tracker.engine.observe import Observable, Trace
 from spook_tracker.engine.program import Program
@@ -44,7 +44,7 @@ def prepare(
     time_step: float,
     duration: float | None = None,
     steps: int | None = None,
-    method: Method = PLAIN,
+    method: Method = DEFAULT,
     observe: Mapping[str, Observable] = NOTHING,
 ) -> Prepared:
     """Compile a scene for `duration` [s] or a number of `steps`, exactly one of them; see `simulate`."""
@@ -73,7 +73,7 @@ def simulate(
     time_step: float,
     duration: float | None = None,
     steps: int | None = None,
-    method: Method = PLAIN,
+    method: Method = DEFAULT,
     observe: Mapping[str, Observable] = NOTHING,
     time_limit: float | None = None,
     time_stages: bool = False,

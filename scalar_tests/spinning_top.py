@@ -74,7 +74,7 @@ def lean_and_round(places: Any) -> tuple[Any, Any]:
 
 def steady(simulate: case.Simulate) -> dict[str, float]:
     """Rate, lean, energy and joint over 20 s."""
-    result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=OBSERVE)
+    result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, method=engine.PLAIN, observe=OBSERVE)
     lean, turned = lean_and_round(result["place"])
     return {
         "path_error": _off_the_circle(result),
@@ -163,7 +163,7 @@ def _sleeping_map(method: engine.Method) -> Callable[[case.Simulate], case.Stabi
 
 def draw(simulate: case.Simulate) -> case.Drawing:
     """Path of the centre of mass from above."""
-    result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, observe=OBSERVE)
+    result = simulate(scene(), time_step=TIME_STEP, duration=DURATION, method=engine.PLAIN, observe=OBSERVE)
     places = result["place"][::4]
     around = np.linspace(0.0, 2.0 * math.pi, 90)
     radius = ARM * math.sin(LEAN)

@@ -14,7 +14,7 @@ import numpy as np
 from spook_tracker.engine.errors import MethodError
 from spook_tracker.engine.forces import Load
 from spook_tracker.engine.joints import AxialJoint
-from spook_tracker.engine.method import PLAIN, Method
+from spook_tracker.engine.method import DEFAULT, Method
 from spook_tracker.engine.model_file import ModelRun
 from spook_tracker.engine.observe import (
     ContactForce,
@@ -52,12 +52,12 @@ EXPLICIT = (Method(runge_kutta="order8", tolerance=1e-11), Method(composition="o
 IMPLICIT = (
     Method(half_step_velocities=True, corrections=2),
     Method(half_step_velocities=True),
-    PLAIN,
+    DEFAULT,
 )
 
 
 def run_model(
-    run: ModelRun, time_step: float, duration: float, time_limit: float | None, method: Method = PLAIN
+    run: ModelRun, time_step: float, duration: float, time_limit: float | None, method: Method = DEFAULT
 ) -> Result:
     """Load the file, drive it for `duration` [s] and read what is asked for."""
     if run.elsewhere:

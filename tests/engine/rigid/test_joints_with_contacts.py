@@ -110,7 +110,7 @@ def test_what_was_solved_directly_after_iterations_overlaps_no_more_than_before(
         CATALOGUE["falling_chain"].example().scene,
         duration=0.7,
         time_step=STEP,
-        method=Method(solver="iterative"),
+        method=Method(solver="iterative", turns="linear"),
         observe=maxima(deepest=Penetration()),
     )
     assert run.status == "completed"

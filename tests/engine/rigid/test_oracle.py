@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import (
+    PLAIN,
     AngularVelocity,
     ConstraintForce,
     Distance,
@@ -41,7 +42,7 @@ def largest_differences(
         observe[f"force of {c.name}"] = Trace(quantity=ConstraintForce(c.name))
         if isinstance(c, Hinge | Prismatic):
             observe[f"coordinate of {c.name}"] = Trace(quantity=JointCoordinate(c.name))
-    method = method or Method()
+    method = method or PLAIN
     run = simulate(scene, time_step=TIME_STEP, steps=steps, observe=observe, method=method)
     dense = oracle or RigidOracle(scene, TIME_STEP / method.substeps)
     worst: dict[str, float] = {}
@@ -105,7 +106,7 @@ def test_motors_springs_loads_particles_and_static_bodies(seed: int) -> None:
 
 
 def test_substeps_are_smaller_steps() -> None:
-    assert_equal(tree(np.random.default_rng(7)), steps=5, method=Method(substeps=3))
+    assert_equal(tree(np.random.default_rng(7)), steps=5, method=Method(substeps=3, turns="linear"))
 
 
 def test_the_comparison_is_sharp() -> None:

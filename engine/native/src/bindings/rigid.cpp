@@ -370,6 +370,7 @@ RigidMethod to_method(const nb::dict& method) {
     if (out.runge_kutta) out.composition = 8;  // what holds beside a composition's stages holds here
     options.read("string_stiffness", out.string_stiffness);
     options.read("half_step_velocities", out.half_step_velocities);
+    options.read("linear_turns", out.linear_turns);
     options.read("corrections", out.corrections);
     options.read("correction_cap", out.correction_cap);
     options.read("force_collision", out.force_collision);

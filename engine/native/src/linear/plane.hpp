@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "linear/elementary.hpp"
 #include "linear/vec.hpp"
 
 namespace spook {
@@ -35,6 +36,11 @@ constexpr HalfTurn conjugate(HalfTurn a) noexcept { return {a.cosine, -a.sine}; 
 constexpr HalfTurn unit(HalfTurn a) noexcept {
     const double s = 1.5 - 0.5 * (a.cosine * a.cosine + a.sine * a.sine);
     return {s * a.cosine, s * a.sine};
+}
+
+inline HalfTurn half_turn(double angle) noexcept {
+    const SineCosine half = sine_cosine(0.5 * angle);
+    return {half.cosine, half.sine};
 }
 
 /// The turn's matrix less one, [[fall, −sine], [sine, fall]], with the relative accuracy of a small angle.

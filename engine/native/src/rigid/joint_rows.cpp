@@ -197,7 +197,7 @@ void joint_bias(const JointConstants& joint, const BodyState& first, const BodyS
 }
 
 void joint_curvature(const JointConstants& joint, const BodyState& first, const BodyState& second,
-                     const BodyState& first_there, const BodyState& second_there, double h,
+                     const BodyState& first_there, const BodyState& second_there, double h, OpenGap gap,
                      double* out) noexcept {
     JointRows rows{};
     double spare[2][36], there[6];
@@ -211,19 +211,20 @@ void joint_curvature(const JointConstants& joint, const BodyState& first, const 
     const Vec3 spins =
         cross(second.angular_velocity, second_reach) - cross(first.angular_velocity, first_reach);
     Vec3 slide = second.velocity - first.velocity + spins;  // along what no row holds
-    Vec3 gap = second.displacement - first.displacement + second.turn_less_one * joint.second_arm -
-               first.turn_less_one * joint.first_arm;
+    Vec3 slid = second.displacement - first.displacement + second.turn_less_one * joint.second_arm -
+                first.turn_less_one * joint.first_arm;
     const Vec3 bend =
         (second_there.turn_less_one * joint.second_arm - second.turn_less_one * joint.second_arm) -
         (first_there.turn_less_one * joint.first_arm - first.turn_less_one * joint.first_arm);
     for (int k = holds.linear_first; k < holds.linear_end; ++k) {
         const Vec3 axis = carried(first, joint.axes[k]);
         slide -= dot(axis, slide) * axis;
+        if (gap == OpenGap::stays) slid -= dot(axis, slid) * axis;
     }
-    // The gap goes along with the first body, and slides on.
+    // What has slid goes along with the first body, and slides on.
     const Quat turned = first_there.turn * conjugate(first.turn);
-    const Vec3 ahead = gap + h * slide;
-    const Vec3 way = ahead + rotation_less_one(turned) * ahead - gap;
+    const Vec3 ahead = slid + h * slide;
+    const Vec3 way = ahead + rotation_less_one(turned) * ahead - slid;
     for (int k = holds.linear_first; k < holds.linear_end; ++k)
         *out++ = dot(carried(first, joint.axes[k]), bend - h * spins - way);
 }

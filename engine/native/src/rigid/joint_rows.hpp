@@ -63,10 +63,14 @@ void joint_violation(const JointConstants& joint, const BodyState& first, const 
 void joint_bias(const JointConstants& joint, const BodyState& first, const BodyState& second,
                 double* bias) noexcept;
 
+/// Where the gap that a joint has left open between its ends goes while they turn: along with its first body, as its rows see it; or it
+/// stays in place, where it can be closed however far that body turns in the step.
+enum class OpenGap { goes_along, stays };
+
 /// Per row g(there) − g − h G v: what a linear row leaves out of the way over h, or back over −h, on which the ends turn from
 /// where they are to `there`. Centres go as the joint lets them, not as their velocities point now, which turn as well.
 void joint_curvature(const JointConstants& joint, const BodyState& first, const BodyState& second,
-                     const BodyState& first_there, const BodyState& second_there, double h,
+                     const BodyState& first_there, const BodyState& second_there, double h, OpenGap gap,
                      double* out) noexcept;
 
 /// What bias says for the rate of the free coordinate.

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 
+#include "linear/disjoint_sets.hpp"
 #include "rigid/rotors.hpp"
 #include "rigid/tyre_rows.hpp"
 
@@ -96,10 +97,37 @@ void JointSet::assemble(int index, std::span<const BodyState> bodies, double* fi
         for (int k = 0; k < block.size; ++k)
             right.right[k] =
                 joint.gain[k].upsilon * rows.rate[k] - joint.gain[k].violation * rows.violation[k];
+        if (!turning.empty() && joint.constants.kind != JointKind::distance)
+            follow_turns(joint, bodies, right);
     }
     if (!state.broken) return;
     right.lower.fill(0.0);
     right.upper.fill(0.0);
+}
+
+/// What spins leaves the rows, linear in the turn, by half its square: beyond a fiftieth of a radian in a step the bend of the way
+/// here and of the way on, at the velocities at hand, come into the right sides. What spins steadily then stays in place.
+void JointSet::follow_turns(const Joint& joint, std::span<const BodyState> bodies,
+                            BlockRight& right) const noexcept {
+    const BodyState &first = state_of(joint.first, bodies), &second = state_of(joint.second, bodies);
+    const double turn = turn_in_step(time_step_, first, second);
+    double share = share_of_bend(turn);
+    if (!(share > 0.0)) return;
+    BodyState behind[2] = {first, second}, next[2] = {first, second}, ahead[2];
+    for (int i = 0; i < 2; ++i) {
+        const int body = i == 0 ? joint.first : joint.second;
+        if (body >= 0) look_around(turning[body], time_step_, behind[i], next[i], ahead[i]);
+        else ahead[i] = next[i];
+    }
+    double on[6], back[6];
+    joint_curvature(joint.constants, next[0], next[1], ahead[0], ahead[1], time_step_, OpenGap::stays, on);
+    joint_curvature(joint.constants, first, second, behind[0], behind[1], -time_step_, OpenGap::stays, back);
+    const int linear = joint.constants.holds.linear();
+    for (int k = 0; k < joint.constants.rows; ++k) {
+        const double relaxation = 0.25 * (1.0 / joint.gain[k].upsilon - 1.0);
+        if (k == linear) share *= share_of_angles(turn);
+        right.right[k] -= share * joint.gain[k].violation * (0.25 * (on[k] + back[k]) + relaxation * on[k]);
+    }
 }
 
 void JointSet::assemble_axial(const JointBlock& block, std::span<const BodyState> bodies, double* first,
@@ -178,6 +206,17 @@ JointSet::RowGain JointSet::gain(int index, int row) const noexcept {
     return {gain.violation, relaxation, linear && arms > 0.0 ? arms : 1.0};
 }
 
+bool JointSet::has_loops(std::span<const BodyConstants> bodies) const {
+    DisjointSets tied;
+    tied.begin(bodies.size() + 1);  // the last one: all that does not move by itself
+    const auto of = [&](int body) {
+        return body >= 0 && bodies[body].moves() ? body : static_cast<int>(bodies.size());
+    };
+    for (const Joint& joint : joints_)
+        if (joint.general < 0 && joint.tyre < 0 && !tied.join(of(joint.first), of(joint.second))) return true;
+    return false;
+}
+
 void JointSet::bias(int index, std::span<const BodyState> bodies, double* out) const noexcept {
     const JointBlock& block = blocks_[index];
     const Joint& joint = joints_[block.joint];
@@ -196,7 +235,7 @@ void JointSet::curvature(int index, std::span<const BodyState> bodies, std::span
     if (joint.general >= 0 || joint.tyre >= 0)
         return static_cast<void>(std::fill_n(out, joint.constants.rows, 0.0));
     joint_curvature(joint.constants, state_of(joint.first, bodies), state_of(joint.second, bodies),
-                    state_of(joint.first, there), state_of(joint.second, there), h, out);
+                    state_of(joint.first, there), state_of(joint.second, there), h, OpenGap::goes_along, out);
 }
 
 void JointSet::violation(int index, std::span<const BodyState> bodies, double* out) const noexcept {

@@ -23,6 +23,10 @@ public:
 
     JointSet(const RigidScene& scene, double time_step);
 
+    std::span<const BodyConstants> turning;  // whose fast turns the right sides follow; empty: none follow
+    /// Whether joints make a loop of bodies, or of what does not move by itself.
+    bool has_loops(std::span<const BodyConstants> bodies) const;
+
     std::span<const JointBlock> blocks() const noexcept { return blocks_; }
     int count() const noexcept { return static_cast<int>(joints_.size()); }
     int rows(int joint) const noexcept { return joints_[joint].constants.rows; }
@@ -150,6 +154,8 @@ private:
     JointBlock add_own_rows(const RigidScene& scene, const JointSpec& spec, Joint& joint);
     void assemble_tyre(const Joint& joint, State& state, std::span<const BodyState> bodies, double* first,
                        double* second, BlockRight& right) noexcept;
+    void follow_turns(const Joint& joint, std::span<const BodyState> bodies,
+                      BlockRight& right) const noexcept;
     void assemble_axial(const JointBlock& block, std::span<const BodyState> bodies, double* first,
                         double* second, BlockRight& right) noexcept;
 

@@ -20,7 +20,8 @@ Twist LockedTree::momentum_of(const Link& link, const BodyState& s, const Locked
 }
 
 /// Where the joint is and what its rows ask for.
-void LockedTree::locate(std::size_t k, std::span<const BodyState> bodies, Work& work) const noexcept {
+void LockedTree::locate(std::size_t k, std::span<const BodyState> bodies, const LockedLoads& loads,
+                        Work& work) const noexcept {
     const Hold& hold = holds_[k];
     const Gain& gain = gains_[links_[k].gain];
     const BodyState& child = bodies[links_[k].body];
@@ -45,7 +46,45 @@ void LockedTree::locate(std::size_t k, std::span<const BodyState> bodies, Work& 
     work.tilt_softness = gain.softness[1] * (over * over);
     work.left.linear = gain.upsilon[0] * slip.linear - gain.violation[0] * gap;
     work.left.angular = gain.upsilon[1] * slip.angular - (sign * 2.0 * gain.violation[1] * over) * work.tilt;
+    if (loads.follows_turns) follow_turns(k, bodies, loads, work);
     if (links_[k].parent < 0) work.left += to_joint(others, work.other_arm);
+}
+
+/// As JointSet::follow_turns(), of a lock.
+void LockedTree::follow_turns(std::size_t k, std::span<const BodyState> bodies, const LockedLoads& loads,
+                              Work& work) const noexcept {
+    const Hold& hold = holds_[k];
+    const Gain& gain = gains_[links_[k].gain];
+    const BodyState &child = bodies[links_[k].body], &other = hold.other < 0 ? still_ : bodies[hold.other];
+    const double turn = turn_in_step(loads.time_step, child, other);
+    if (!(share_of_bend(turn) > 0.0)) return;
+    const int bodies_of[2] = {links_[k].body, hold.other};
+    BodyState behind[2] = {child, other}, next[2] = {child, other}, ahead[2];
+    for (int i = 0; i < 2; ++i) {
+        if (const int body = bodies_of[i]; body >= 0)
+            look_around(loads.constants[body], loads.time_step, behind[i], next[i], ahead[i]);
+        else ahead[i] = next[i];
+    }
+    const auto tilt = [&](const BodyState* at) {
+        const Quat q = conjugate(at[1].turn) * at[0].turn;
+        return (2.0 / q.w) * carried(other, vector_of(q));
+    };
+    const auto bend = [&](const BodyState* from, const BodyState* there, double h) {
+        const Vec3 w = from[0].angular_velocity, other_w = from[1].angular_velocity;
+        return Twist{there[0].turn_less_one * hold.arm - from[0].turn_less_one * hold.arm -
+                         (there[1].turn_less_one * hold.other_arm - from[1].turn_less_one * hold.other_arm) -
+                         h * (cross(w, work.arm) - cross(other_w, work.other_arm)),
+                     tilt(there) - tilt(from) - h * (w - other_w)};
+    };
+    const Twist on = bend(next, ahead, loads.time_step);
+    const BodyState here[2] = {child, other};
+    const Twist back = bend(here, behind, -loads.time_step);
+    const auto lead = [&](int i, Vec3 after, Vec3 before) {
+        const double relaxation = 0.25 * (1.0 / gain.upsilon[i] - 1.0);
+        return share_of_bend(turn) * gain.violation[i] * (0.25 * (after + before) + relaxation * after);
+    };
+    work.left.linear -= lead(0, on.linear, back.linear);
+    work.left.angular -= share_of_angles(turn) * lead(1, on.angular, back.angular);
 }
 
 /// Leaves first. The first time K is found as well; then what the velocities so far leave of rows and momenta.
@@ -83,14 +122,14 @@ void LockedTree::eliminate(std::span<const BodyState> bodies, const LockedLoads&
         }
         const Gain& gain = gains_[link.gain];
         if constexpr (FIRST) {
-            locate(k, bodies, work);
+            locate(k, bodies, loads, work);
             work.stiffness = shifted(mass, work.arm);
             soften_all(work.stiffness, gain.softness, work.tilt, work.tilt_softness);
         } else {
             momentum += about_centre(work.impulse, work.arm);
             Twist slip = to_joint(work.velocity, work.arm);
             if (link.parent >= 0) slip -= to_joint(works_[link.parent].velocity, work.other_arm);
-            if (again) locate(k, bodies, work);  // a refinement before this one is in the place of y
+            if (again) locate(k, bodies, loads, work);  // a refinement before this one is in the place of y
             work.left = work.left - slip - give(work, gain, work.impulse);
         }
         const Twist q = about_joint(momentum, work.arm);

@@ -25,6 +25,7 @@ struct LockedLoads {
     Vec3 gravity;                               // m/s², of all bodies, if there are no loads
     std::span<const BodyConstants> constants;   // for torques
     std::span<const Vec3> acceleration, force;  // per body; empty where there are none
+    bool follows_turns;                         // as JointSet::follow_turns()
 };
 
 class LockedTree {
@@ -108,7 +109,10 @@ private:
     void eliminate(std::span<const BodyState> bodies, const LockedLoads& loads, bool again) noexcept;
     void eliminate(std::span<const BodyState> bodies, const LockedLoads& loads, bool first,
                    bool again) noexcept;
-    void locate(std::size_t k, std::span<const BodyState> bodies, Work& work) const noexcept;
+    void locate(std::size_t k, std::span<const BodyState> bodies, const LockedLoads& loads,
+                Work& work) const noexcept;
+    void follow_turns(std::size_t k, std::span<const BodyState> bodies, const LockedLoads& loads,
+                      Work& work) const noexcept;
     Twist momentum_of(const Link& link, const BodyState& s, const LockedLoads& loads) const noexcept;
 
     /// How far the rows give way under an impulse: C μ.

@@ -208,6 +208,7 @@ void PlaneStep::assemble() noexcept {
             put({-u.x, -u.y, -cross(joint.first_reach, u)}, {u.x, u.y, cross(joint.second_reach, u)},
                 dot(u, gap));
         }
+        if (options_.follows_turns) follow_turns(joint, first, second, gap);
         if (joint.sense == 0.0) continue;
         HalfTurn between = conjugate(a.at.turn) * b.at.turn;
         if (between.cosine < 0.0) between = {-between.cosine, -between.sine};
@@ -218,6 +219,35 @@ void PlaneStep::assemble() noexcept {
     for (const Coupling& m : couplings_) {
         const Lever &one = levers_[m.lever], &two = shares_[m.other];
         envelope_[m.to] += one.x * two.x + one.y * two.y + one.turn * two.turn;
+    }
+}
+
+/// As JointSet::follow_turns(). `first`, `second`: what the arms' turns have added to them; `gap`: between their ends.
+void PlaneStep::follow_turns(const Joint& joint, Vec2 first, Vec2 second, Vec2 gap) noexcept {
+    const Node &a = nodes_[joint.first], &b = nodes_[joint.second];
+    const double h = options_.time_step,
+                 share = share_of_bend(h * std::max(std::fabs(a.rate), std::fabs(b.rate)));
+    if (!(share > 0.0)) return;
+    Vec2 slid = gap, slide = b.velocity + b.rate * across(joint.second_reach) - a.velocity -
+                             a.rate * across(joint.first_reach);
+    for (int k = 0; k < joint.linear; ++k) {
+        const Vec2 u = carried(a.at.turned, joint.axes[k]);
+        slid -= dot(u, slid) * u;
+        slide -= dot(u, slide) * u;
+    }
+    const auto bend = [&](double way) {
+        const TurnLessOne of_first = less_one(half_turn(way * a.rate)),
+                          of_second = less_one(half_turn(way * b.rate));
+        const Vec2 there = slid + way * slide;
+        return of_second * (joint.second_arm + second) - way * b.rate * across(joint.second_reach) -
+               of_first * (joint.first_arm + first) + way * a.rate * across(joint.first_reach) - way * slide -
+               of_first * there;
+    };
+    const Vec2 ahead = bend(h), back = bend(-h);
+    for (int k = 0; k < joint.linear; ++k) {
+        const Vec2 u = carried(a.at.turned, joint.axes[k]);
+        const int r = joint.row + k;
+        asked_[r] -= share * rows_[r].gain * (rows_[r].ahead * dot(u, ahead) + 0.25 * dot(u, back));
     }
 }
 
@@ -358,8 +388,7 @@ void PlaneStep::take_velocities() noexcept {
 /// A pose a step on.
 void PlaneStep::advance(Vec2 velocity, double rate, Pose& pose) const noexcept {
     pose.displacement += options_.time_step * velocity;
-    const SineCosine half = sine_cosine(0.5 * options_.time_step * rate);
-    pose.turn = unit(HalfTurn{half.cosine, half.sine} * pose.turn);
+    pose.turn = unit(half_turn(options_.time_step * rate) * pose.turn);
     pose.turned = less_one(pose.turn);
 }
 

@@ -24,6 +24,7 @@ public:
         double time_step = 0.0;
         int refinements = 1, corrections = 0;
         double cap = 0.0;  // of a correction, part of the joint's size
+        bool follows_turns = false;
     };
     /// Takes the scene if every constrained body moves in the plane and is held there by hinges, locks, slides and planar joints
     /// on each other, and somewhere on what is fixed. Empty otherwise.
@@ -121,6 +122,7 @@ private:
     void solve_refined() noexcept;
     void look(const Joint& joint, const Pose& a, const Pose& b, double* violation) const noexcept;
     double changed(int row, const Node& a, const Node& b) const noexcept;
+    void follow_turns(const Joint& joint, Vec2 first, Vec2 second, Vec2 gap) noexcept;
     void take_past_curvature() noexcept;
     void correct() noexcept;
     void advance(Vec2 velocity, double rate, Pose& pose) const noexcept;

@@ -10,16 +10,7 @@
 
 namespace spook {
 
-namespace {
-
 using namespace tolerances::plane_tree;
-
-HalfTurn half_turn(double angle) noexcept {
-    const SineCosine half = sine_cosine(0.5 * angle);
-    return {half.cosine, half.sine};
-}
-
-}  // namespace
 
 void PlaneTree::take(Plane3 plane, std::vector<Node> nodes, std::vector<Closing> closings, int reach,
                      double scale) {

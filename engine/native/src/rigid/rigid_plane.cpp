@@ -7,9 +7,9 @@
 namespace spook {
 
 void PlanePath::take() {
-    plane_.analyse(
-        model_.constants, joints_, model_.constrained,
-        {model_.h, model_.method.refinements, model_.method.corrections, model_.method.correction_cap});
+    plane_.analyse(model_.constants, joints_, model_.constrained,
+                   {model_.h, model_.method.refinements, model_.method.corrections,
+                    model_.method.correction_cap, !joints_.turning.empty()});
     begin();
 }
 

@@ -166,6 +166,7 @@ struct RigidMethod {
     double tolerance = 0.0;         // of its parts of a step, rad or sizes of joints; 0: none, a step is one
     bool string_stiffness = false;  // the geometric stiffness of loaded joints, implicitly
     bool half_step_velocities = false;  // velocities live at mid-step
+    bool linear_turns = false;          // rows as they are, however far bodies turn
     int corrections = 0;                // extra solves per step for the curvature of the rows
     double correction_cap = 0.3;        // of the joint's arms, or rad
     bool force_collision = false;  // look for contacts even where none are possible, to measure what it costs

@@ -37,7 +37,8 @@ bool BilateralSolve::find_by_links(bool ahead) {
                       model_.stages.runs(Stage::apply_gravity) ? model_.gravity : Vec3{},
                       model_.constants,
                       {},
-                      forces_.of_springs_and_fields()};
+                      forces_.of_springs_and_fields(),
+                      !joints_.turning.empty()};
     if (model_.stages.runs(Stage::apply_loads) || forces_.loads_change())
         loads.acceleration = forces_.accelerations();
     const auto solve = [&](const auto& take) {

@@ -204,9 +204,12 @@ constexpr StageTable<Facts> TABLE{{
                                               " extra back-substitutions keep the curvature of the rows";
      },
      [](const Facts& is) -> std::string {
-         return is.joints ? "the method linearises the rows, so that what spins off its joint slows down; "
-                            "corrections=2 keep its energy"
-                          : "no joints, so nothing is curved";
+         return !is.joints ? "no joints, so nothing is curved"
+                : is.method().linear_turns
+                    ? "rows are linear in the turn, so that what spins off its joint slows down; "
+                      "turns=\"followed\" and corrections=2 keep its energy to a third of a radian a step, order4 beyond"
+                    : "where bodies turn far in a step, the right sides of their joints follow the bend of the way; what spins "
+                      "askew by more than a third of a radian a step loses energy: composition=\"order4\" keeps it";
      }},
     {Stage::half_step, [](const Facts& is) { return is.composed() || is.method().half_step_velocities; },
      [](const Facts& is) {

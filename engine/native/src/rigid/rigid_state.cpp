@@ -1,5 +1,7 @@
 #include "rigid/rigid_state.hpp"
 
+#include "rigid/tolerances.hpp"
+
 namespace spook {
 namespace {
 
@@ -100,6 +102,28 @@ void move(const BodyConstants& body, double h, BodyState& state) noexcept {
     if (body.motion == Motion::fixed) return;
     advance_pose(body, h, state);
     if (!body.particle) state.turn_less_one = rotation_less_one(state.turn);
+}
+
+double share_of_bend(double turn) noexcept { return std::clamp(turn / fast_turn - 1.0, 0.0, 1.0); }
+double share_of_angles(double turn) noexcept { return std::clamp(2.0 - turn / far_turn, 0.0, 1.0); }
+
+void look_around(const BodyConstants& body, double h, BodyState& behind, BodyState& next,
+                 BodyState& ahead) noexcept {
+    const bool steady = body.motion != Motion::kinematic &&
+                        h * h * dot(next.angular_velocity, next.angular_velocity) > 4.0 * far_turn * far_turn;
+    const auto moved = [&](double time, BodyState& state) {
+        if (!steady) return move(body, time, state);
+        state.displacement += time * state.velocity;
+        state.turn = unit(turn_of(time, state.angular_velocity) * state.turn);
+        state.turn_less_one = rotation_less_one(state.turn);
+    };
+    moved(-h, behind);
+    if (!steady && !body.particle && body.moves() && !isotropic(body.inertia)) {
+        next.angular_momentum =
+            carried(rotation_less_one(next.turn * conjugate(behind.turn)), next.angular_momentum);
+        next.angular_velocity = turned_by(body, next, next.angular_momentum);
+    }
+    moved(h, ahead = next);
 }
 
 void lead(const BodyConstants& body, const Mat3& axes, double h, const BodyState& from,

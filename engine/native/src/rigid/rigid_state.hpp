@@ -2,6 +2,9 @@
 // the start: a violation of 1e-11 m is then known to sixteen digits, however far from the origin the scene lies.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
+
 #include "rigid/rigid_scene.hpp"
 #include "rigid/rotation.hpp"
 
@@ -57,6 +60,20 @@ BodyState start_of(const RigidBodySpec& spec, const BodyConstants& body) noexcep
 
 /// Angular velocity from angular momentum, and the derived matrices, at the state's orientation.
 void refresh(const BodyConstants& body, BodyState& state) noexcept;
+
+/// How much of the bend of its rows a joint follows: 0 where what it holds turns little in a step, 1 where it turns far [rad]; and of
+/// the bend of its angles, 0 where it turns by a radian: then where an axle points does not follow from how it spins.
+double share_of_bend(double turn) noexcept;
+double share_of_angles(double turn) noexcept;
+/// The larger turn of two bodies in a step h [rad].
+inline double turn_in_step(double h, const BodyState& first, const BodyState& second) noexcept {
+    return h * std::sqrt(std::max(dot(first.angular_velocity, first.angular_velocity),
+                                  dot(second.angular_velocity, second.angular_velocity)));
+}
+
+/// A step back and a step on of a body that goes on as it came: its spin turns on with the body (`next`). All three begin as it is.
+void look_around(const BodyConstants& body, double h, BodyState& behind, BodyState& next,
+                 BodyState& ahead) noexcept;
 
 /// Where integrate() takes a body, without the rest of what is derived from it: displacement, turn, turn_less_one.
 void move(const BodyConstants& body, double h, BodyState& state) noexcept;

@@ -39,6 +39,12 @@ bool stops_are_apart(const JointSet& joints, std::span<const int> index, int bod
     return true;
 }
 
+/// Plain steps do, but of loops: their rows depend on each other, and what is taken from one would contradict another.
+bool follows_turns(const RigidModel& model, const JointSet& joints) {
+    return !model.method.linear_turns && model.method.corrections == 0 && !model.composed &&
+           !model.half_step && !model.stiff && !joints.has_loops(model.constants);
+}
+
 }  // namespace
 
 RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
@@ -68,6 +74,7 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     model_.half_step = model_.stages.runs(Stage::half_step) && !model_.composed;
     model_.stiff = model_.stages.runs(Stage::string_stiffness) && block;
     model_.curved = method.corrections > 0 && !model_.composed && rows_.rows() > 0 && (!block || may_touch);
+    if (follows_turns(model_, joints_)) joints_.turning = model_.constants;
     if (!may_touch &&
         stops_are_apart(joints_, model_.solver_index, static_cast<int>(model_.constrained.size())))
         joints_.stops().let_fold();
@@ -278,6 +285,11 @@ RigidSystem::Work RigidSystem::work_done() const noexcept {
     done = done +
            Work{{plane_.solves(), plane_.solves() * plane_.step().blocks(), 0, plane_.solves() * readings}};
     return mixed_.contacts() ? done + Work{mixed_.contacts()->factor_counters()} : done;
+}
+
+void RigidSystem::judge_end(RunReport& report) const {
+    energy_.judge(report);
+    judge_open_joints(model_, live_, joints_, report);
 }
 
 void RigidSystem::count(RunReport& report, std::int64_t steps) const {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 
 #include "rigid/tolerances.hpp"
 
@@ -75,6 +76,37 @@ const char* cause_of_runaway(const RigidModel& model, const JointSet& joints,
                  "(T h²/(m l) is above 0.3); use a smaller time step"
                : "ran away: its joints carry more tension than so light a body can take in a step "
                  "(T h²/(m l) is above 0.3); use string_stiffness=True, or a smaller time step";
+}
+
+void judge_open_joints(const RigidModel& model, const RigidState& live, const JointSet& joints,
+                       RunReport& report) {
+    if (report.status != Status::completed) return;
+    const auto blocks = joints.blocks();
+    for (int k = 0; k < static_cast<int>(blocks.size()); ++k) {
+        const JointBlock& block = blocks[k];
+        const JointState& state = joints.states[block.joint];
+        const int linear = block.axial ? 0 : holds_of(joints.constants(block.joint).kind).linear();
+        if (linear == 0 || state.broken) continue;
+        const JointSet::RowLaw law = joints.law(block.joint, 0);
+        if (law.softness * model.h > rigid_compliance * law.violation) continue;  // it is meant to give way
+        double violation[6], open = 0.0;
+        joints.violation(block.joint, live.bodies, violation);
+        for (int i = 0; i < linear; ++i) open += violation[i] * violation[i];
+        open = std::sqrt(open);
+        if (!(open > joints.gain(k, 0).extent)) continue;
+        report.status = Status::unsettled;
+        report.failed_step = report.steps;
+        report.failed_body = model.constants[std::max(block.second, 0)].moves() && block.second >= 0
+                                 ? block.second
+                                 : block.first;
+        char said[160];
+        std::snprintf(
+            said, sizeof said,
+            "was found %.3g m off its joint, further than the joint's arms reach; take smaller steps or less compliance",
+            open);
+        report.reason = said;
+        return;
+    }
 }
 
 }  // namespace spook

@@ -6,6 +6,7 @@
 
 #include "rigid/rigid_model.hpp"
 #include "rigid/run_state.hpp"
+#include "run/report.hpp"
 
 namespace spook {
 
@@ -17,5 +18,9 @@ int find_whirling(const RigidModel& model, const RigidState& live, const JointSe
 /// it. `touching`: where surfaces may touch.
 const char* cause_of_runaway(const RigidModel& model, const JointSet& joints,
                              const LargeArray<JointState>& early, bool touching, bool known) noexcept;
+
+/// Bodies found further off a rigid joint than its arms reach: unsettled, however quietly they got there.
+void judge_open_joints(const RigidModel& model, const RigidState& live, const JointSet& joints,
+                       RunReport& report);
 
 }  // namespace spook

@@ -124,7 +124,8 @@ inline constexpr double steady_squared = 0x1p-106;  // square of the rounding of
 // runaway.cpp
 namespace tolerances::runaway {
 inline constexpr double passing_energy = 1e-6;  // of its spin's energy: what it has by going round its joint
-inline constexpr double taut = 0.3;             // of h² F / (m r): a body lighter for its load is loaded
+inline constexpr double rigid_compliance = 1e-5;  // m/N: what gives way more is meant to
+inline constexpr double taut = 0.3;               // of h² F / (m r): a body lighter for its load is loaded
 }  // namespace tolerances::runaway
 
 // sleep.cpp
@@ -146,6 +147,10 @@ inline constexpr std::size_t looking_from = 16;  // bodies: steps of fewer are t
 }
 
 // Read by several parts
+inline constexpr double fast_turn =
+    0.02;  // rad in a step: linear rows are off by half its square, 1/5000 of their arms
+inline constexpr double far_turn =
+    0.5;  // rad in a step: twice as far, and an axle may point anywhere at its end
 inline constexpr double creep_speed = 1e-3;  // m/s: a wheel that is slower creeps
 
 // wake.cpp

@@ -73,7 +73,7 @@ public:
             report.status = Status::timed_out;
             report.failed_step = report.steps + 1;
         }
-        if constexpr (requires { system_.judge_energy(report); }) system_.judge_energy(report);
+        if constexpr (requires { system_.judge_end(report); }) system_.judge_end(report);
         report.state_hash = state_hash(report.final_state);
         for (std::size_t k = 0; k < STAGES; ++k) {
             const Stage stage = static_cast<Stage>(k);
