@@ -79,13 +79,14 @@ class Method:
                        iterations go on there and nearby, for up to sixteen times the work (joints: four)
     friction           cone (isotropic), box (bound from the step before), scaled_box (current normal force)
     impacts            simultaneous: all that touch take part in one impact (a ball on four gives −.6 and four times .4);
-                       free balls of which one pair meets at a time do so one after the other, as often as they meet; any
-                       other pair is hit once in a step, and stops without rebound where it approaches again
-                       (counters["stopped_impacts"]); so is a joint's stop where surfaces may touch or another is connected,
-                       else as often as its ends are met in the step;
+                       what flies, balls of which one pair meets at a time or a single body of any shape, does so one after the
+                       other, each at its time, as often as it meets; any other pair is hit once, as the step begins, and
+                       stops without rebound where it approaches again (counters["stopped_impacts"]; substeps tell such
+                       impacts apart); so does a joint's stop that bodies touch, another is connected to, or that flies
+                       where surfaces may touch, else it is met at its times, too;
                        successive: one pair after the other until none approaches, as if there were small gaps (the
                        last ball leaves, no energy is lost at restitution 1); those that are open as a step begins in
-                       the order in which they close, free balls moved from one impact to the next
+                       the order in which they close, what flies moved from one impact to the next as above
     unsettled_residual a solve that leaves more than this [m/s], by default .05 of `Scene.typical_speed`, makes the run
                        "unsettled": the row furthest from its law, its impulse against where a step of projection would
                        put it; so does one that stopped early and left bodies sunk into each other by a fiftieth of the

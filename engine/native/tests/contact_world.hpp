@@ -60,6 +60,16 @@ public:
             }
         while (touching && stage.impact_needed(system)) {
             momenta(velocity);
+            StepMotion& motion = stage.find_next_impact(system);
+            for (std::size_t k = 0; k < bodies.size(); ++k)
+                if (const double until = motion.moved_until(static_cast<int>(k)); until > 0.0) {
+                    const Vec3 w{velocity[k][3], velocity[k][4], velocity[k][5]};
+                    const double rate = norm(w),
+                                 share = rate > 0.0 ? sine_cosine(0.5 * until * rate).sine / rate : 0.0;
+                    const Quat turn{sine_cosine(0.5 * until * rate).cosine, share * w.x, share * w.y,
+                                    share * w.z};
+                    motion.turn_to_impact(static_cast<int>(k), rotation(turn) * poses[k].rotation, w);
+                }
             std::vector<Vec6> impulses;
             stage.impact(system, impulses);
             for (std::size_t k = 0, u = 0; k < bodies.size(); ++k)

@@ -159,38 +159,76 @@ def test_a_ball_between_closing_walls_is_hit_as_often_as_it_meets_them(method: M
 
 
 @pytest.mark.parametrize("method", SOLVERS)
+@pytest.mark.parametrize("h", STEPS)
+@pytest.mark.parametrize(
+    "shape", [Sphere(0.05), Box((0.1, 0.1, 0.1)), Capsule(0.05, 0.1)], ids=["ball", "box", "capsule"]
+)
+@pytest.mark.parametrize(("play", "speed"), [(0.02, 3.0), (0.04, 5.0), (0.19, 1.7)])
+def test_an_elastic_body_goes_to_and_fro_between_walls(
+    play: float, speed: float, shape: Shape, h: float, method: Method
+) -> None:
+    """In closed form, up to four impacts a step. A box or a capsule was met where its step begins, once: it kept .14 to .56 of its
+    speed at 1/60 s, or came back 200 times in 20 s where 179 is right."""
+    elastic = Material(restitution=1.0)
+    walls = [
+        fixed(
+            f"wall {side}",
+            Plane((-side, 0.0, 0.0)),
+            (side * (0.05 + play / 2), 0.0, 0.0),
+            material=elastic,
+        )
+        for side in (-1.0, 1.0)
+    ]
+    body = solid("body", shape, (0.003, 0.0, 0.0), velocity=(speed, 0.0, 0.0), material=elastic)
+    steps = round(4.0 / h)
+    observe = {"x": Trace(quantity=Position("body")), "v": Trace(quantity=Velocity("body"))}
+    run = simulate(
+        Scene(bodies=(body, *walls)), time_step=h, steps=steps, method=method, observe=observe, books=True
+    )
+    way = (play / 2 + 0.003 + speed * h * np.arange(steps + 1)) % (2 * play)
+
+    assert run.completed
+    np.testing.assert_allclose(run["x"][:, 0], play / 2 - np.abs(way - play), rtol=0.0, atol=1e-9)
+    assert abs(run["v"][-1, 0]) == pytest.approx(speed, rel=1e-9)
+    assert run.books.stopped_impacts == 0
+
+
+@pytest.mark.parametrize("method", SOLVERS)
 def test_impacts_that_are_stopped_without_a_rebound_are_counted(method: Method) -> None:
-    """A box, which is not moved to the time of an impact, between two plates 4 mm off: it is stopped, and says so."""
+    """A box on a guide, which is not moved to the time of an impact, between two plates 4 mm off: it is stopped, and says so."""
     elastic = Material(restitution=1.0)
 
     def plate(name: str, x: float) -> RigidBody:
         return fixed(name, Box((1.0, 2.0, 2.0)), (x, 0.0, 0.0), material=elastic)
 
     box = solid("box", Box((0.2, 0.2, 0.2)), (0.0, 0.0, 0.0), velocity=(3.0, 0.0, 0.0), material=elastic)
+    guide = Prismatic(name="guide", between=(WORLD, "box"), axis=(1.0, 0.0, 0.0))
     run = simulate(
-        Scene(bodies=(box, plate("left", -0.602), plate("right", 0.602))),
+        Scene(bodies=(box, plate("left", -0.602), plate("right", 0.602)), constraints=(guide,)),
         time_step=1 / 60,
         steps=60,
         method=method,
         observe={"v": Trace(quantity=Velocity("box"))},
     )
-    slowed = np.abs(run["v"][-1, 0]) < 2.9
 
-    assert (run.counters["stopped_impacts"] > 0) == slowed
+    assert np.abs(run["v"][-1, 0]) < 2.9
+    assert run.counters["stopped_impacts"] > 0
 
 
 def test_a_stop_whose_rebound_ends_at_the_other_end_is_counted() -> None:
-    """Where surfaces may touch, a slide at 3 m/s between elastic stops 8 mm apart goes no further in a step than from one to the other."""
+    """Where surfaces may touch, a slide on what flies, at 3 m/s between elastic stops 8 mm apart, goes no further in a step than from
+    one to the other."""
     slide = solid("slide", Sphere(0.1), (0.0, 0.0, 0.0), velocity=(3.0, 0.0, 0.0), inertia=(0.1,) * 3)
     guide = Prismatic(
         name="guide",
-        between=(WORLD, "slide"),
+        between=("rail", "slide"),
         axis=(1.0, 0.0, 0.0),
         limit=Limit(lower=-0.004, upper=0.004, restitution=1.0),
     )
     run = simulate(
         Scene(
             bodies=(
+                RigidBody(name="rail", mass=1e3, position=(0.0, 0.0, 0.0), inertia=(1.0,) * 3),
                 slide,
                 RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, -9.0)),
             ),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import (
+    WORLD,
     Box,
     Capsule,
     Material,
@@ -16,6 +17,7 @@ from spook_tracker.engine import (
     Penetration,
     Plane,
     Position,
+    Prismatic,
     RigidBody,
     Scene,
     Sphere,
@@ -98,15 +100,20 @@ def test_a_ball_bounces_where_the_map_of_its_steps_says() -> None:
 
 @pytest.mark.parametrize("solver", ["direct", "iterative"])
 @pytest.mark.parametrize("psi", [0.3, 0.6, 0.9])
-def test_an_impact_ahead_in_the_step_gives_back_what_it_meets_with(psi: float, solver: str) -> None:
-    """A step's v is that of the middle of the step before. Met with (v − g h/2)² + 2 g d below the start of the step, given back ψ times
-    as fast, slower by 2 g d up there again, and by g h/2 in the middle of the step."""
+@pytest.mark.parametrize("guided", [False, True])
+def test_an_impact_ahead_in_the_step_gives_back_what_it_meets_with(
+    guided: bool, psi: float, solver: str
+) -> None:
+    """A step's v is that of the middle of the step before: what flies along v − g h is met as fast as it falls until then, given back ψ
+    times as fast, and slower by what gravity takes until the middle of the step. On a guide it is met as the step begins, given back
+    ψ times as fast as v² + 2 g d, slower by 2 g d up there again, and by g h in the step."""
     rubber = Material(restitution=psi)
     capsule = RigidBody(
         name="capsule", mass=1.0, shape=Capsule(0.1, 0.5), position=(0.0, 0.0, 1.0), material=rubber
     )
+    guide = Prismatic(name="guide", between=(WORLD, "capsule"), axis=(0.0, 0.0, 1.0), compliance=0.0)
     result = simulate(
-        Scene(bodies=(ground(rubber), capsule), gravity=DOWN),
+        Scene(bodies=(ground(rubber), capsule), constraints=(guide,) * guided, gravity=DOWN),
         time_step=TIME_STEP,
         steps=40,
         method=Method(solver=solver),
@@ -114,12 +121,16 @@ def test_an_impact_ahead_in_the_step_gives_back_what_it_meets_with(psi: float, s
     )
     v, gap = result["v"][:, 2], result["x"][:, 2] - 0.35
     (blow, *_) = np.nonzero((v[:-1] < 0.0) & (v[1:] > 0.0))[0]
-    half_kick = 0.5 * GRAVITY * TIME_STEP
-    met = (v[blow] - half_kick) ** 2 + 2.0 * GRAVITY * gap[blow]
-    back = math.sqrt(psi**2 * met - 2.0 * GRAVITY * gap[blow])
-
     assert gap[blow] > 1e-3
-    assert v[blow + 1] == pytest.approx(back - half_kick, rel=1e-12)
+    if guided:
+        back = math.sqrt(psi**2 * v[blow] ** 2 - (1.0 - psi**2) * 2.0 * GRAVITY * gap[blow])
+        assert v[blow + 1] == pytest.approx(back - GRAVITY * TIME_STEP, rel=1e-9)
+        return
+    time = gap[blow] / (GRAVITY * TIME_STEP - v[blow])
+    back = psi * (GRAVITY * (0.5 * TIME_STEP + time) - v[blow])
+    left = TIME_STEP - time
+    assert v[blow + 1] == pytest.approx(back - GRAVITY * (left - 0.5 * TIME_STEP), rel=1e-12)
+    assert gap[blow + 1] == pytest.approx(left * v[blow + 1], abs=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -61,7 +61,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     state_.counters.contacts += points_.all.size();
     motion_.apply_half_of_forces();
     order_points();
-    measure_points();
+    impacts_.measure(motion_, search_.margins().reach(), points_);
     return true;
 }
 
@@ -92,8 +92,8 @@ int ContactStage::find_impacts(const Cast& cast) {
 }
 
 void ContactStage::impact(MixedSystem& system, std::vector<Vec6>& impulses) {
-    quality_ = impacts_.solve(system, search_.open(), ran_away_ ? not_too_large : 0, motion_, points_,
-                              impulses, state_.counters);
+    quality_ =
+        impacts_.solve(system, ran_away_ ? not_too_large : 0, motion_, points_, impulses, state_.counters);
     mark_rows(system.mass.size(), impacts_.hit_rows());
     after_impact(system);
 }
@@ -121,14 +121,16 @@ void ContactStage::after_impact(const MixedSystem& system) {
         state_.counters.contacts += points_.all.size() - known;
         order_points();
     }
-    measure_points();
+    impacts_.measure(motion_, search_.margins().reach(), points_);
     impacts_.look_again(*model_, points_);
 }
 
 /// After a solve: whether an impact is to come first. Impacts that rebound and were found late follow from others that were too slow
 /// to rebound: the resting rows that answer these know of no bounce, so they are met before, as plastic ones.
 bool ContactStage::needs_impact_first() {
-    if (!rebounds_late_ || !impacts_.meet_slow_too() || !measure_points()) return false;
+    if (!rebounds_late_ || !impacts_.meet_slow_too() ||
+        !impacts_.measure(motion_, search_.margins().reach(), points_))
+        return false;
     order_points();
     return true;
 }

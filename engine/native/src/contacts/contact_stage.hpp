@@ -17,7 +17,7 @@
 // gets rows only if a cast of both along their motion finds that they meet (`collision/shape_cast.hpp`): supported bodies
 // (`contacts/supported_bodies.cpp`) are cast with v, flying ones with v + h M⁻¹ f.
 //
-// Impacts of balls that fly, and of a few that something holds, are events at their own times t within the step, one after the
+// Impacts of what flies, and of a few balls that something holds, are events at their own times t within the step, one after the
 // other (contacts/impact_queue.hpp), with the normals and the arms of their meetings: impulses act there, with a part of the
 // step's forces before and the rest after, and the bodies move by t v₋ + (h − t) v₊. Which part: contacts/supported_bodies.cpp.
 // Other impacts act at the start of the step: the gap may close, no more; with restitution a step early, psi then
@@ -85,6 +85,13 @@ public:
 
     /// The part of the step's forces that acts on `body` before the impact, or before the last one that hit it.
     double toi_fraction(int body) const noexcept { return motion_.toi_fraction[body]; }
+
+    /// Finds the next impact of the step. What it hits that is not a ball is to be brought there before impact(), in `system`, which
+    /// holds mass and momentum, and in the motion it gives.
+    StepMotion& find_next_impact(MixedSystem& system) {
+        impacts_.find_next(system, search_.open(), motion_, points_);
+        return motion_;
+    }
 
     /// The impact. `system` holds mass, momentum M v₋ (with the forces before events) and the rows of joints as for solve(), of
     /// which those take part that are connected to a point. Bilateral ones keep G v₊ + Sig lambda = 0, limits that touch do
@@ -165,7 +172,6 @@ private:
     bool needs_impact_first();
     int find_impacts(const Cast& cast);
     void order_points() { points_.order(state_.cache, model_->surfaces.resists_turning); }
-    bool measure_points() { return impacts_.measure(motion_, search_.margins().reach(), points_); }
     void after_impact(const MixedSystem& system);
     void mark_rows(std::size_t bodies, const std::vector<RowBlock>& rows);
     void move_on(const MixedSystem& system);

@@ -110,8 +110,8 @@ void ImpactQueue::find_islands(const OpenPairs& open_pairs, const StepMotion& mo
 }
 
 /// What bodies say of their islands. Those in which something rebounds are followed: all where impacts are successive; else those
-/// of balls, of any number that fly, of a few that something holds. What one of several bodies without rebound sets in motion may
-/// meet others that no one looked for yet.
+/// of balls, of any number that fly, of a few that something holds, and another body that flies alone, faster than a fall. What one
+/// of several bodies without rebound sets in motion may meet others that no one looked for yet.
 void ImpactQueue::look_at_bodies(const StepMotion& motion) {
     const ContactBodies& bodies = motion.bodies();
     for (std::size_t b = 0; b < bodies.count(); ++b) {
@@ -121,6 +121,8 @@ void ImpactQueue::look_at_bodies(const StepMotion& motion) {
         ++at.members;
         at.balls &= bodies.ball[b] != 0;
         at.flies &= motion.is_free(b);
+        at.fast |= in_order_[b] > 0 ||
+                   norm(linear(motion.predicted[b])) > falls * norm(linear(motion.whole_dv_ext[b]));
         at.known &= in_order_[b] >= 0;
         at.moving_along += motion.moves_along_forces(static_cast<int>(b));
         at.fastest = std::max(at.fastest, norm(linear(motion.predicted[b])));
@@ -128,8 +130,9 @@ void ImpactQueue::look_at_bodies(const StepMotion& motion) {
     const bool all = motion.options().impacts == ImpactOrder::successive;
     for (Island& at : islands_) {
         at.rebounds |= possible_ && (all || at.members > 1);
+        at.moved = at.balls || (at.flies && at.fast && at.members == 1);
         at.followed =
-            at.rebounds && (all || (at.balls && at.known && (at.flies || at.members <= event_bodies)));
+            at.rebounds && (all || (at.moved && at.known && (at.flies || at.members <= event_bodies)));
     }
     for (std::size_t b = 0; b < bodies.count(); ++b)
         if (const int own = island(bodies, b); own >= 0) rebounds_[b] = islands_[own].rebounds;
@@ -181,7 +184,7 @@ void ImpactQueue::find_meetings(const CandidateSearch& search, StepMotion& motio
     find_islands(search.open(), motion, points);
     for (StepContact& point : points.all) {
         const Island& own = of(bodies, point);
-        point.queued = point.toi >= 0.0 && own.followed && own.balls;
+        point.queued = point.toi >= 0.0 && own.followed && own.moved;
         look_at_meeting(point, search.margins().reach(), motion);
     }
     look_at_open(search.open(), motion);
@@ -227,10 +230,10 @@ void ImpactQueue::advance(StepMotion& motion, MixedSystem& system) {
         if ((hit_[b] || (at.balls && !motion.is_free(b))) && time > clock_[b]) {
             path_[b] = path_until(motion, b, time);
             clock_[b] = time;
-            if (at.balls)
+            if (at.moved)
                 apply_forces_before(b, part_of_forces(time / h, motion.surfaces().rebounds), motion, system);
         }
-        if (!at.balls || (at.rebounds && motion.moves_along_forces(static_cast<int>(b)))) continue;
+        if (!at.moved || (at.rebounds && motion.moves_along_forces(static_cast<int>(b)))) continue;
         motion.event_time[b] = clock_[b];
         if (clock_[b] > 0.0) motion.predicted[b] = sum(Vec6{}, path_[b], 1.0 / clock_[b]);
     }

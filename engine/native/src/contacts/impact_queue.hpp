@@ -43,7 +43,8 @@ private:
         int members = 0;
         bool balls = true, flies = true,
              known = true;  // all in it: are, are held by nothing, are where the queue says
-        bool followed = false;
+        bool fast = false;  // some of it is more than forces give in a few steps
+        bool followed = false, moved = false;      // its impacts come in order, and bodies are moved to them
         bool rebounds = false;                     // something in it, or what it may set in motion
         bool open = false;                         // more than one pair of it may meet yet, or is approached
         double fastest = 0.0;                      // of its bodies, m/s

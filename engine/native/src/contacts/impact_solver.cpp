@@ -320,17 +320,24 @@ void ImpactSolver::deliver(std::size_t joints, std::vector<Vec6>& impulses, Cont
     }
 }
 
-SolveQuality ImpactSolver::solve(MixedSystem& system, const OpenPairs& open, std::size_t few_enough,
-                                 StepMotion& motion, ContactPoints& points, std::vector<Vec6>& impulses,
-                                 ContactCounters& counters) {
-    const ContactOptions& options = motion.options();
-    ++counters.impacts;
+void ImpactSolver::find_next(MixedSystem& system, const OpenPairs& open, StepMotion& motion,
+                             ContactPoints& points) {
     ++rounds_;
     const bool in_order = queue_.possible() && rounds_ <= most_rounds(points.all.size());
     std::vector<std::size_t>& hit_points = filled(work_.hit_points, 0);
     if (in_order) queue_.find_next(system, open, motion, points, hit_points);
     for (std::size_t k = 0; !in_order && k < points.all.size(); ++k)
         if (points.all[k].bounce >= 0.0) hit_points.push_back(k);
+}
+
+SolveQuality ImpactSolver::solve(MixedSystem& system, std::size_t few_enough, StepMotion& motion,
+                                 ContactPoints& points, std::vector<Vec6>& impulses,
+                                 ContactCounters& counters) {
+    const ContactOptions& options = motion.options();
+    ++counters.impacts;
+    for (const std::size_t k : work_.hit_points)  // what was moved to the impact has turned
+        points.all[k].approach =
+            relative_velocity(points.all[k], points.all[k].contact.point.normal, motion.velocity);
     MixedSystem& hit = work_.hit;
     hit.mass = system.mass;
     hit.momentum = system.momentum;

@@ -38,10 +38,11 @@ public:
     /// Newton's law for it and resting rows for them would raise the energy. A stop alone is left to the resting stage.
     bool stop_is_hit(const MixedSystem& system, const ContactBodies& bodies, const ContactPoints& points);
 
-    /// See ContactStage::impact(). `few_enough`: see IslandRules. Of the pairs that are open some may be next. Gives how near to
-    /// its law the worst solve was left.
-    SolveQuality solve(MixedSystem& system, const OpenPairs& open, std::size_t few_enough, StepMotion& motion,
-                       ContactPoints& points, std::vector<Vec6>& impulses, ContactCounters& counters);
+    /// Finds the points of the next impact, and moves bodies there. Of the pairs that are open some may be next.
+    void find_next(MixedSystem& system, const OpenPairs& open, StepMotion& motion, ContactPoints& points);
+    /// See ContactStage::impact(). `few_enough`: see IslandRules. Gives how near to its law the worst solve was left.
+    SolveQuality solve(MixedSystem& system, std::size_t few_enough, StepMotion& motion, ContactPoints& points,
+                       std::vector<Vec6>& impulses, ContactCounters& counters);
     /// What took part in it.
     const std::vector<RowBlock>& hit_rows() const noexcept { return work_.hit.rows; }
 

@@ -38,12 +38,14 @@ struct StopRow {
     bool answered = false;       // by an impact
     bool limit_reached = false;  // by the last of its step
     // Of a stop with two ends:
-    double room = unbounded;  // to the other end, m or rad
-    double range = 0.0;       // from one to the other
-    double other = 0.0;       // right side of a row for the other end
-    double given = 0.0;       // what bodies that move as they are told give to its rate, m/s or rad/s
-    bool both = false;        // the other end has its row, too
-    bool cut = false;         // its rebound is slower than its restitution says, to end at the other end
+    double room = unbounded;   // to the other end, m or rad
+    double range = 0.0;        // from one to the other
+    double other = 0.0;        // right side of a row for the other end
+    double given = 0.0;        // what bodies that move as they are told give to its rate, m/s or rad/s
+    bool both = false;         // the other end has its row, too
+    bool cut = false;          // its rebound is slower than its restitution says, to end at the other end
+    bool asks = false;         // left out, to find what forces give to its rate
+    bool may_be_late = false;  // hit within the step if it pushes
 };
 
 /// Up to six rows between two moving bodies (or one: `second` or `first` is −1), or one row over any number.

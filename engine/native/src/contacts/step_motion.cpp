@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "contacts/contact_geometry.hpp"
+#include "linear/elementary.hpp"
 
 namespace spook {
 
@@ -18,6 +19,7 @@ void StepMotion::begin(const std::vector<Pose>& at, const std::vector<Vec6>& v,
     drive.begin(model_->bodies, model_->surfaces, v);
     toi_fraction.assign(bodies, 0.0);
     event_time.assign(bodies, -1.0);
+    event_rotation.resize(bodies);
     correction.clear();
     supported.begin(bodies);
 }
@@ -67,7 +69,7 @@ Vec3 StepMotion::free_fall_correction(int body, Vec3 after) const {
 void StepMotion::correct_events(const MixedSystem& system, const std::vector<char>& has_rows) {
     for (std::size_t b = 0; b < model_->bodies.count(); ++b) {
         const int u = model_->bodies.solver_index[b];
-        if (u < 0 || event_time[b] < 0.0 || !has_rows[u]) continue;
+        if (u < 0 || event_time[b] < 0.0 || !has_rows[u] || moved_until(static_cast<int>(b)) > 0.0) continue;
         if (correction.empty()) correction.assign(system.mass.size(), Vec6{});
         // What a joint holds turns as it goes, or the joint would answer the difference with a speed.
         for (int i = 0; i < (model_->bodies.jointed[b] ? 6 : 3); ++i)
@@ -81,6 +83,13 @@ void StepMotion::correct_events(const MixedSystem& system, const std::vector<cha
 Pose StepMotion::moved(int b, const std::vector<Vec6>& along) const {
     Pose pose = poses[b];
     if (event_time[b] >= 0.0) pose.position += event_time[b] * (linear(predicted[b]) - linear(along[b]));
+    if (const double time = moved_until(b); time > 0.0) {
+        const Vec3 w = angular(along[b]);
+        const double rate = norm(w);
+        const SineCosine half = sine_cosine(-0.5 * time * rate);
+        const double s = rate > 0.0 ? half.sine / rate : 0.0;
+        pose.rotation = rotation(Quat{half.cosine, s * w.x, s * w.y, s * w.z}) * event_rotation[b];
+    }
     return pose;
 }
 

@@ -42,6 +42,14 @@ struct StepMotion {
     /// moving bodies.
     void correct_events(const MixedSystem& system, const std::vector<char>& has_rows);
 
+    /// How far into the step a body that is not a ball has been moved to an impact, s.
+    double moved_until(int body) const noexcept {
+        return model_->bodies.ball[body] != 0 ? 0.0 : std::max(0.0, event_time[body]);
+    }
+    void turn_to_impact(int body, const Mat3& there, Vec3 w) noexcept {
+        event_rotation[body] = there;
+        velocity[body][3] = w.x, velocity[body][4] = w.y, velocity[body][5] = w.z;
+    }
     /// Where a body begins its way of this step. An event's bodies have gone part of it with another velocity.
     Pose moved(int body, const std::vector<Vec6>& along) const;
     /// Approach and push, from the current velocities.
@@ -69,6 +77,7 @@ struct StepMotion {
     std::vector<Vec6> predicted;         // what bodies are cast along
     std::vector<double> toi_fraction;    // the part of the forces that acts before the last impact
     std::vector<double> event_time;      // s; negative: the body is moved to no impact's time
+    std::vector<Mat3> event_rotation;    // of what is not a ball, where it is moved to one
     std::vector<Vec6> correction;        // to add to v₊ when positions advance, per moving body; empty: none
     SupportedBodies supported;
     ExternalDrive drive;

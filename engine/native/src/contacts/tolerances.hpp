@@ -74,6 +74,7 @@ inline constexpr double sunk = 0.02;  // of the smaller body's radius: an overla
 // impact_queue.cpp
 namespace tolerances::impact_queue {
 inline constexpr int event_bodies = 8;  // larger islands that something holds keep to the step's start
+inline constexpr double falls = 2.0;    // of a step: what is not a ball and slower meets nothing by itself
 inline constexpr double still = 1e-9;  // of where bodies may get to in the step: an approach that is rounding
 }  // namespace tolerances::impact_queue
 

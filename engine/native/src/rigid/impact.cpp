@@ -4,6 +4,7 @@
 // reads: points, masses and rows of joints. writes: velocities of bodies and scratch_.velocities, impulses of impacts, share_ (the part of
 // the forces still to act after an event), stops that were hit.
 #include <cmath>
+#include <utility>
 
 #include "rigid/mixed_rows.hpp"
 #include "rigid/tolerances.hpp"
@@ -31,9 +32,57 @@ void MixedRows::act_before_events() {
     }
 }
 
+/// What is hit and is not a ball has turned until then: its inertia is that of the time of its impact, or one would give it energy.
+void MixedRows::move_to_impact(StepMotion& motion) {
+    for (std::size_t k = 0; k < model_.constrained.size(); ++k) {
+        const int i = model_.constrained[k];
+        const double until = motion.moved_until(i);
+        if (until == 0.0) continue;
+        scratch_.gone.resize(model_.constants.size());
+        auto& [time, there] = scratch_.gone[i];
+        if (!(until > time)) continue;
+        const BodyConstants& body = model_.constants[i];
+        if (time == 0.0) there = live_.bodies[i];
+        there.angular_momentum = live_.bodies[i].angular_momentum;
+        refresh(body, there);
+        integrate(body, until - std::exchange(time, until), there);
+        there.displacement = live_.bodies[i].displacement + until * linear(motion.predicted[i]);
+        fill_mass(body, there, system.mass[k]);
+        const Vec6& p = system.momentum[k];
+        motion.turn_to_impact(i, axes(body, there), turned_by(body, there, {p[3], p[4], p[5]}));
+    }
+}
+
+/// What forces give to the rates of stops that were left out, or whether some are hit that only forces lead to: then all is solved
+/// again. What leads joints back to where they hold turns round with the rate and is no force.
+bool MixedRows::find_pushes() {
+    bool asked = false, late = false;
+    const auto read_rates = [&](bool forces) {
+        for (std::size_t k = 0; k < joints_.blocks().size(); ++k) {
+            const StopRow& stop = system.rows[k].stop;
+            if (!stop.asks) continue;
+            const double rate = row_velocity(system.rows[k], stop.row, system.velocity);
+            double& push = joints_.states[joints_.blocks()[k].joint].push;
+            push = forces ? rate : push - rate;
+            asked = true;
+        }
+    };
+    for (std::size_t k = 0; k < joints_.blocks().size(); ++k) {
+        const StopRow& stop = system.rows[k].stop;
+        if (!stop.may_be_late || system.rows[k].multiplier[stop.row] == 0.0) continue;
+        late = joints_.states[joints_.blocks()[k].joint].late = true;
+    }
+    read_rates(true);
+    if (!asked) return late;
+    fill_momenta(false);
+    if (solve_joints()) read_rates(false);
+    return true;
+}
+
 /// Rows are those of the velocities before, and after it of those it leaves.
 void MixedRows::impact() {
     fill_momenta(false);
+    move_to_impact(contacts_->find_next_impact(system));
     contacts_->impact(system, scratch_.impulses);
     judge_contacts();
     const auto add_to_before = [this](double sign) {  // with the forces that are still to come

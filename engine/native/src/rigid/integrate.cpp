@@ -11,6 +11,19 @@
 
 namespace spook {
 
+namespace {
+
+/// Brings a body that was moved to an impact of the step there. What is left of the step then, s.
+double begin_at_impact(const RigidModel& model, const StepScratch& scratch, int body, BodyState& s) {
+    if (scratch.gone.empty() || scratch.gone[body].time == 0.0) return model.h;
+    const auto& [time, there] = scratch.gone[body];
+    s.displacement = there.displacement, s.turn = there.turn;
+    refresh(model.constants[body], s);
+    return model.h - time;
+}
+
+}  // namespace
+
 void RigidSystem::integrate() {
     const auto find_whirling = [this](std::span<const int> bodies) {
         if (live_.whirling < 0)
@@ -28,7 +41,10 @@ void RigidSystem::integrate() {
     if (!mixed_.touching() || scratch_.led_by_joints) find_whirling(model_.constrained);
     if (!bilateral_.take_moved())
         for (int i : model_.constrained)
-            if (!live_.asleep(i)) spook::integrate(model_.constants[i], model_.h, live_.bodies[i]);
+            if (!live_.asleep(i)) {
+                const double left = begin_at_impact(model_, scratch_, i, live_.bodies[i]);
+                spook::integrate(model_.constants[i], left, live_.bodies[i]);
+            }
     for (int i : model_.free) spook::integrate(model_.constants[i], model_.h, live_.bodies[i]);
     for (int i : model_.driven) spook::integrate(model_.constants[i], model_.h, live_.bodies[i]);
     if (mixed_.contacts() && !mixed_.contacts()->correction().empty()) {

@@ -168,7 +168,10 @@ void JointSet::assemble_axial(const JointBlock& block, std::span<const BodyState
             right.stop.other = inwards * (room > 0.0 ? room / time_step_ : r.violation_gain * room);
             const double value =
                 stops_.right(inwards, violation, row.rate, r, axial.restitution, room, state, right.stop);
-            (low ? right.lower : right.upper)[next(value)] = 0.0;
+            next(value);
+            const int row = right.stop.row;
+            if (!state.folds) (low ? right.lower : right.upper)[row] = 0.0;
+            if (right.stop.asks) right.lower[row] = right.upper[row] = 0.0;
         }
     }
     if (axial.has_spring && !axial.spring_pulls) {

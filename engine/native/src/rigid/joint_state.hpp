@@ -26,8 +26,11 @@ struct JointState {
     signed char met = 0;       // the end at which an impact of the step has left it: it was on its way there
     double rebounds = 0.0;     // slower than this, m/s or rad/s, an impact of the step has answered it
     double initial_overstep = -1.0;  // of its limit, as far as it is left; negative: not known
-    bool folds = false;              // the stops of the joint are hit several times in the step,
-    double fold_to = 0.0;            // and its coordinate is here behind the last, m or rad
+    bool folds = false;              // a stop of the joint is hit within the step, or several times,
+    double fold_to = 0.0;            // and its coordinate is here where the step ends, m or rad
+    bool late = false;               // it is hit because of what forces do in the step
+    /// What they give to its rate in all of the step, m/s or rad/s; NaN: not known.
+    double push = std::numeric_limits<double>::quiet_NaN();
     double rotor = std::numeric_limits<double>::quiet_NaN();  // its armature's speed; NaN: not known
     double rotor_lead = 0.0;  // of the coordinate over the last step, before its row at the start
     double angle = 0.0;       // unwrapped coordinate of a hinge that needs it

@@ -4,6 +4,7 @@
 // reads: the time step. writes: what the states of joints say of stops.
 #pragma once
 
+#include <limits>
 #include <utility>
 #include <vector>
 
@@ -18,18 +19,22 @@ public:
     explicit JointStops(double time_step) noexcept : time_step_(time_step) {}
 
     void add(int joint) { joints_.push_back(joint); }
-    /// From now on a stop that is hit several times in a step, by turns with its other end, gives back what all of these leave.
-    void let_fold() noexcept { fold_ = true; }
+    /// From now on in this step a stop that is hit, or by turns with its other end, is met at the times of these impacts, or none is.
+    void fold(bool folds, LargeArray<JointState>& states) noexcept {
+        fold_ = folds;
+        for (const int joint : joints_) states[joint].folds = false;
+    }
     /// Whether some limit was assembled, since this was asked last, that a step does not end at by its velocities: the scene
-    /// began beyond it, or it folds.
+    /// began beyond it, or it was hit.
     bool take_some_overstepped() noexcept { return std::exchange(some_overstepped_, false); }
     /// A new step: whose stops were closed in the one before is known from then on, however often rows are assembled.
     void begin_step(LargeArray<JointState>& states) noexcept {
         for (const int joint : joints_) {
-            states[joint].at_limit = states[joint].closed;
+            states[joint].at_limit = states[joint].folds ? 0 : states[joint].closed;
             states[joint].rebounds = 0.0;
             states[joint].met = 0;
-            states[joint].folds = false;
+            states[joint].folds = states[joint].late = false;
+            states[joint].push = std::numeric_limits<double>::quiet_NaN();
         }
     }
     /// The right side of a row that only pushes `inwards`; what else its solver needs to know is put into `stop`.
@@ -37,7 +42,9 @@ public:
                  double room, JointState& state, StopRow& stop) noexcept;
 
 private:
-    double fold(double inwards, double violation, double approach, double restitution, JointState& state,
+    bool is_met(bool open, double approach, double restitution, const JointState& state,
+                StopRow& stop) const noexcept;
+    double meet(double inwards, double violation, double rate, double restitution, JointState& state,
                 StopRow& stop) noexcept;
 
     double time_step_;

@@ -15,6 +15,9 @@
 
 namespace spook {
 
+/// Mass and inertia of a body where it is.
+void fill_mass(const BodyConstants& body, const BodyState& at, Mat6& mass) noexcept;
+
 class MixedRows {
 public:
     MixedRows(const RigidModel& model, RigidState& live, JointSet& joints, Forces& forces,
@@ -29,6 +32,7 @@ public:
 
     MixedSystem system;  // rows of joints first, block by block, then those of a step's contacts
     std::uint64_t rounds = 0, pgs_iterations = 0;
+    bool stops_are_apart = false;  // none is connected to another
 
     /// Which stages run here.
     void take_stages(RigidModel& model);
@@ -74,11 +78,13 @@ private:
     void note_start_of_contacts();
     void act_before_events();
     void impact();
-    void fill_masses();
     void fill_momenta(bool forces);
     void fill_rows(bool solved = false);
     static RowBlock other_end(const RowBlock& block);
-    bool find_other_ends();
+    void begin_solve(bool touching);
+    bool find_stops();
+    bool find_pushes();
+    void move_to_impact(StepMotion& motion);
     double leading_work(std::size_t block) const;
     bool is_driven(const JointBlock& block) const;
     bool leave_open();

@@ -18,8 +18,8 @@ RigidBodySpec turning(RigidBodySpec body) {
     return body;
 }
 
-/// Whether no stop is connected to another: what one sends back does not reach any.
-bool stops_are_apart(const JointSet& joints, std::span<const int> index, int bodies) {
+/// Whether no stop is connected to another: what one sends back does not reach any. Unless they `may_float`, on what does not move.
+bool stops_are_apart(const JointSet& joints, std::span<const int> index, int bodies, bool may_float) {
     IslandFinder finder;
     finder.begin(bodies);
     const auto own = [&](int body) { return body < 0 ? -1 : index[body]; };
@@ -34,6 +34,7 @@ bool stops_are_apart(const JointSet& joints, std::span<const int> index, int bod
     for (const JointBlock& block : joints.blocks()) {
         const int body = std::max(own(block.first), own(block.second));
         if (body < 0 || !joints.may_stop(block)) continue;
+        if (!may_float && std::min(own(block.first), own(block.second)) >= 0) return false;
         if (std::exchange(known[static_cast<std::size_t>(islands.of_body[body])], 1) != 0) return false;
     }
     return true;
@@ -75,9 +76,8 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     model_.stiff = model_.stages.runs(Stage::string_stiffness) && block;
     model_.curved = method.corrections > 0 && !model_.composed && rows_.rows() > 0 && (!block || may_touch);
     if (follows_turns(model_, joints_)) joints_.turning = model_.constants;
-    if (!may_touch &&
-        stops_are_apart(joints_, model_.solver_index, static_cast<int>(model_.constrained.size())))
-        joints_.stops().let_fold();
+    mixed_.stops_are_apart = stops_are_apart(joints_, model_.solver_index,
+                                             static_cast<int>(model_.constrained.size()), !may_touch);
     bilateral_.take();
     sleeping_.take(scene);
     if (method.runge_kutta && !runge_kutta_.take())

@@ -106,21 +106,29 @@ void MixedRows::begin_again() {
     }
 }
 
+void MixedRows::begin_solve(bool touching) {
+    for (std::size_t k = 0; k < model_.constrained.size(); ++k)
+        fill_mass(model_.constants[model_.constrained[k]], live_.bodies[model_.constrained[k]],
+                  system.mass[k]);
+    scratch_.gone.clear();
+    joints_.stops().fold(stops_are_apart && !touching, joints_.states);
+    scratch_.other_ends.clear();
+    scratch_.impulses.assign(joints_.blocks().size(), {});
+    scratch_.left_open.assign(joints_.blocks().size(), 0);
+    scratch_.led_by_joints = false;
+    scratch_.anew.clear();
+}
+
 void MixedRows::solve(bool touching) {
     live_.last_rows = LastRows::mixed;
     const auto blocks = joints_.blocks();
-    fill_masses();
+    begin_solve(touching);
     if (touching) act_before_events();
     const auto impact_needed = [&] {
         return touching && model_.stages.runs(Stage::impact) && contacts_->impact_needed(system);
     };
     const Stage solver = model_.stages.runs(Stage::solve_iterative) ? Stage::solve_iterative : Stage::pivot;
     ContactStage::SolveEnd end;
-    scratch_.other_ends.clear();
-    scratch_.impulses.assign(blocks.size(), {});
-    scratch_.left_open.assign(blocks.size(), 0);
-    scratch_.led_by_joints = false;
-    scratch_.anew.clear();
     int corrected = 0;
     const auto to_correct = [&] { return model_.curved && corrected++ < model_.method.corrections; };
     do {
@@ -133,7 +141,7 @@ void MixedRows::solve(bool touching) {
         if (touching) end = contacts_->solve(system, scratch_.velocities, scratch_.anew);
         else end.finite = solve_joints();
         clock_.mark(solver);
-    } while (end.finite && (impact_needed() || ((!touching || end.ends_passed) && find_other_ends()) ||
+    } while (end.finite && (impact_needed() || ((!touching || end.ends_passed) && find_stops()) ||
                             to_correct() || leave_open()));  // the solve may find some that is to come first
     touching ? judge_contacts() : judge_pgs();
     if (!end.finite) {
@@ -177,17 +185,12 @@ void MixedRows::take_multipliers() {
     }
 }
 
-void MixedRows::fill_masses() {
-    for (std::size_t k = 0; k < model_.constrained.size(); ++k) {
-        const BodyConstants& body = model_.constants[model_.constrained[k]];
-        const BodyState& s = live_.bodies[model_.constrained[k]];
-        Mat6& mass = system.mass[k];
-        for (int row = 0; row < 3; ++row) {
-            mass[7 * row] = body.mass;
-            for (int column = 0; column < 3; ++column)  // a particle's rotation is never touched
-                mass[6 * (row + 3) + column + 3] =
-                    body.particle ? (row == column ? body.mass : 0.0) : s.inertia.m[3 * row + column];
-        }
+void fill_mass(const BodyConstants& body, const BodyState& at, Mat6& mass) noexcept {
+    for (int row = 0; row < 3; ++row) {
+        mass[7 * row] = body.mass;
+        for (int column = 0; column < 3; ++column)  // a particle's rotation is never touched
+            mass[6 * (row + 3) + column + 3] =
+                body.particle ? (row == column ? body.mass : 0.0) : at.inertia.m[3 * row + column];
     }
 }
 
@@ -211,7 +214,9 @@ void MixedRows::take_velocities(bool angular_too, const std::function<bool(int)>
         }
         s.velocity = {v[0], v[1], v[2]};
         if (model_.constants[model_.constrained[k]].particle) continue;
-        s.angular_momentum = s.inertia * Vec3{v[3], v[4], v[5]};
+        const int i = model_.constrained[k];
+        const bool gone = !scratch_.gone.empty() && scratch_.gone[i].time > 0.0;
+        s.angular_momentum = (gone ? scratch_.gone[i].there : s).inertia * Vec3{v[3], v[4], v[5]};
         if (angular_too) s.angular_velocity = {v[3], v[4], v[5]};
     }
 }
@@ -293,8 +298,9 @@ RowBlock MixedRows::other_end(const RowBlock& block) {
     return row;
 }
 
-/// Whether velocities lead past such ends; in the next solve of this step they have rows.
-bool MixedRows::find_other_ends() {
+/// Whether stops are to be solved again: velocities lead past such ends, which have rows in the next solve of this step.
+bool MixedRows::find_stops() {
+    if (find_pushes()) return true;
     const std::size_t known = scratch_.other_ends.size();
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
         if (passes_other_end(system.rows[k], system.velocity, model_.h)) scratch_.other_ends.push_back(k);

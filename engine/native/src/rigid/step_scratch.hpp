@@ -27,8 +27,13 @@ struct StepScratch {
     std::vector<int> other_ends;  // blocks of the step's joints whose stops have a row for each end
     std::vector<Vec6> impulses;   // of the step's impacts, per block of rows
     std::vector<char> left_open;  // blocks of the step's joints that are not led back to where they hold
-    bool led_by_joints = false;   // what moves has a good part of its energy from joints that are led back
-    std::vector<char> anew;       // moving bodies whose next solve of the step knows nothing of the last one
+    struct Gone {                 // to an impact of the step
+        double time = 0.0;        // s
+        BodyState there;
+    };
+    std::vector<Gone> gone;      // by body, or empty
+    bool led_by_joints = false;  // what moves has a good part of its energy from joints that are led back
+    std::vector<char> anew;      // moving bodies whose next solve of the step knows nothing of the last one
     IslandSolver joint_solver;
     std::vector<std::size_t> rows;  // by island
     std::vector<char> answered;     // rows
@@ -49,6 +54,7 @@ struct StepScratch {
     void spoil() noexcept;  // step.cpp: what the step before has left is no number and no index
 #endif
     void begin() {
+        gone.clear();
 #ifdef NDEBUG
         other_ends.clear();
         led_by_joints = false;

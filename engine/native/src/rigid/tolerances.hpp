@@ -27,6 +27,7 @@ inline constexpr double slight_tilt = 1e-17;  // its square: what K need not kno
 namespace tolerances::joint_stops {
 inline constexpr double unreachable_rate = 1e5;  // m/s or rad/s: no gap that takes more closes within a step,
 inline constexpr double unreachable_ratio = 10.0;  // nor one that takes so many times the rate it has
+inline constexpr double short_flight = 1e-6;       // of a step: what returns to its end so soon rests there
 }  // namespace tolerances::joint_stops
 
 // joint_tree.cpp
