@@ -167,6 +167,7 @@ public:
     BlockLdlt::Counters factor_counters() const noexcept;
     /// How near to their law the rows of the last solve, or impact, were left.
     const SolveQuality& quality() const noexcept { return quality_; }
+    JudgedStep judged() const noexcept { return {motion_, points_, state_.initial_penetration}; }
 
 private:
     bool needs_impact_first();
@@ -178,7 +179,6 @@ private:
     void correct_events(const MixedSystem& system);
     /// Whether few rows are solved directly though iterations are asked for.
     bool by_rows(std::size_t joints) const noexcept;
-    JudgedStep judged() const noexcept { return {motion_, points_, state_.initial_penetration}; }
     // solve_by_pgs.cpp: the same by PGS over compact contacts
     struct PgsSolveEnd : SolveEnd {
         bool unfinished = false;  // few rows are better solved directly, or the iterations run away

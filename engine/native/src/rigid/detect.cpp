@@ -51,4 +51,20 @@ void MixedRows::note_start_of_contacts() {
     }
 }
 
+void find_what_touches(const ContactStage* contacts, std::span<const BodyConstants> bodies,
+                       const JointSet& joints, std::vector<char>& touched) {
+    if (joints.turning.empty()) return;
+    touched.assign(bodies.size(), 0);
+    if (contacts == nullptr) return;
+    for (const StepContact& point : contacts->judged().points.all)
+        for (const int body : {point.contact.first, point.contact.second})
+            if (bodies[body].moves()) touched[joints.trees[body]] = 1;
+}
+
+bool follows_turns(const JointSet& joints, const JointBlock& block,
+                   const std::vector<char>& touched) noexcept {
+    const auto free = [&](int body) { return body < 0 || touched[joints.trees[body]] == 0; };
+    return !joints.turning.empty() && free(block.first) && free(block.second);
+}
+
 }  // namespace spook

@@ -78,7 +78,7 @@ JointBlock JointSet::add_own_rows(const RigidScene& scene, const JointSpec& spec
 }
 
 void JointSet::assemble(int index, std::span<const BodyState> bodies, double* first, double* second,
-                        BlockRight& right) noexcept {
+                        BlockRight& right, bool follows) noexcept {
     const JointBlock& block = blocks_[index];
     const Joint& joint = joints_[block.joint];
     State& state = states[block.joint];
@@ -97,7 +97,7 @@ void JointSet::assemble(int index, std::span<const BodyState> bodies, double* fi
         for (int k = 0; k < block.size; ++k)
             right.right[k] =
                 joint.gain[k].upsilon * rows.rate[k] - joint.gain[k].violation * rows.violation[k];
-        if (!turning.empty() && joint.constants.kind != JointKind::distance)
+        if (follows && joint.follows && !turning.empty() && joint.constants.kind != JointKind::distance)
             follow_turns(joint, bodies, right);
     }
     if (!state.broken) return;
@@ -209,15 +209,32 @@ JointSet::RowGain JointSet::gain(int index, int row) const noexcept {
     return {gain.violation, relaxation, linear && arms > 0.0 ? arms : 1.0};
 }
 
-bool JointSet::has_loops(std::span<const BodyConstants> bodies) const {
+bool JointSet::find_trees(std::span<const BodyConstants> bodies) {
     DisjointSets tied;
-    tied.begin(bodies.size() + 1);  // the last one: all that does not move by itself
-    const auto of = [&](int body) {
-        return body >= 0 && bodies[body].moves() ? body : static_cast<int>(bodies.size());
-    };
+    const int fixed =
+        static_cast<int>(bodies.size());  // all that does not move by itself, which ties nothing
+    const auto of = [&](int body) { return body >= 0 && bodies[body].moves() ? body : fixed; };
+    const auto own = [](const Joint& joint) { return joint.general < 0 && joint.tyre < 0; };
+    bool loops = false;
+    tied.begin(bodies.size() + 1);
     for (const Joint& joint : joints_)
-        if (joint.general < 0 && joint.tyre < 0 && !tied.join(of(joint.first), of(joint.second))) return true;
-    return false;
+        if (own(joint)) loops |= !tied.join(of(joint.first), of(joint.second));
+    tied.begin(bodies.size());
+    for (const Joint& joint : joints_)
+        if (of(joint.first) != fixed && of(joint.second) != fixed) tied.join(joint.first, joint.second);
+    trees.resize(bodies.size());
+    for (int body = 0; body < fixed; ++body) trees[body] = tied.root(body);
+    std::vector<char> held(bodies.size(), 0), bends(bodies.size(), 0);
+    const auto tree = [&](const Joint& joint) {
+        return trees[of(joint.first) == fixed ? joint.second : joint.first];
+    };
+    for (const Joint& joint : joints_) {
+        if (!own(joint)) continue;
+        held[tree(joint)] |= of(joint.first) == fixed || of(joint.second) == fixed;
+        bends[tree(joint)] |= joint.constants.holds.rows() < 6;
+    }
+    for (Joint& joint : joints_) joint.follows = own(joint) && (held[tree(joint)] || !bends[tree(joint)]);
+    return !loops;
 }
 
 void JointSet::bias(int index, std::span<const BodyState> bodies, double* out) const noexcept {

@@ -24,8 +24,10 @@ public:
     JointSet(const RigidScene& scene, double time_step);
 
     std::span<const BodyConstants> turning;  // whose fast turns the right sides follow; empty: none follow
-    /// Whether joints make a loop of bodies, or of what does not move by itself.
-    bool has_loops(std::span<const BodyConstants> bodies) const;
+    /// Which bodies joints tie together, and which of these trees follow fast turns: those that something holds, and those that are
+    /// one body. What floats and folds would be given energy. Whether joints make no loop, through what is fixed either.
+    bool find_trees(std::span<const BodyConstants> bodies);
+    std::vector<int> trees;  // per body: one of those it is tied to
 
     std::span<const JointBlock> blocks() const noexcept { return blocks_; }
     int count() const noexcept { return static_cast<int>(joints_.size()); }
@@ -40,9 +42,9 @@ public:
     const double* other_rows() const noexcept { return generals_.other_gradient(); }
 
     /// Writes the Jacobians of a block (rows × 6 each; the memory holds zeros or an earlier call's values) and
-    /// its right side without the share of bodies that move by themselves.
+    /// its right side without the share of bodies that move by themselves. `follows`: fast turns, where it is asked for at all.
     void assemble(int block, std::span<const BodyState> bodies, double* first, double* second,
-                  BlockRight& right) noexcept;
+                  BlockRight& right, bool follows = true) noexcept;
 
     /// The constants of one row: (4/h) Ups; θ; and the size of the joint that curvature and rounding are measured
     /// by (m; 1 for angles).
@@ -140,7 +142,7 @@ private:
         int block = 0;     // of its own rows: index into blocks_
         int general = -1;  // of a relation, a wire or an eye: index into generals_
         int tyre = -1;     // index into tyre_forms_
-        bool tracked = false, breakable = false;
+        bool tracked = false, breakable = false, follows = false;
         double strength = 0.0, torque_strength = 0.0;  // N s, N m s
         struct {
             double upsilon, violation;

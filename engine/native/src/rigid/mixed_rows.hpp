@@ -112,4 +112,11 @@ private:
     std::optional<ContactStage> contacts_, fresh_contacts_;
 };
 
+/// By tree of joints: whether a body of it touches something. It may spin otherwise after the step than before it, and its joints
+/// do not follow how it turns.
+void find_what_touches(const ContactStage* contacts, std::span<const BodyConstants> bodies,
+                       const JointSet& joints, std::vector<char>& touched);
+bool follows_turns(const JointSet& joints, const JointBlock& block,
+                   const std::vector<char>& touched) noexcept;
+
 }  // namespace spook

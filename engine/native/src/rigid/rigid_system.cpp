@@ -41,9 +41,9 @@ bool stops_are_apart(const JointSet& joints, std::span<const int> index, int bod
 }
 
 /// Plain steps do, but of loops: their rows depend on each other, and what is taken from one would contradict another.
-bool follows_turns(const RigidModel& model, const JointSet& joints) {
+bool follows_turns(const RigidModel& model, JointSet& joints) {
     return !model.method.linear_turns && model.method.corrections == 0 && !model.composed &&
-           !model.half_step && !model.stiff && !joints.has_loops(model.constants);
+           !model.half_step && !model.stiff && joints.find_trees(model.constants);
 }
 
 }  // namespace

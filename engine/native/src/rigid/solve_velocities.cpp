@@ -400,6 +400,7 @@ void MixedRows::fill_further(int block, RowBlock& rows, BlockRight& numbers,
 /// `solved`: whether the curvature of the rows is that of a solution, not of the velocities at hand.
 void MixedRows::fill_rows(bool solved) {
     if (model_.curved) curvature_.curve(solved, &system.velocity);
+    find_what_touches(touching_ ? &*contacts_ : nullptr, model_.constants, joints_, scratch_.touched);
     const auto blocks = joints_.blocks();
     system.rows.resize(blocks.size());
     further_.resize(blocks.size());
@@ -414,7 +415,8 @@ void MixedRows::fill_rows(bool solved) {
         }
         BlockRight numbers;
         joints_.assemble(static_cast<int>(k), live_.bodies, rows.first_jacobian[0].data(),
-                         rows.second_jacobian[0].data(), numbers);
+                         rows.second_jacobian[0].data(), numbers,
+                         follows_turns(joints_, blocks[k], scratch_.touched));
         if (scratch_.left_open[k] && joints_.always_holds(blocks[k])) numbers.right = {};
         if (!joints_.others(static_cast<int>(k)).empty())
             fill_further(static_cast<int>(k), rows, numbers, further_[k]);

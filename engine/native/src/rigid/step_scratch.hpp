@@ -26,6 +26,7 @@ struct StepScratch {
     // solve_velocities():
     std::vector<int> other_ends;  // blocks of the step's joints whose stops have a row for each end
     std::vector<Vec6> impulses;   // of the step's impacts, per block of rows
+    std::vector<char> touched;    // by JointSet::tree(): whether a body of it touches something
     std::vector<char> left_open;  // blocks of the step's joints that are not led back to where they hold
     struct Gone {                 // to an impact of the step
         double time = 0.0;        // s
