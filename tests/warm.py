@@ -25,6 +25,7 @@ import socket
 import subprocess
 import sys
 import threading
+import time
 import types
 from collections.abc import Callable, Sequence
 from contextlib import suppress
@@ -244,8 +245,11 @@ def wait(number: int, parent: int, package: str) -> None:
         told, tells = os.pipe()
         between = os.fork()
         if between == 0:
+            number = os.getpid()
             if (process := os.fork()) == 0:
                 asked.detach()
+                while os.getppid() == number:  # or it could ask to end with this parent, which does
+                    time.sleep(1e-4)
                 _run(order, descriptors)
             os.write(tells, process.to_bytes(8, "little"))
             os._exit(0)
