@@ -208,8 +208,9 @@ constexpr StageTable<Facts> TABLE{{
                 : is.method().linear_turns
                     ? "rows are linear in the turn, so that what spins off its joint slows down; "
                       "turns=\"followed\" and corrections=2 keep its energy to a third of a radian a step, order4 beyond"
-                    : "where bodies turn far in a step, the right sides of their joints follow the bend of the way; what spins "
-                      "askew by more than a third of a radian a step loses energy: composition=\"order4\" keeps it";
+                    : "where bodies that something holds, or that are locked into one, turn far in a step, joints "
+                      "follow the bend of the way; what spins askew by more than a third of a radian a step, chains "
+                      "that float and loops lose energy: composition=\"order4\" keeps it";
      }},
     {Stage::half_step, [](const Facts& is) { return is.composed() || is.method().half_step_velocities; },
      [](const Facts& is) {
