@@ -6,6 +6,8 @@ import json
 import os
 import subprocess
 import sys
+import threading
+import time
 from pathlib import Path
 
 import pytest
@@ -74,3 +76,16 @@ def test_what_says_more_of_the_interpreter_is_started(words: list[str], given: d
 
     assert done.stdout == "1 False\n"
     assert told("import sys; print(sys.flags.optimize, 'numpy' in sys.modules)").stdout == "0 True\n"
+
+
+def test_what_waits_outlives_the_thread_that_asked_first() -> None:
+    warm.close()
+    warm.begin()
+    thread = threading.Thread(target=told, args=("",))
+    thread.start()
+    place = Path(f"/proc/self/task/{thread.native_id}")
+    thread.join()
+    while place.exists():
+        time.sleep(0.001)
+
+    assert told("import sys; print('numpy' in sys.modules)").stdout == "True\n"

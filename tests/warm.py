@@ -34,7 +34,7 @@ from typing import NamedTuple, NoReturn
 
 import spook_tracker
 
-ENDS_WITH_PARENT, ADOPTS = 1, 36  # PR_SET_PDEATHSIG, PR_SET_CHILD_SUBREAPER
+ADOPTS = 36  # PR_SET_CHILD_SUBREAPER
 IMPORTED = (
     "measure.again", "measure.apart", "measure.catalogues", "measure.fitting", "measure.run", "measure.workers",
     "cli.main", "cli.report_table", "cli.report_sweep", "store.database", "store.history", "store.record",
@@ -224,7 +224,6 @@ def _imported() -> socket.socket:
 
 def wait(number: int, parent: int, package: str) -> None:
     """The life of the process that has imported everything, in which it forks."""
-    ctypes.CDLL(None).prctl(ENDS_WITH_PARENT, signal.SIGKILL, 0, 0, 0)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     asked = socket.socket(fileno=number)
     for name in IMPORTED:
