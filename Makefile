@@ -34,7 +34,7 @@ help:
 	@echo "make mutants   engines wrong on purpose: is each of them named?"
 	@echo "make mutants-tonight  four of them, others every night"
 	@echo "make past      a wrong commit planted in this history and found, and ten old commits asked: many builds"
-	@echo "make mutation  the judge's rules changed one at a time: do its tests notice?"
+	@echo "make mutation SAMPLE=20   the judge's rules, and so many random places of each room, changed: do the tests notice?"
 	@echo "make tolerances the numbers contacts are tuned by, times and by ten: which tests and bits notice?"
 	@echo "make pairs      how many unchanged changes are blocked beside their base, and how many slower ones found"
 	@echo "make detectors  what the judge of run times finds and cries over, beside asv, Otava and ruptures"
@@ -140,8 +140,10 @@ mutants-tonight: develop
 past: develop
 	$(BIN)/python bench/past.py --page docs/past.md
 
+SAMPLE ?= 20  # random mutants of each room
 mutation: develop
 	$(BIN)/python bench/mutation.py
+	$(BIN)/python bench/mutation.py --rooms all --sample $(SAMPLE)
 
 tolerances: develop
 	$(BIN)/python bench/tolerances.py $(PARTS)

@@ -1,40 +1,40 @@
-"""`make mutation`: change the judge's rules one at a time, and see that its tests notice; prints the score.
+"""`make mutation`: change the code one place at a time, and see that the tests of its room notice; prints scores.
 
-Each mutant is a copy of the sources with one text replaced. It is killed if the tests of the judge fail, and it
-survives if they pass: then a rule stands in the code that no test checks. `python bench/mutation.py NAME …`
-runs only those named. Ends with 1 if one survives, or no longer applies.
+The judge's rules are changed as the table below says, and each must be noticed: one that survives is a rule that no test
+checks, and ends this with 1, as one does that no longer applies. `python bench/mutation.py NAME …` runs only those named.
+Of the other rooms, `--rooms tracker/store engine …` (or `all`), `--sample N` mutants each are drawn at random; some change
+nothing that can be seen, so their score is to be set beside another of the same `--seed`, not beside 100 %.
 """
 
 from __future__ import annotations
 
+import argparse
 import os
+import re
 import shutil
 import subprocess
 import sys
-import sysconfig
 import tempfile
+import time
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
 from pathlib import Path
+from queue import SimpleQueue
 
-ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
+
+from bench.random_mutants import ROOMS, ROOT, Mutant, drawn
+
 JUDGE = "tracker/judge"
-TESTS = (
-    "tests/tracker/judge/test_rules.py", "tests/tracker/judge/test_detection.py", "tests/tracker/judge/test_verdict.py", "tests/tracker/judge/test_noise.py",
-    "tests/tracker/judge/test_compare.py", "tests/tracker/judge/test_analyse.py", "tests/tracker/judge/test_accepted.py",
-    "tests/tracker/judge/test_normal_nights.py", "tests/tracker/judge/test_segments.py",
+TESTS = tuple(
+    f"tests/{JUDGE}/test_{name}.py" for name in (
+        "rules", "detection", "verdict", "noise", "compare", "analyse", "accepted", "normal_nights", "segments"
+    )
 )  # fmt: skip
-RUN = "import sys; sys.path[:0] = sys.argv[1:3]; import pytest; sys.exit(pytest.main(sys.argv[3:]))"
-
-
-@dataclass(frozen=True)
-class Mutant:
-    """One rule changed."""
-
-    name: str
-    file: str
-    old: str  # occurs once
-    new: str
+# In a copy it is the copy that is imported, by whatever its tests start, too.
+COPY_FIRST = """import sys
+sys.meta_path[:] = [found for found in sys.meta_path if "editable" not in type(found).__module__]
+"""
 
 
 def mutant(name: str, file: str, old: str, new: str) -> Mutant:
@@ -108,62 +108,140 @@ MUTANTS = (
 )  # fmt: skip
 
 
-def applied(found: Mutant, text: str) -> str:
-    """The text with the rule changed; ValueError if it is not there exactly once."""
-    if text.count(found.old) != 1:
-        raise ValueError(
-            f"{found.name}: {found.old!r} is in {found.file} {text.count(found.old)} times, not once"
-        )
-    return text.replace(found.old, found.new)
+class Copy:
+    """The sources and tests as they are in the working tree, with the engine that is built; changed and asked."""
 
+    def __init__(self, folder: Path) -> None:
+        from spook_tracker.engine import _core
 
-def copied(folder: Path) -> None:
-    """The sources and tests, with the engine that is built and the pages that tests hold to the judge."""
-    from spook_tracker.engine import _core
+        self.folder, self.changes = folder, 0
+        listed = ("git", "ls-files", "-z", "--cached", "--others", "--exclude-standard")
+        for name in (
+            subprocess.run(listed, cwd=ROOT, capture_output=True, check=True).stdout.decode().split("\0")
+        ):
+            source, target = ROOT / name, folder / name
+            if name and (source.is_symlink() or source.is_file()):
+                target.parent.mkdir(parents=True, exist_ok=True)
+                shutil.copy2(source, target, follow_symlinks=False)
+        shutil.copy(str(_core.__file__), folder / "engine")
+        (folder / ".first").mkdir()
+        (folder / ".first" / "sitecustomize.py").write_text(COPY_FIRST)
 
-    only = shutil.ignore_patterns("native", "__pycache__", "*.so")
-    for name in ("engine", "scalar_tests", "tracker", "migrations", "site", "tests", "bench"):
-        shutil.copytree(ROOT / name, folder / name, ignore=only)
-    shutil.copytree(ROOT / "spook_tracker", folder / "spook_tracker", symlinks=True)
-    (folder / "docs").mkdir()
-    for page in (ROOT / "docs").glob("*.md"):
-        shutil.copy(page, folder / "docs")
-    shutil.copy(str(_core.__file__), folder / "engine")
-    shutil.copy(ROOT / "pyproject.toml", folder)
-
-
-def killed(found: Mutant | None) -> bool:
-    """Whether the judge's tests fail for this mutant. None: the sources as they are."""
-    with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
-        copied(folder)
-        if found is not None:
-            file = folder / found.file
-            file.write_text(applied(found, file.read_text()))
-        tests = [test for test in TESTS if (folder / test).is_file()]
-        arguments = ["-q", "-x", "-p", "no:cacheprovider", "-p", "no:xdist", *tests]
-        command = [sys.executable, "-S", "-B", "-c", RUN, name, sysconfig.get_path("purelib"), *arguments]
-        environment = os.environ | {"HYPOTHESIS_STORAGE_DIRECTORY": name}
-        done = subprocess.run(
-            command, cwd=folder, env=environment, capture_output=True, text=True, check=False
-        )
+    def asked(self, tests: Sequence[str], limit: float | None = None) -> tuple[int, str]:
+        """Exit code and output of the tests; 1 where they take longer than the limit, s."""
+        path = f"{self.folder / '.first'}{os.pathsep}{self.folder}"
+        environment = os.environ | {
+            "PYTHONPATH": path, "PYTHONDONTWRITEBYTECODE": "", "OPENBLAS_NUM_THREADS": "1",
+            "HYPOTHESIS_STORAGE_DIRECTORY": str(self.folder / ".hypothesis"),
+        }  # fmt: skip
+        command = [
+            sys.executable,
+            "-m",
+            "pytest",
+            "-q",
+            "-p",
+            "no:cacheprovider",
+            "-p",
+            "no:xdist",
+            "--hypothesis-seed=0",
+        ]
+        try:
+            done = subprocess.run(
+                [*command, *tests], cwd=self.folder, env=environment, capture_output=True, text=True, check=False,
+                timeout=limit,
+            )  # fmt: skip
+        except subprocess.TimeoutExpired:
+            return 1, "too slow"
         if done.returncode not in (0, 1):
             raise RuntimeError(done.stdout[-2000:] + done.stderr[-2000:])
-        return done.returncode == 1
+        return done.returncode, done.stdout
+
+    def killed(self, found: Mutant, tests: Sequence[str], limit: float | None = None) -> bool:
+        """Whether the tests fail for this mutant."""
+        file = self.folder / found.file
+        sound, self.changes = file.stat(), self.changes + 1
+        text = file.read_text(encoding="utf-8")
+        try:
+            file.write_text(found.applied(text), encoding="utf-8")
+            os.utime(file, (0, self.changes))  # what was compiled of another mutant is not taken for it
+            return self.asked(["-x", *tests], limit)[0] == 1
+        finally:
+            file.write_text(text, encoding="utf-8")
+            os.utime(file, (sound.st_atime, sound.st_mtime))
 
 
-def main(names: list[str]) -> int:
-    chosen = [found for found in MUTANTS if not names or found.name in names]
-    if killed(None):
-        print("the tests fail without any change; nothing can be said")
-        return 1
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
-        results = list(pool.map(killed, chosen))
-    for found, dead in zip(chosen, results, strict=True):
-        print(f"{'killed  ' if dead else 'SURVIVED'}  {found.name:32} {found.file}")
-    print(f"\n{sum(results)} of {len(results)} mutants killed")
-    return 0 if all(results) else 1
+def score(copies: Sequence[Copy], mutants: Sequence[Mutant], paths: Sequence[str]) -> list[bool] | None:
+    """Which mutants these tests kill; None where they fail without any change and nothing can be said."""
+    begun = time.perf_counter()
+    files = [str(f.relative_to(ROOT)) for path in paths for f in tests_of(path)]
+    _, output = copies[0].asked(files)
+    deselected = [
+        f"--deselect={name}"
+        for name in re.findall(r"^(?:FAILED|ERROR) (\S+::[^\n]*?)(?: - |$)", output, re.M)
+    ]
+    limit = 4.0 * (time.perf_counter() - begun) + 60.0
+    if len(deselected) > 5:
+        return None
+    free: SimpleQueue[Copy] = SimpleQueue()
+    for copy in copies:
+        free.put(copy)
+
+    def killed(found: Mutant) -> bool:
+        copy = free.get()
+        try:
+            name = Path(found.file).stem
+            near = sorted(
+                files,
+                key=lambda file: not re.search(rf"\b{name}\b", (ROOT / file).read_text(encoding="utf-8")),
+            )
+            return copy.killed(found, [*deselected, *near], limit)
+        finally:
+            free.put(copy)
+
+    with ThreadPoolExecutor(len(copies)) as pool:
+        return list(pool.map(killed, mutants))
+
+
+def tests_of(path: str) -> list[Path]:
+    place = ROOT / path
+    return sorted(place.rglob("test_*.py")) if place.is_dir() else sorted(ROOT.glob(path))
+
+
+def told(mutants: Sequence[Mutant], results: Sequence[bool]) -> None:
+    for found, dead in zip(mutants, results, strict=True):
+        print(f"{'killed  ' if dead else 'SURVIVED'}  {found.name:32} {found.file if found.at < 0 else ''}")
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("names", nargs="*")
+    parser.add_argument("--rooms", nargs="+", choices=["all", *ROOMS], default=[])
+    parser.add_argument("--sample", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--workers", type=int, default=os.cpu_count())
+    asked = parser.parse_args(words)
+    rooms = list(ROOMS) if "all" in asked.rooms else asked.rooms
+    with tempfile.TemporaryDirectory() as name:
+        copies = [Copy(Path(name) / str(n)) for n in range(asked.workers)]
+        if not rooms:
+            chosen = [found for found in MUTANTS if not asked.names or found.name in asked.names]
+            results = score(copies, chosen, TESTS)
+            if results is None:
+                print("the tests fail without any change; nothing can be said")
+                return 1
+            told(chosen, results)
+            print(f"\n{sum(results)} of {len(results)} mutants killed")
+            return 0 if all(results) else 1
+        for room in rooms:
+            mutants = drawn(room, asked.sample, asked.seed)
+            results = score(copies, mutants, ROOMS[room])
+            if results is None:
+                print(f"{room}: the tests fail without any change; nothing can be said")
+                continue
+            told(mutants, results)
+            print(f"{room}: {sum(results)} of {len(results)} random mutants killed", flush=True)
+    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    sys.exit(main())
