@@ -389,6 +389,7 @@ class ScalarTest:
     lacks: Mapping[str, Reason] = field(
         default_factory=dict
     )  # why it has no ladder, or no break point or map
+    topic: str = ""  # what it is about, in a word or two: lists and pages put tests of a topic together
     measured: bool = False  # its right answer was measured, not derived: validation
     seven: bool = False  # one of the thesis' seven continuous tests
     formerly: tuple[str, ...] = ()  # its earlier names: its history goes on

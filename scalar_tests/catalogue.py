@@ -6,6 +6,7 @@ A new test is a file and a line here.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from importlib import import_module
 
 from spook_tracker.scalar_tests import case
@@ -131,9 +132,14 @@ TOPIC = {name: topic for topic, tests in TOPICS.items() for name in tests}
 class Catalogue(Mapping[str, case.ScalarTest]):
     """The table; a test is imported when it is asked for, so that a few are had without what all the others need."""
 
+    def __init__(self) -> None:
+        self._found: dict[str, case.ScalarTest] = {}
+
     def __getitem__(self, name: str) -> case.ScalarTest:
-        test: case.ScalarTest = import_module(f"{__package__}.{QUESTIONS[name]}").TEST
-        return test
+        if name not in self._found:
+            test: case.ScalarTest = import_module(f"{__package__}.{QUESTIONS[name]}").TEST
+            self._found[name] = replace(test, topic=TOPIC[name])
+        return self._found[name]
 
     def __iter__(self) -> Iterator[str]:
         return iter(QUESTIONS)

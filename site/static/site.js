@@ -380,7 +380,7 @@ function filter() {
   if (!tools) { return; }
   const search = document.getElementById("search"), show = document.getElementById("show"), none = document.getElementById("none-found");
   const groups = [...document.querySelectorAll("details.cause")];
-  const lines = groups.length ? groups : [...tools.parentElement.querySelectorAll(".charts .cell, tbody tr")];
+  const lines = groups.length ? groups : [...tools.parentElement.querySelectorAll(".charts .cell, tbody tr:not(.topic)")];
   const known = new Map();
   const textOf = (element) => {
     if (!known.has(element)) { known.set(element, `${element.dataset.search || ""} ${element.textContent}`.toLowerCase()); }
@@ -399,6 +399,9 @@ function filter() {
         line.querySelectorAll("tbody tr").forEach((row) => { row.hidden = !whole && !fits(row); });
         if (words.length && !whole && !line.hidden) { line.open = true; }
       }
+    });
+    document.querySelectorAll("tr.topic").forEach((head) => {  // gone with the last of its lines
+      head.hidden = [...head.parentElement.rows].every((row) => row === head || row.hidden);
     });
     if (none) { none.hidden = lines.some((line) => !line.hidden) || !lines.length; }
   };

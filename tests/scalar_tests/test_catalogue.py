@@ -48,7 +48,7 @@ def test_every_test_is_listed_once_under_its_topic_and_in_that_order() -> None:
     ]
     listed = [(row[0], next(cell.strip() for cell in row[1:] if cell)) for row in rows[1:]]
     assert listed == [(name, topic) for topic, tests in TOPICS.items() for name in tests]
-    assert "topic" not in catalogue_table({"of_a_team": CATALOGUE["door"]})
+    assert "topic" not in catalogue_table({"of_a_team": replace(CATALOGUE["door"], topic="")})
 
 
 @every_test

@@ -1,4 +1,4 @@
-"""Which engine for what: half of a use's scenes, what no adapter can ask, and every test in one use."""
+"""Which engine for what: half of the scenes of a topic, and what no adapter can ask."""
 
 from __future__ import annotations
 
@@ -10,20 +10,14 @@ from pathlib import Path
 import pytest
 
 from spook_tracker.engine import find
-from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.document.run_document import OutcomeClass, Sample, SeriesDefinition, Timing
 from spook_tracker.tracker.document.wording import seconds as within
 from spook_tracker.tracker.store.documents import DocumentHistory
-from spook_tracker.tracker.website.page_chooser import FACTS, USES, half, uses
+from spook_tracker.tracker.website.page_chooser import FACTS, half, topics
 from spook_tracker.tracker.website.publish import publish
+from tests.histories.documents import card
 from tests.histories.synthetic import history, rival, sample, series
 from tests.website.test_engines import table
-
-
-def test_every_test_with_a_ladder_stands_in_one_use() -> None:
-    placed = [test for tests in USES.values() for test in tests]
-
-    assert sorted(placed) == sorted(name for name, test in CATALOGUE.items() if test.ladders)
 
 
 @pytest.mark.parametrize(
@@ -43,10 +37,10 @@ def test_the_first_answer_names_the_soonest_engines_and_below_what_each_cannot_b
     site = tmp_path / "public"
     publish(DocumentHistory([*history(3).documents.values(), rival("3.3")]), site)
     first = table(site, "engines.html", "The soonest to an error")
-    every = table(site, "engines.html", "Robots and chains of joints: time for half of 1 scene,")
+    every = table(site, "engines.html", "Every test: time for half of 1 scene,")
 
-    (use,) = [line for name, line in first.items() if name != "I simulate"]
-    assert use == [
+    (soonest,) = [line for name, line in first.items() if name != "Topic"]
+    assert soonest == [
         "spook 40.4 µs, rival 200 µs",
         "spook 70 µs, rival 200 µs",
         "rival 200 µs, spook 221 µs",
@@ -72,23 +66,29 @@ def rungs(test: str, *seconds: float | OutcomeClass) -> dict[str, tuple[SeriesDe
 
 
 def test_what_an_engine_cannot_be_asked_takes_for_ever_and_is_named() -> None:
-    """Two scenes count: the third only one engine can be asked."""
+    """Two scenes count: the third only one engine can be asked. A scene whose test has no page is of no topic."""
     cannot: OutcomeClass = "not_supported"
     asked = {
         "one": rungs("friction", 1.0) | rungs("grasp", 2.0) | rungs("grain", 3.0),
         "two": rungs("friction", 3.0, "timed_out") | rungs("grasp", 4.0, "crashed") | rungs("grain", cannot),
         "three": rungs("friction", cannot) | rungs("grasp", 0.5) | rungs("grain", cannot),
     }
-    (use,) = uses(asked, {name: (f"{name}.html", name) for name in asked}, {"friction": "Friction"})
-    lines = {line.engine: line for line in use.lines}
+    addresses = {name: (f"{name}.html", name) for name in asked}
+    cards = {name: card(name=name, title=name.title(), topic="friction") for name in ("friction", "grasp")}
+    (topic,) = topics(asked, addresses, cards)
+    lines = {line.engine: line for line in topic.lines}
 
-    assert use.count == 2
+    assert (topic.title, topic.count) == ("Friction", 2)
+    assert [(one.title, one.count) for one in topics(asked, addresses, {"grasp": cards["grasp"]})] == [
+        ("Friction", 1),
+        ("Other tests", 1),
+    ]
     assert list(lines) == ["one", "two", "three"], "the most scenes first, then the soonest"
     assert {name: line.times[0] for name, line in lines.items()} == {
         "one": (within(1.0), 2), "two": (within(3.0), 2), "three": (within(0.5), 1),
     }  # fmt: skip
     assert lines["three"].lacking == (("Friction", "tests/friction.html"),)
-    assert [line.worst for line in use.lines] == ["none failed", "crashed on 1", "none failed"]
+    assert [line.worst for line in topic.lines] == ["none failed", "crashed on 1", "none failed"]
 
 
 def test_every_engine_has_its_facts_and_the_licence_that_its_package_names() -> None:

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 import click
 
 from spook_tracker.scalar_tests.case import LimitKind, Measurement, Metric, ScalarTest
-from spook_tracker.scalar_tests.catalogue import TOPIC
 from spook_tracker.tracker.cli.console import Column, table, width
 from spook_tracker.tracker.cli.report_sweep import seconds
 from spook_tracker.tracker.cli.report_table import number
@@ -25,14 +24,14 @@ if TYPE_CHECKING:
 
 
 def catalogue_table(tests: Mapping[str, ScalarTest]) -> str:
-    """Every test with its question and its first gate; ours with their topics."""
+    """Every test with its question, its first gate, and its topic where any has one."""
     rows: list[tuple[str, ...]] = []
-    topics = {name: TOPIC[name] for name in tests if name in TOPIC}
+    topics = any(test.topic for test in tests.values())
     for name, test in tests.items():
         gates = [metric for _, metric in test.metrics() if metric.role == "gate"]
         more = f" +{len(gates) - 1}" if len(gates) > 1 else ""
         limit = (limit_of(gates[0]) + more) if gates else "-"
-        rows.append((name, *((topics.get(name, ""),) if topics else ()), limit, test.question))
+        rows.append((name, *((test.topic,) if topics else ()), limit, test.question))
     topic = (Column("topic"),) if topics else ()
     columns = (Column("test"), *topic, Column("limit"), Column("question", flexible=True))
     seven = sum(test.seven for test in tests.values())

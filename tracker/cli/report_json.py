@@ -92,6 +92,7 @@ def _test(name: str, test: ScalarTest) -> dict[str, Writable]:
         "test": name,
         "title": test.title,
         "question": test.question,
+        "topic": test.topic,
         "seven": test.seven,
         "metrics": [
             {

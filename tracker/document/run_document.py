@@ -316,6 +316,7 @@ class TestCard(Struct, frozen=True, kw_only=True):
     lacks: dict[Name, Text] = {}  # why it has no "ladder" or "stability"; what a "look" left out
     saving: Saving | None = None  # None: not measured
     measured: bool = False  # its right answer was measured in the world: validation, not verification
+    topic: Text = ""  # what it is about: pages put tests of a topic together, in the order of the document
 
 
 Family = Literal["values", "sweep", "stability"]

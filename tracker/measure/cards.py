@@ -39,6 +39,7 @@ def test_card(name: str, test: ScalarTest, engine: Engine, out: LeavingOut | Non
         lacks=dict(test.lacks),
         saving=out.told() if out is not None else None,
         measured=test.measured,
+        topic=test.topic,
     )
 
 

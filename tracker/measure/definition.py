@@ -55,6 +55,7 @@ WORDING = {
     "time_tolerance",
     "title",
     "tolerance",
+    "topic",
     "why",
     "x_label",
     "y_label",

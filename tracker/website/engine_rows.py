@@ -53,7 +53,7 @@ class GateRow(TypedDict):
     address: str
     what: str
     limit: str
-    seven: bool
+    topic: str
     cells: list[Cell]
     mine: list[Cell]  # of them
     others: bool  # whether any other engine can be asked
@@ -64,6 +64,7 @@ class RankRow(TypedDict):
 
     title: str
     address: str
+    topic: str
     what: str
     unit: str
     columns: list[list[Cell]]

@@ -41,6 +41,7 @@ from spook_tracker.tracker.judge.standing import worst
 from spook_tracker.tracker.judge.vocabulary import Class
 from spook_tracker.tracker.website.earlier_nights import Earlier, earlier_nights
 from spook_tracker.tracker.website.motions import Motion, kept_motions
+from spook_tracker.tracker.website.topics import order_of
 
 NIGHTS_FOR_FIGURES = 12  # how far back figures, maps and cards are looked for
 
@@ -364,9 +365,11 @@ def _chapter(
     figures: dict[str, list[FigureData]] = {}
     motions: dict[str, list[tuple[Night, Trajectory]]] = {}
     maps: dict[str, MapData] = {}
+    documents: list[Sequence[TestCard]] = []
     for night in reversed(nights[-NIGHTS_FOR_FIGURES:]):
         figures_found = set(figures)
-        for card in history.cards(night.id):
+        documents.append(history.cards(night.id))
+        for card in documents[-1]:
             cards.setdefault(card.name, card)
         for figure in history.figures(night.id):
             if figure.test not in figures_found:
@@ -397,7 +400,9 @@ def _chapter(
         )
         for test, card in cards.items()
     ]
-    return nights, sorted(tests, key=lambda t: not t.card.seven), earlier
+    place = order_of(documents)
+    tests.sort(key=lambda test: (not test.card.seven, *place(test.card)))
+    return nights, tests, earlier
 
 
 def _bare_card(name: str, title: str) -> TestCard:

@@ -1,4 +1,4 @@
-"""Which engine for what: the scenes of one use together, and in what time each engine comes within an error on half of them.
+"""Which engine for what: the scenes of a topic together, and in what time each engine comes within an error on half of them.
 
 Counted are scenes that at least two engines can be asked. One that an engine cannot be asked, or on which it never comes
 so near, takes for ever: so all are measured on the same scenes, and a half has a time where the mean would have none.
@@ -12,11 +12,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from spook_tracker.tracker.document.addresses import page_of
-from spook_tracker.tracker.document.run_document import OutcomeClass
+from spook_tracker.tracker.document.run_document import OutcomeClass, TestCard
 from spook_tracker.tracker.document.wording import seconds
 from spook_tracker.tracker.judge.rank import Rungs, Samples, ladders, soonest
 from spook_tracker.tracker.website.charts import Chart, Line
 from spook_tracker.tracker.website.diagrams import View, view
+from spook_tracker.tracker.website.topics import grouped
 
 ERRORS = (1e-2, 1e-3, 1e-4)  # in the unit of a scene
 DRAWN = tuple(10.0 ** (-place / 2.0) for place in range(1, 15))
@@ -29,34 +30,6 @@ SEVERE: tuple[OutcomeClass, ...] = (
     "unsettled",
 )  # the worst first
 Scene = tuple[str, str, str]  # test, ladder, unit
-USES: Mapping[str, tuple[str, ...]] = {  # every test of the catalogue that has a ladder stands in one
-    "Stacks and heaps": (
-        "resting_box", "resting_ball", "resting_stack", "resting_grid", "overhang", "leaning_cards", "card_house", "pile",
-        "falling_pile", "masonry_arch", "stone_bridge", "rocking_block", "shaken_block",
-    ),
-    "Robots and chains of joints": (
-        "pendulum", "n_pendulum", "simple_pendulum", "double_pendulum", "swinging_door", "door", "motor", "robot_arm", "arm_path",
-        "loaded_rods", "hanging_chain", "spinning_top", "steady_turns", "bar_pendulum", "seconds_pendulum",
-    ),
-    "Mechanisms with loops": (
-        "four_bars", "squeezer", "bricard", "governor", "slider_crank", "loose_bearing", "scissor_lift", "gears", "lock_ring",
-    ),
-    "Vehicles and rolling": (
-        "vehicle", "climb", "suspension", "cornering", "rolling_sphere", "rolling_friction", "rolling_coin", "rolling_log", "bowl",
-        "seams", "rolling_beats",
-    ),
-    "Gripping, sliding, conveying": (
-        "friction", "slip_angle", "force_ratio", "slope_grid", "edge_roll", "grasp", "grain", "conveyor", "turntable", "sorting",
-    ),
-    "Ropes, springs, soft joints": (
-        "oscillator_spring", "oscillator_row", "oscillator_damped", "beam", "cantilever", "wires", "capstan", "hanging_cable",
-        "taut_rope", "rope", "falling_chain",
-    ),
-    "Flight and impacts": (
-        "falling_object", "planetarium", "rotating_box", "thrown_die", "bouncing_ball", "bounce_grid", "billiards",
-        "floating_box", "sinking_sphere", "last_bounce",
-    ),
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -93,7 +66,7 @@ FACTS: Mapping[str, Facts] = {
 
 @dataclass(frozen=True)
 class Row:
-    """One engine in one use."""
+    """One engine on one topic."""
 
     engine: str
     address: str
@@ -106,8 +79,8 @@ class Row:
 
 
 @dataclass(frozen=True)
-class Use:
-    """One use: which is soonest at each error, and every engine."""
+class Topic:
+    """Scenes of one topic: which engine is soonest at each error, and every engine."""
 
     title: str
     anchor: str
@@ -119,27 +92,23 @@ class Use:
     chart: View | None
 
 
-def uses(
-    asked: Mapping[str, Samples], addresses: Mapping[str, tuple[str, str]], titles: Mapping[str, str]
-) -> list[Use]:
-    """Every use of which two engines were asked a scene; `addresses` gives an engine's page and its plain name."""
+def topics(
+    asked: Mapping[str, Samples],
+    addresses: Mapping[str, tuple[str, str]],
+    tests: Mapping[str, TestCard],
+) -> list[Topic]:
+    """Every topic of which two engines were asked a scene; `addresses` gives an engine's page and its plain name, `tests`
+    are those that have a page, topic by topic."""
     groups = {name: ladders(samples) for name, samples in asked.items()}
-    found = []
-    for title, tests in USES.items():
-        scenes = _scenes(groups, tests)
-        if scenes:
-            found.append(_use(title, scenes, groups, addresses, titles))
-    return found
-
-
-def _scenes(groups: Mapping[str, Mapping[Scene, Mapping[str, Rungs]]], tests: Sequence[str]) -> list[Scene]:
-    able = Counter(
-        scene
-        for mine in groups.values()
-        for scene, found in mine.items()
-        if scene[0] in tests and _able(found)
+    able = Counter(scene for mine in groups.values() for scene, found in mine.items() if _able(found))
+    places = {name: place for place, name in enumerate(tests)}
+    scenes = sorted(
+        (scene for scene, count in able.items() if count > 1), key=lambda one: places.get(one[0], len(places))
     )
-    return [scene for scene, count in able.items() if count > 1]
+    return [
+        _topic(one.title or "Every test", one.anchor, one.lines, groups, addresses, tests)
+        for one in grouped(scenes, lambda scene: tests[scene[0]].topic if scene[0] in tests else "")
+    ]
 
 
 def _able(found: Mapping[str, Rungs]) -> bool:
@@ -154,14 +123,14 @@ def half(times: Sequence[float | None]) -> float | None:
     return known[needed - 1] if len(known) >= needed > 0 else None
 
 
-def _use(
+def _topic(
     title: str,
+    anchor: str,
     scenes: Sequence[Scene],
     groups: Mapping[str, Mapping[Scene, Mapping[str, Rungs]]],
     addresses: Mapping[str, tuple[str, str]],
-    titles: Mapping[str, str],
-) -> Use:
-    place = list(USES).index(title)
+    tests: Mapping[str, TestCard],
+) -> Topic:
     halves: dict[str, tuple[float | None, ...]] = {}
     lines: list[Row] = []
     drawn: list[Line] = []
@@ -186,7 +155,7 @@ def _use(
                 address,
                 tuple(told),
                 _worst(mine, scenes),
-                tuple(_named(lacking, titles)),
+                tuple(_named(lacking, tests)),
                 FACTS.get(plain),
             )
         )
@@ -204,12 +173,12 @@ def _use(
         ]
     )
     chart = Chart(
-        name=f"use-{place}", title=f"{title}: error on half of {len(scenes)} scenes against run time", x_label="run time [s]",
+        name=anchor, title=f"{title}: error on half of {len(scenes)} scenes against run time", x_label="run time [s]",
         y_label="error", x_scale="log", y_scale="log", lines=tuple(drawn),
     )  # fmt: skip
-    return Use(
+    return Topic(
         title,
-        f"use-{place}",
+        anchor,
         len(scenes),
         tuple(_first(halves, i, addresses) for i in range(len(ERRORS))),
         tuple(lines),
@@ -235,6 +204,6 @@ def _worst(mine: Mapping[Scene, Mapping[str, Rungs]], scenes: Sequence[Scene]) -
     return f"{worst.replace('_', ' ')} on {met[worst]}" if worst else "none failed"
 
 
-def _named(scenes: Sequence[Scene], titles: Mapping[str, str]) -> list[tuple[str, str]]:
+def _named(scenes: Sequence[Scene], tests: Mapping[str, TestCard]) -> list[tuple[str, str]]:
     found = dict.fromkeys(test for test, _, _ in scenes)
-    return [(titles.get(test, test), page_of(test) if test in titles else "") for test in found]
+    return [(tests[test].title, page_of(test)) if test in tests else (test, "") for test in found]

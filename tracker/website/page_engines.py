@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from itertools import groupby, pairwise
+from typing import TypeVar
 
 import msgspec
 
 from spook_tracker.tracker.document.addresses import page_of
-from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
+from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, TestCard
 from spook_tracker.tracker.document.wording import (
     clean,
     conditions,
@@ -51,9 +52,10 @@ from spook_tracker.tracker.website.engine_rows import (
     VersionRow,
 )
 from spook_tracker.tracker.website.nights import Book, Chapter, TestHistory, Trend
-from spook_tracker.tracker.website.page_chooser import uses
+from spook_tracker.tracker.website.page_chooser import topics
 from spook_tracker.tracker.website.page_rows import Page
 from spook_tracker.tracker.website.recorded import Recorded
+from spook_tracker.tracker.website.topics import Group, grouped
 
 ENGINES, RECORDED = "engines.html", "recorded.html"
 MOST_RELEASES = 200  # in the table of an engine's versions
@@ -111,19 +113,21 @@ def engines(book: Book, recorded: Recorded | None = None, path: str = ENGINES, b
         "index.html" if chapter.name == book.name else engine_address(chapter.name, folder)
         for chapter in chapters
     ]
-    chosen = uses(
+    cards = {test.name: test.card for test in book.tests}
+    chosen = topics(
         {title: samples for title, samples in asked.items() if title not in apart},
         {
             title: (address, chapter.name)
             for title, address, chapter in zip(titles, addresses, chapters, strict=True)
         },
-        {test.name: test.card.title for test in book.tests},
+        cards,
     )
     own = [chapter.name == book.name for chapter in chapters]
     lines = [
         _line(test, definition, of_gate, own)
         for (test, _), (definition, of_gate) in zip(gates, told, strict=True)
     ]
+    ranks = _ranks(found, cards, apart, own)
     context = {
         "engines": [
             _card(title, chapter, address, told, found)
@@ -131,12 +135,13 @@ def engines(book: Book, recorded: Recorded | None = None, path: str = ENGINES, b
         ],
         "recorded": None if recorded is None else _occasion(recorded),
         "beside": beside,
-        "uses": chosen,
-        "use_charts": [use.chart for use in chosen if use.chart is not None],
-        "matrix": [line for line in lines if line["others"]],
-        "alone": [line for line in lines if not line["others"]],
+        "topics": chosen,
+        "topic_charts": [one.chart for one in chosen if one.chart is not None],
+        "matrix": _by_topic(line for line in lines if line["others"]),
+        "alone": _by_topic(line for line in lines if not line["others"]),
         "mine": [title for title, mine in zip(titles, own, strict=True) if mine],
-        "ranks": list(_ranks(found, book, apart, own)),
+        "ranks": _by_topic(ranks),
+        "scenes": ranks,
         "ours": ours,
         "behind": None if ours in apart else _behind(found, ours, book),
         "apart": apart,
@@ -198,7 +203,7 @@ def _line(test: TestHistory, gate: SeriesDefinition, told: Sequence[Answer], own
         "address": page_of(test.name),
         "what": named(gate)[0],
         "limit": limit(gate),
-        "seven": test.card.seven,
+        "topic": test.card.topic,
         "cells": cells,
         "mine": [cell for cell, mine in zip(cells, own, strict=True) if mine],
         "others": any(
@@ -226,13 +231,21 @@ def _told(definition: SeriesDefinition, sample: Sample) -> str:
     return clean(f"{conditions(definition)}{': ' + sample.failure if sample.failure else ''}")[:300]
 
 
+Row = TypeVar("Row", GateRow, RankRow)
+
+
+def _by_topic(rows: Iterable[Row]) -> list[Group[Row]]:
+    return grouped(rows, lambda row: row["topic"])
+
+
 def _ranks(
-    found: Sequence[Standing], book: Book, apart: Mapping[str, str], own: Sequence[bool]
-) -> Iterator[RankRow]:
+    found: Sequence[Standing], cards: Mapping[str, TestCard], apart: Mapping[str, str], own: Sequence[bool]
+) -> list[RankRow]:
     """A line for every scene: its errors at h = 1/60, and the run times to each error; `apart` says whose do not compare,
-    and why; which engines are `own`."""
-    titles = {test.name: test.card.title for test in book.tests}
-    for group in scenes(found):
+    and why; which engines are `own`. In the order of `cards`."""
+    places = {name: place for place, name in enumerate(cards)}
+    rows: list[RankRow] = []
+    for group in sorted(scenes(found), key=lambda group: places.get(group[0].test, len(places))):
         first = group[0]
         lacks = [one.outcome.replace("_", " ") for one in group]
         columns = [_cells([one.error for one in group], lacks, partial(_error, first.unit), TIE)]
@@ -243,9 +256,11 @@ def _ranks(
         for place in range(len(ERRORS)):
             columns.append(_cells([one.seconds[place] for one in group], late, seconds))
         if any(cell.best for column in columns for cell in column):
-            yield {
-                "title": titles.get(first.test, first.test),
-                "address": page_of(first.test) if first.test in titles else "",
+            card = cards.get(first.test)
+            row: RankRow = {
+                "title": card.title if card else first.test,
+                "address": page_of(first.test) if card else "",
+                "topic": card.topic if card else "",
                 "what": first.ladder.replace("_", " "),
                 "unit": "" if first.unit == "1" else first.unit,
                 "columns": columns,
@@ -258,6 +273,8 @@ def _ranks(
                     for column in columns
                 ],
             }
+            rows.append(row)
+    return rows
 
 
 def _error(unit: str, value: float) -> str:

@@ -20,6 +20,7 @@ from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, WORSE_TH
 from spook_tracker.tracker.website.causes import ToldCause, damage_of, lasting, told
 from spook_tracker.tracker.website.nights import Book, Night, TestHistory, Trend
 from spook_tracker.tracker.website.page_rows import Page, Row, address, row
+from spook_tracker.tracker.website.topics import Group, grouped
 
 HEAT_NIGHTS = 60
 MOST_RED = 30  # tests beyond the thesis with a row of their own there
@@ -64,13 +65,12 @@ def index(book: Book, causes: Sequence[Cause]) -> Page:
         if test.card.measured and t.definition.limit_kind == "physical"
     ]
     others = [
-        _nearest(test, book)
+        (test.card.topic, _nearest(test, book))
         for test in book.tests
         if not ((test.card.seven or test.card.measured) and test.gates())
         and _judged(test)
         and not _lacks(_judged(test))
     ]
-    others.sort(key=lambda one: CLASS_RANK[one.state] if one.state in RED else len(CLASS_RANK))
     steps = {t.definition.time_step for test, t in gates if test.card.seven}
     step = steps.pop() if len(steps) == 1 else None
     context = {
@@ -82,7 +82,7 @@ def index(book: Book, causes: Sequence[Cause]) -> Page:
         "nights": len(book.nights),
         "seven": seven,
         "measured": measured,
-        "others": others,
+        "others": _by_topic(others),
         "lacking": [(test.card.title, address(test)) for test in lacking],
         "common_step": _step_words(step),
         "heat": heat(book, folded=True),
@@ -142,7 +142,17 @@ def _nearest(test: TestHistory, book: Book) -> Row:
     rows = [row(trend, test.card.title, address(test), book.nights) for trend in _judged(test)]
     shown = min(rows, key=lambda one: (CLASS_RANK[one.state], -float(one.share or 0.0)))
     shown.more = len(rows) - 1
+    shown.search = f"{shown.search} {clean(test.card.topic).lower()}"
     return shown
+
+
+def _by_topic(rows: Sequence[tuple[str, Row]]) -> list[Group[Row]]:
+    """What is red first, the worst on top; then topic by topic."""
+    red = sorted((row for _, row in rows if row.state in RED), key=lambda row: CLASS_RANK[row.state])
+    rest = grouped([one for one in rows if one[1].state not in RED], lambda one: one[0])
+    told = [Group(one.title, one.anchor, [row for _, row in one.lines]) for one in rest]
+    title = "Red" if any(one.title for one in told) else ""
+    return [Group(title, "topic-red", red), *told] if red else told
 
 
 def _red_maps(book: Book) -> list[ToldMap]:
