@@ -344,18 +344,27 @@ function fold(list) {
   const kind = list.tagName === "TBODY" ? "rows" : "charts", first = FIRST[kind], count = list.children.length;
   if (count <= first.narrow + 1 || list.dataset.fold) { return; }
   list.dataset.fold = kind;
-  const button = document.createElement("button"), line = document.createElement("p");
+  const head = list.querySelector(":scope > tr.topic");  // of a topic the line for the rest stays in the table
+  const button = document.createElement("button"), line = document.createElement(head ? "tr" : "p");
   button.type = "button";
   button.className = "button";
-  button.textContent = kind === "rows" ? `Show all ${count} rows` : "Show all of them";
+  button.textContent = kind === "rows" ? `Show all ${count - (head ? 1 : 0)} rows` : "Show all of them";
   button.addEventListener("click", () => {
     const next = [...list.children].find((entry) => !entry.checkVisibility());
     unfold(list);
     next?.querySelector("a, summary, button")?.focus();
   });
   line.className = count > first.wide ? "fold-more" : "fold-more narrow";
-  line.append(button);
-  (list.closest(".scroll") || list).after(line);
+  if (head) {
+    const cell = document.createElement("td");
+    cell.colSpan = head.cells[0].colSpan;
+    cell.append(button);
+    line.append(cell);
+    list.append(line);
+  } else {
+    line.append(button);
+    (list.closest(".scroll") || list).after(line);
+  }
   list.foldLine = line;
 }
 
@@ -380,7 +389,7 @@ function filter() {
   if (!tools) { return; }
   const search = document.getElementById("search"), show = document.getElementById("show"), none = document.getElementById("none-found");
   const groups = [...document.querySelectorAll("details.cause")];
-  const lines = groups.length ? groups : [...tools.parentElement.querySelectorAll(".charts .cell, tbody tr:not(.topic)")];
+  const lines = groups.length ? groups : [...tools.parentElement.querySelectorAll(".charts .cell, tbody tr:not(.topic, .fold-more)")];
   const known = new Map();
   const textOf = (element) => {
     if (!known.has(element)) { known.set(element, `${element.dataset.search || ""} ${element.textContent}`.toLowerCase()); }
