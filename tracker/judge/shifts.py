@@ -231,8 +231,8 @@ def _permuted(base: Values, last: Values, rise: float, memory: float) -> float |
     at_random = not memory and clusters(base) is not None  # in two clusters: exchangeable indeed
     if not at_random and rise <= standard_error(base, len(last), memory):
         return None
-    probability = permutation_probability(base, last)
     enough = RAREST if at_random else RARE
+    probability = permutation_probability(base, last, enough)
     return probability if probability < enough else None
 
 
@@ -281,8 +281,11 @@ def remembered(base: Values, before: Sequence[float] = ()) -> float:
     return min(strongest, 0.98)
 
 
-def permutation_probability(base: Values, last: Values) -> float:
-    """The share of choices of as many values among all whose sum is at least that of the last."""
+def permutation_probability(base: Values, last: Values, enough: float = math.inf) -> float:
+    """The share of choices of as many values among all whose sum is at least that of the last.
+
+    Where choices of values that each reach the mean of the last are as many as `enough` already, their share is told.
+    """
     import numpy as np
 
     pooled = np.concatenate([base, last])
@@ -291,6 +294,10 @@ def permutation_probability(base: Values, last: Values) -> float:
         return 1.0
     steps = np.rint((pooled - low) * (GRID / (high - low))).astype(np.int64)
     span, reached = len(last), int(steps[len(base) :].sum())
+    every = math.comb(len(pooled), span)
+    surely = math.comb(int((span * steps >= reached).sum()), span) / every
+    if surely >= enough:
+        return surely
     size, powers = _turned(span)
     turn = np.fft.fft(np.bincount(steps, minlength=size))
     sums = [
@@ -301,7 +308,7 @@ def permutation_probability(base: Values, last: Values) -> float:
         signed = (sums[i] * chosen[count - 1 - i] * (1.0 - 2.0 * (i % 2)) for i in range(count))
         chosen.append(sum(signed) / count)
     ways = np.rint(np.fft.irfft(chosen[span], size))  # whole numbers, of 10^9: told to a millionth of one
-    return float(ways[reached:].sum()) / math.comb(len(pooled), span)
+    return float(ways[reached:].sum()) / every
 
 
 @lru_cache(maxsize=8)

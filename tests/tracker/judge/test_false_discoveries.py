@@ -5,6 +5,8 @@ So it makes no difference how many series are asked about. Counted here after a 
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 from scipy import stats
@@ -17,21 +19,22 @@ from tests.histories import noise as battery
 LEARNING, NIGHTS, EACH = 100, 140, 8
 
 
-def starts(values: np.ndarray) -> list[int]:
-    """Nights after those of learning on which a red stretch begins."""
+@cache
+def starts(name: str, series: int, slower: float) -> list[int]:
+    """Nights after those of learning on which a red stretch begins, where it becomes so much slower after them."""
+    values = np.array(battery.noise(name, series, NIGHTS))
+    values[LEARNING:] *= slower
     red = [night.state == "detected" for night in judge_noisy([float(value) for value in values])]
     return [n for n in range(LEARNING, len(red)) if red[n] and not red[n - 1]]
 
 
 def of_all_kinds(slower: dict[int, float]) -> list[list[int]]:
     """Alarms of a eighty-eight series of every kind of noise, some of which become slower after learning."""
-    found = []
-    for kind, name in enumerate(battery.STATIONARY):
-        for series in range(EACH):
-            values = np.array(battery.noise(name, 500 + series, NIGHTS))
-            values[LEARNING:] *= slower.get(kind * EACH + series, 1.0)
-            found.append(starts(values))
-    return found
+    return [
+        starts(name, 500 + series, slower.get(kind * EACH + series, 1.0))
+        for kind, name in enumerate(battery.STATIONARY)
+        for series in range(EACH)
+    ]
 
 
 def test_if_nothing_happened_nineteen_nights_in_twenty_are_silent_over_all_series() -> None:
