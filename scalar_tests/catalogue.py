@@ -77,6 +77,7 @@ TOPICS: dict[
         "rotating_box": "rotating_box",
         "thrown_die": "thrown_die",
         "steady_turns": "steady_turns",
+        "flywheel": "flywheel",
         "rolling_sphere": "rolling_sphere",
         "spinning_top": "spinning_top",
         "rolling_coin": "rolling_coin",

@@ -52,6 +52,7 @@ FORMS: dict[str, Form] = {  # of each question that has a physical limit
     "masonry_arch": contacts.masonry,
     "stone_bridge": contacts.masonry,
     "sorting": contacts.on_a_turntable,
+    "flywheel": motions.turning,
     "rolling_beats": contacts.rolling,
     "grasp": contacts.between_fingers,
     "four_bars": motions.parallel_rods,
