@@ -24,7 +24,7 @@ from spook_tracker.engine import (
 from tests.engine.rigid.test_oracle import largest_differences
 from tests.scenes.rigid import GRAVITY, TIME_STEP, between, rigid_body, vector
 
-LINKED = "locks make trees"  # what explain says of it
+LINKED = "link by link"  # what explain says of it
 
 
 def locked(seed: int, root: str, spins: bool = False) -> Scene:

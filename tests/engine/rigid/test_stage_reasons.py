@@ -16,6 +16,7 @@ from spook_tracker.engine import (
     Load,
     Lock,
     Material,
+    Method,
     Motor,
     Particle,
     Plane,
@@ -144,6 +145,36 @@ def test_a_stage_is_kept_where_it_is_needed(stage: str, scene: Scene, kept: bool
     assert choice.kept == kept and choice.reason and reason in choice.reason
     assert not kept or choice.reason not in {why for name, _, met, why in STAGES if name == stage and not met}
     assert (stage in compile(scene, time_step=TIME_STEP).stages) == kept
+
+
+LOCK = Lock(name="lock", between=(WORLD, "body"))
+SOLVERS = [
+    (joined(LOCK), Method(), "link by link", []),
+    (joined(LOCK, replace(LOCK, name="twice")), Method(), "one sparse", ["links: locks close a loop", "plane: some body"]),
+    (joined(LOCK), Method(corrections=1), "one sparse", ["links: the method asks for more", "plane: some body"]),
+    (PLAIN, Method(), "one sparse", ["links: some joint is no lock", "plane: places, speeds or forces lead out of it"]),
+    (replace(PLAIN, gravity=(0.0, 0.0, 0.0)), Method(), "in the plane across z", ["links: some joint is no lock"]),
+    (PLAIN, Method(composition="order4"), "joint coordinates", []),
+    (joined(AXLE, TYRE), Method(), "some joint row has a bound", []),
+    (
+        joined(AXLE, bodies=(body(inertia=((1.0, 0.1, 0.0), (0.1, 1.5, 0.0), (0.0, 0.0, 2.0))),)),
+        Method(composition="order4"),
+        "Newton's method",
+        ["joint_tree: axes of some body are not those of its inertia"],
+    ),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("scene", "method", "solver", "refusals"), SOLVERS)
+def test_the_first_solver_that_takes_a_scene_solves_it_and_those_before_it_say_why_not(
+    scene: Scene, method: Method, solver: str, refusals: list[str]
+) -> None:
+    reasons = {c.stage: c.reason for c in explain(scene, time_step=TIME_STEP, method=method)}
+    solves, _, others = reasons["solve_block"].partition(" (not ")
+
+    assert solver in solves
+    named = others.removesuffix(")").split("; not ") if others else []
+    assert len(named) == len(refusals) and all(map(str.startswith, named, refusals)), named
 
 
 def test_none_of_them_brings_another() -> None:

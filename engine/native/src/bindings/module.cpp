@@ -13,7 +13,7 @@ nb::list to_list(const StageChoices& choices) {
     nb::list list;
     for (std::size_t k = 0; k < STAGES; ++k) {
         const Stage stage = static_cast<Stage>(k), other = choices[k].kept ? host(stage, choices) : stage;
-        list.append(nb::make_tuple(to_text(stage), choices[k].kept, choices[k].reason,
+        list.append(nb::make_tuple(to_text(stage), choices[k].kept, choices[k].told(),
                                    other == stage ? std::string() : to_text(other)));
     }
     return list;

@@ -29,10 +29,13 @@ public:
     LoopWatch loops;
     StringStiffness stiffness;
 
+    /// Whether all joints are locks that make trees, and are to be solved link by link.
+    Refusal take_links() { return locked_.analyse(model_.constants, joints_, model_.constrained); }
+    /// By the solver that was chosen.
     void take();
     void begin();
     /// Solved link by link, without a matrix.
-    bool by_links() const noexcept { return !locked_.empty(); }
+    bool by_links() const noexcept { return model_.solver == Solver::links; }
     LockedTree::Counters counters() const noexcept { return locked_.counters(); }
 
     /// Finds the velocities; `ahead`: into scratch.next, to see what they lead to, before they are taken. False where the
@@ -58,7 +61,7 @@ private:
     RowCurvature& curvature_;
     StepScratch& scratch_;
     const StageTimer& clock_;
-    LockedTree locked_;         // of plain steps in which all joints are locks that make trees; else empty
+    LockedTree locked_;
     bool undelivered_ = false;  // its multipliers are not in the joints yet
     bool moved_ = false;
 };

@@ -117,15 +117,17 @@ private:
 
 }  // namespace
 
-void JointTree::analyse(std::span<const BodyConstants> constants, const JointSet& joints,
-                        std::span<const int> tied, const LargeArray<BodyState>& start) {
+Refusal JointTree::analyse(std::span<const BodyConstants> constants, const JointSet& joints,
+                           std::span<const int> tied, const LargeArray<BodyState>& start) {
     constants_ = constants;
     joints_ = &joints;
     coordinates_ = 0;
     plane_.clear();
     pivots_.clear();
-    if (attach(tied) && close(start) && order()) return flatten(), free_pivots();
-    coordinates_ = 0;
+    const Refusal refusal = attach(tied, start);
+    if (refusal) coordinates_ = 0;
+    else flatten(), free_pivots();
+    return refusal;
 }
 
 bool JointTree::hang(std::span<const BodyConstants> constants, const JointSet& joints,
@@ -140,8 +142,12 @@ bool JointTree::hang(std::span<const BodyConstants> constants, const JointSet& j
            std::count_if(joints.blocks().begin(), joints.blocks().end(), holds);
 }
 
-bool JointTree::attach(std::span<const int> tied) {
-    return hang_up(tied, false) && has_all_rotors() && has_small_trees();
+Refusal JointTree::attach(std::span<const int> tied, const LargeArray<BodyState>& start) {
+    if (!hang_up(tied, false)) return "joints do not hang up all bodies in trees";
+    if (!has_all_rotors()) return "a joint that closes a loop has a rotor";
+    if (!has_small_trees()) return "some tree is too large";
+    if (!close(start)) return "rows that close loops are too many, or depend on each other";
+    return order() ? nullptr : "its band is too wide";
 }
 
 /// The forest, its nodes by depth.

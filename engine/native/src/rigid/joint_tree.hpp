@@ -20,6 +20,7 @@
 #include "rigid/joint_set.hpp"
 #include "rigid/pivot_bodies.hpp"
 #include "rigid/plane_tree.hpp"
+#include "rigid/solver.hpp"
 
 namespace spook {
 
@@ -41,9 +42,9 @@ public:
     };
 
     /// Takes the scene if it can: every constrained body is attached by joints it knows to the world or on a body that floats, in
-    /// small trees, and what closes loops is not redundant at the start. Empty otherwise.
-    void analyse(std::span<const BodyConstants> constants, const JointSet& joints, std::span<const int> tied,
-                 const LargeArray<BodyState>& start);
+    /// small trees, and what closes loops is not redundant at the start. Empty otherwise, and why.
+    Refusal analyse(std::span<const BodyConstants> constants, const JointSet& joints,
+                    std::span<const int> tied, const LargeArray<BodyState>& start);
     /// Takes the bodies without stages of its own if joints hang them up in trees of any size, and close no loop. What floats may
     /// be a particle.
     bool hang(std::span<const BodyConstants> constants, const JointSet& joints, std::span<const int> bodies);
@@ -109,7 +110,7 @@ private:
         Vec3 linear[6][2], angular[6][2];
     };
 
-    bool attach(std::span<const int> tied);
+    Refusal attach(std::span<const int> tied, const LargeArray<BodyState>& start);
     bool hang_up(std::span<const int> tied, bool particles);
     Node node_held_by(int block, int body) const noexcept;
     bool has_all_rotors() const noexcept;

@@ -16,6 +16,7 @@
 #include "linear/large_array.hpp"
 #include "rigid/inertia6.hpp"
 #include "rigid/joint_set.hpp"
+#include "rigid/solver.hpp"
 
 namespace spook {
 
@@ -34,10 +35,11 @@ public:
         std::uint64_t factorisations = 0, block_operations = 0, solves = 0;
     };
 
-    /// True if every joint is a lock whose compliance and damping are the same along all axes and the same about all
-    /// axes, and no two ways lead from body to body or from body to what moves as it is told. Else nothing is kept.
-    bool analyse(std::span<const BodyConstants> constants, const JointSet& joints, std::span<const int> tied);
-    bool empty() const noexcept { return links_.empty(); }
+    /// Null if every joint is a lock whose compliance and damping are the same along all axes and the same about all
+    /// axes, and no two ways lead from body to body or from body to what moves as it is told. Else why not,
+    /// and nothing is kept.
+    Refusal analyse(std::span<const BodyConstants> constants, const JointSet& joints,
+                    std::span<const int> tied);
 
     /// Velocities after the step, refined so many times, by velocity(body, Twist), each body once, parents first.
     /// False when a number was not finite. Allocates nothing.

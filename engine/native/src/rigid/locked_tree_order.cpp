@@ -21,21 +21,23 @@ struct Edge {
     bool child_is_first;
 };
 
-/// Of every body. False if some joint is no lock, or one whose coefficients depend on the direction.
-bool find_edges(std::span<const BodyConstants> constants, const JointSet& joints,
-                std::vector<std::vector<Edge>>& edges) {
+/// Of every body. Refuses a joint that is no lock, or one whose coefficients depend on the direction.
+Refusal find_edges(std::span<const BodyConstants> constants, const JointSet& joints,
+                   std::vector<std::vector<Edge>>& edges) {
     for (const JointBlock& block : joints.blocks()) {
         const JointConstants& joint = joints.constants(block.joint);
-        if (block.axial || joint.kind != JointKind::lock || block.first == block.second) return false;
+        if (block.axial || joint.kind != JointKind::lock || block.first == block.second)
+            return "some joint is no lock";
         for (int body : {block.first, block.second})
-            if (moves(constants, body) && constants[body].particle) return false;
+            if (moves(constants, body) && constants[body].particle) return "some body cannot turn";
         for (int i = 1; i < 6; ++i) {
-            if (i != 3 && !(joints.law(block.joint, i) == joints.law(block.joint, i - 1))) return false;
+            if (i != 3 && !(joints.law(block.joint, i) == joints.law(block.joint, i - 1)))
+                return "some lock gives way otherwise in one direction than in another";
         }
         if (moves(constants, block.first)) edges[block.first].push_back({block.joint, block.second, true});
         if (moves(constants, block.second)) edges[block.second].push_back({block.joint, block.first, false});
     }
-    return true;
+    return nullptr;
 }
 
 /// Every tree from its root on: what is held by the world, or the first of a floating one.
@@ -111,11 +113,12 @@ private:
 
 }  // namespace
 
-bool LockedTree::analyse(std::span<const BodyConstants> constants, const JointSet& joints,
-                         std::span<const int> tied) {
+Refusal LockedTree::analyse(std::span<const BodyConstants> constants, const JointSet& joints,
+                            std::span<const int> tied) {
     std::vector<std::vector<Edge>> edges(constants.size());
     Forest forest(constants.size());
-    if (!find_edges(constants, joints, edges) || !forest.grow(constants, edges, tied)) return false;
+    if (const Refusal refusal = find_edges(constants, joints, edges)) return refusal;
+    if (!forest.grow(constants, edges, tied)) return "locks close a loop";
     // Leaves first, the heaviest branch first of all: what waits for the others is then never much.
     std::vector<int> order = forest.heaviest_last();
     std::reverse(order.begin(), order.end());
@@ -156,7 +159,7 @@ bool LockedTree::analyse(std::span<const BodyConstants> constants, const JointSe
     }
     waiting_.resize(deepest);
     works_.assign(links_.size(), {});
-    return true;
+    return nullptr;
 }
 
 /// The place of a lock's coefficients among those of all; neighbours of equal ones share it.

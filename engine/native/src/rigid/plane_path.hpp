@@ -12,8 +12,8 @@ public:
               LoopWatch& loops) noexcept
         : model_(model), live_(live), joints_(joints), forces_(forces), loops_(loops) {}
 
-    /// Of a scene in which nothing but joints, steady forces and steps of the plain kind bears on the bodies.
-    void take();
+    /// Of a scene in which nothing but joints, steady forces and steps of the plain kind bears on the bodies. Null if they are in a plane.
+    Refusal take();
     void begin();
     /// Whether this run may use it; whether the bodies are in it, those of the state behind.
     bool is_used() const noexcept { return used_; }

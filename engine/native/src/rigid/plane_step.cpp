@@ -12,8 +12,9 @@ namespace spook {
 
 using namespace tolerances::plane_step;
 
-void PlaneStep::analyse(std::span<const BodyConstants> constants, const JointSet& joints,
-                        std::span<const int> tied, const Options& options) {
+Refusal PlaneStep::analyse(std::span<const BodyConstants> constants, const JointSet& joints,
+                           std::span<const int> tied, const Options& options) {
+    const auto refuse = [this](Refusal refusal) { return joints_.clear(), refusal; };
     joints_.clear(), nodes_.clear(), rows_.clear();
     options_ = options;
     const auto blocks = joints.blocks();
@@ -23,12 +24,12 @@ void PlaneStep::analyse(std::span<const BodyConstants> constants, const JointSet
         for (int i = 0; i < 3 && normal < 0 && joint.kind == JointKind::hinge; ++i)
             if (std::fabs(joint.axes[0][i]) > 0.9) normal = i;
     }
-    if (normal < 0) return;
+    if (normal < 0) return "no hinge is along an axis of the world";
     plane_ = {normal};
     std::vector<int> node_of(constants.size(), static_cast<int>(tied.size()));
     for (const int body : tied) {
         const BodyConstants& c = constants[body];
-        if (c.particle) return;
+        if (c.particle) return "some body cannot turn";
         const Mat3& p = c.start_principal;
         const Vec3 axis{p(normal, 0), p(normal, 1), p(normal, 2)};
         const Vec3 spin{c.inertia.x * axis.x, c.inertia.y * axis.y, c.inertia.z * axis.z};
@@ -36,7 +37,8 @@ void PlaneStep::analyse(std::span<const BodyConstants> constants, const JointSet
         node.body = body;
         node.mass = c.mass;
         node.inertia = dot(axis, spin);
-        if (!(norm(spin - node.inertia * axis) <= 4.0 * rounding * node.inertia)) return;  // it would wobble
+        if (!(norm(spin - node.inertia * axis) <= 4.0 * rounding * node.inertia))
+            return "some body would wobble";
         node.over_mass = 1.0 / node.mass;
         node.over_inertia = 1.0 / node.inertia;
         node_of[body] = static_cast<int>(nodes_.size());
@@ -52,13 +54,14 @@ void PlaneStep::analyse(std::span<const BodyConstants> constants, const JointSet
     joint_at_.assign(static_cast<std::size_t>(joints.count()), -1);
     int row = 0;
     for (const JointBlock& block : blocks) {
-        if (!take_joint(constants, joints, block, row, node_of)) return joints_.clear();
+        if (!take_joint(constants, joints, block, row, node_of)) return refuse("some joint leads out of it");
         row += block.size;
         root[find(joints_.back().first)] = find(joints_.back().second);
     }
     for (int k = 0; k < static_cast<int>(nodes_.size()); ++k)  // what floats could tip over
-        if (find(k) != find(static_cast<int>(tied.size()))) return joints_.clear();
-    if (!order_rows(joints)) joints_.clear();
+        if (find(k) != find(static_cast<int>(tied.size())))
+            return refuse("a mechanism that floats could tip over");
+    return order_rows(joints) ? nullptr : refuse("its rows have too wide an envelope");
 }
 
 /// False if it is none of the joints that hold bodies in the plane, or holds them beside it.

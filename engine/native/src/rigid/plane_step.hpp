@@ -15,6 +15,7 @@
 #include "linear/large_array.hpp"
 #include "linear/plane.hpp"
 #include "rigid/joint_set.hpp"
+#include "rigid/solver.hpp"
 
 namespace spook {
 
@@ -27,9 +28,9 @@ public:
         bool follows_turns = false;
     };
     /// Takes the scene if every constrained body moves in the plane and is held there by hinges, locks, slides and planar joints
-    /// on each other, and somewhere on what is fixed. Empty otherwise.
-    void analyse(std::span<const BodyConstants> constants, const JointSet& joints, std::span<const int> tied,
-                 const Options& options);
+    /// on each other, and somewhere on what is fixed. Empty otherwise, and why.
+    Refusal analyse(std::span<const BodyConstants> constants, const JointSet& joints,
+                    std::span<const int> tied, const Options& options);
     bool empty() const noexcept { return joints_.empty(); }
     /// The axis of the world that stands on the plane (0: x).
     int normal() const noexcept { return plane_.normal; }

@@ -29,13 +29,13 @@ namespace spook {
 
 using namespace tolerances::rigid_composition;
 
-void RigidComposition::take() {
+Refusal RigidComposition::take() {
     const bool tilted =  // joint coordinates see inertias along the bodies' own axes
         std::any_of(model_.constants.begin(), model_.constants.end(),
                     [](const BodyConstants& body) { return body.tilted; });
-    if (model_.solver == RigidSolver::block && !tilted)
-        tree_.analyse(model_.constants, joints_, model_.constrained, model_.start);
-    in_tree_ = tree_.coordinates() > 0 && tree_.holds(model_.start);  // for those that ask before a run
+    if (tilted) return "axes of some body are not those of its inertia";
+    const Refusal refusal = tree_.analyse(model_.constants, joints_, model_.constrained, model_.start);
+    return refusal || tree_.holds(model_.start) ? refusal : "joints do not hold where the scene begins";
 }
 
 void RigidComposition::begin() {
@@ -48,7 +48,7 @@ void RigidComposition::begin() {
     pace_.assign(std::max(rows, unknowns_), 0.0);
     multiplier_.assign(std::max(rows, unknowns_), 0.0);
     hold_.begin();
-    if (model_.solver != RigidSolver::block) return;
+    if (!model_.bilateral) return;
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
         for (int i = 0; i < joints_.blocks()[k].size; ++i)
             if (i != joints_.blocks()[k].rotor) rows_.matrix.diagonal(k)[i] = -0.0;
@@ -69,7 +69,7 @@ void RigidComposition::project() {
 void RigidComposition::compose(std::int64_t steps) {
     clock_.start();
     for (; steps > 0; --steps) {
-        if (model_.solver == RigidSolver::block && live_.tension_look-- <= 0) look_at_tension();
+        if (model_.bilateral && live_.tension_look-- <= 0) look_at_tension();
         for (int part = 0; part < live_.parts; ++part) step(model_.h / live_.parts, 0);
         live_.halved_steps += live_.parts - 1;
         joints_.follow(live_.bodies);
@@ -295,7 +295,7 @@ bool RigidComposition::stage(double tau, std::size_t stage) {
     const double span = live_.pending + 0.5 * tau;
     kick_all(span);
     clock_.mark({Stage::apply_gravity, Stage::apply_loads});
-    if (model_.solver == RigidSolver::block) {
+    if (model_.bilateral) {
         if (!hold_stage(tau, span, stage)) return false;
         clock_.mark(Stage::solve_block);
     } else {
@@ -315,7 +315,7 @@ void RigidComposition::read() {
     for (int i = 0; i < model_.bodies(); ++i)
         if (model_.constants[i].moves() && !model_.constants[i].particle)
             refresh(model_.constants[i], live_.bodies[i]);
-    if (model_.solver != RigidSolver::block || live_.lost >= 0) return;
+    if (!model_.bilateral || live_.lost >= 0) return;
     const std::size_t rows = rows_.rows();
     const auto blocks = joints_.blocks();
     const auto take = [&] {

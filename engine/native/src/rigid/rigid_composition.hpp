@@ -21,9 +21,8 @@ public:
           clock_(clock),
           hold_(model, live, joints, rows) {}
 
-    /// Whether joint coordinates will do, once the bodies are known.
-    void take();
-    bool in_tree() const noexcept { return in_tree_; }
+    /// Null if joint coordinates will do, once the bodies are known.
+    Refusal take();
     const JointTree& tree() const noexcept { return tree_; }
 
     void begin();

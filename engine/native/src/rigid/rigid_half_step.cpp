@@ -23,7 +23,7 @@ void HalfStep::start() {
     for (int i : model_.free)
         go_back(i, live_.bodies[i].velocity + forces_.kick(i),
                 live_.bodies[i].angular_momentum + model_.h * model_.constants[i].torque);
-    if (model_.solver == RigidSolver::block) {
+    if (model_.bilateral) {
         rows_.assemble();
         rows_.fill_inertias();
         rows_.fill_momenta();

@@ -28,7 +28,7 @@ void StageHold::begin() {
     extent_.clear();
     for (int k = 0; k < static_cast<int>(blocks.size()); ++k)
         for (int i = 0; i < blocks[k].size; ++i) extent_.push_back(joints_.gain(k, i).extent);
-    dense_ = model_.solver == RigidSolver::block && rows_.rows() <= max_dense_rows;
+    dense_ = model_.bilateral && rows_.rows() <= max_dense_rows;
     if (!dense_) return;
     dense_rows_.prepare(static_cast<int>(rows_.rows()));
     couplings_.clear();

@@ -8,12 +8,10 @@
 #include "rigid/joint_set.hpp"
 #include "rigid/rigid_scene.hpp"
 #include "rigid/rigid_state.hpp"
+#include "rigid/solver.hpp"
 #include "run/stages.hpp"
 
 namespace spook {
-
-/// How a step's rows are solved: block is one factorisation, for bilateral rows; pivot and iterative know bounds.
-enum class RigidSolver { none, block, pivot, iterative };
 
 struct RigidModel {
     RigidModel(StageList stages, Vec3 gravity, const RigidMethod& method)
@@ -26,7 +24,8 @@ struct RigidModel {
     Vec3 gravity;
     RigidMethod method;
     double h;  // s, of one substep
-    RigidSolver solver = RigidSolver::none;
+    Solver solver = Solver::none;
+    bool bilateral = false;  // there are joints, and a direct solver for rows that all hold
     // How the method goes beyond plain SPOOK; `curved`: whether RowCurvature does its corrections.
     bool composed = false, half_step = false, stiff = false, curved = false;
     LargeArray<BodyConstants> constants;  // the loads in them may be set between steps, see Forces

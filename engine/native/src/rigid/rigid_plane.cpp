@@ -6,11 +6,12 @@
 
 namespace spook {
 
-void PlanePath::take() {
-    plane_.analyse(model_.constants, joints_, model_.constrained,
-                   {model_.h, model_.method.refinements, model_.method.corrections,
-                    model_.method.correction_cap, !joints_.turning.empty()});
+Refusal PlanePath::take() {
+    const Refusal refusal = plane_.analyse(model_.constants, joints_, model_.constrained,
+                                           {model_.h, model_.method.refinements, model_.method.corrections,
+                                            model_.method.correction_cap, !joints_.turning.empty()});
     begin();
+    return refusal ? refusal : used_ ? nullptr : "places, speeds or forces lead out of it";
 }
 
 void PlanePath::begin() {

@@ -8,11 +8,7 @@
 namespace spook {
 
 void BilateralSolve::take() {
-    if (model_.solver != RigidSolver::block) return;
-    const bool plain = !model_.composed && !model_.half_step && !model_.stiff &&
-                       model_.method.corrections == 0 && !(model_.method.sleep_speed > 0.0);
-    if (plain) locked_.analyse(model_.constants, joints_, model_.constrained);
-    if (by_links()) return;
+    if (!model_.bilateral || by_links()) return;
     rows_.analyse();
     loops.take();
 }

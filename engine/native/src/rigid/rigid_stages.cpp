@@ -3,7 +3,8 @@
 #include <algorithm>
 #include <string>
 
-#include "rigid/rigid_system.hpp"
+#include "collision/detection.hpp"
+#include "rigid/joint_set.hpp"
 
 namespace spook {
 
@@ -147,10 +148,7 @@ constexpr StageTable<Facts> TABLE{{
      smooth},
     {Stage::solve_path, "rigid bodies couple in blocks"},
     {Stage::solve_block, [](const Facts& is) { return is.direct() && is.joints && !is.bounded; },
-     [](const Facts& is) {
-         return std::string("joints are bilateral: one sparse LDLᵀ per step, ordered once") +
-                (is.contacts ? " (while nothing touches)" : "");
-     },
+     "joints are bilateral",
      [](const Facts& is) -> std::string {
          if (is.iterative()) return iterates;
          return is.joints ? "some joint row has a bound" : "there are no joints";
@@ -198,10 +196,9 @@ constexpr StageTable<Facts> TABLE{{
     {Stage::correct_curvature,
      [](const Facts& is) { return is.joints && (is.composed() || is.method().corrections > 0); },
      [](const Facts& is) {
-         return is.method().runge_kutta ? "joint coordinates keep the joints by construction"
-                : is.composed()         ? "iteration keeps the curvature of the rows to rounding"
-                                        : std::to_string(is.method().corrections) +
-                                              " extra back-substitutions keep the curvature of the rows";
+         return is.composed() ? "a step ends on its joints, to rounding"
+                              : std::to_string(is.method().corrections) +
+                                    " extra back-substitutions keep the curvature of the rows";
      },
      [](const Facts& is) -> std::string {
          return !is.joints ? "no joints, so nothing is curved"
@@ -246,31 +243,6 @@ static_assert(is_in_order(TABLE));
 
 StageChoices choose_stages(const RigidScene& scene, bool observing) {
     return choose_by(TABLE, facts_of(scene, observing));
-}
-
-void RigidSystem::tell(StageChoices& choices) const {
-    std::string& solve = choices[static_cast<std::size_t>(Stage::solve_block)].reason;
-    if (bilateral_.by_links())
-        solve = std::string("locks make trees: solved link by link, leaves first, without a matrix") +
-                (mixed_.contacts() ? " (while nothing touches)" : "");
-    if (plane_.is_used())
-        solve = std::string("the mechanism lies in the plane across ") + "xyz"[plane_.step().normal()] +
-                ": " + std::to_string(plane_.step().rows()) + " rows of that plane, factored in an envelope";
-    if (model_.method.runge_kutta) {
-        solve = "joints make trees: " + std::to_string(runge_kutta_.coordinates()) +
-                " joint coordinates, accelerated by articulated bodies";
-        choices[static_cast<std::size_t>(Stage::assemble_rows)].reason = "rows for what is read";
-    }
-    if (!composition_.in_tree()) return;
-    const JointTree& tree = composition_.tree();
-    solve = "joints make trees: " + std::to_string(tree.coordinates()) + " joint coordinates, " +
-            std::to_string(tree.rows()) + " rows to close loops, by Newton's method in a band";
-    if (tree.across() >= 0) solve += std::string(", in the plane across ") + "xyz"[tree.across()];
-    if (tree.pivots()) solve = "bodies on balls of the world: each turns about its own as a free body does";
-    choices[static_cast<std::size_t>(Stage::correct_curvature)].reason =
-        "joint coordinates keep the joints by construction";
-    choices[static_cast<std::size_t>(Stage::assemble_rows)].reason =
-        "all rows only where joint coordinates find no step, and for what is read";
 }
 
 }  // namespace spook

@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "rigid/runaway.hpp"
+#include "rigid/solver_table.hpp"
 
 namespace spook {
 
@@ -70,25 +71,21 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     rows_.take();
     if (model_.stages.runs(Stage::collision)) mixed_.take_contacts(scene);
     const RigidMethod& method = model_.method;
-    const bool block = model_.solver == RigidSolver::block, may_touch = mixed_.may_touch();
+    const bool may_touch = mixed_.may_touch();
     model_.composed = method.composition > 2;
     model_.half_step = model_.stages.runs(Stage::half_step) && !model_.composed;
-    model_.stiff = model_.stages.runs(Stage::string_stiffness) && block;
-    model_.curved = method.corrections > 0 && !model_.composed && rows_.rows() > 0 && (!block || may_touch);
+    model_.stiff = model_.stages.runs(Stage::string_stiffness) && model_.bilateral;
+    model_.curved =
+        method.corrections > 0 && !model_.composed && rows_.rows() > 0 && (!model_.bilateral || may_touch);
     if (follows_turns(model_, joints_)) joints_.turning = model_.constants;
     mixed_.stops_are_apart = stops_are_apart(joints_, model_.solver_index,
                                              static_cast<int>(model_.constrained.size()), !may_touch);
+    SolverChoice choice =
+        choose_solver({scene, model_, mixed_, forces_, bilateral_, plane_, composition_, runge_kutta_});
+    model_.solver = choice.solver;
+    notes_ = std::move(choice.notes);
     bilateral_.take();
     sleeping_.take(scene);
-    if (method.runge_kutta && !runge_kutta_.take())
-        throw std::invalid_argument(
-            "method: runge_kutta needs joints that make trees; those that slide and turn are to name first what carries them");
-    if (model_.composed && !method.runge_kutta) composition_.take();
-    // Nothing of the scene but its joints, steady forces and steps of the plain kind bears on the bodies:
-    if (block && !bilateral_.by_links() && !model_.composed && !model_.stiff && !mixed_.surfaces() &&
-        !method.force_block && !scene.loads_change && forces_.act_steadily() && model_.free.empty() &&
-        model_.driven.empty())
-        plane_.take();
 }
 
 /// Constants and start of all bodies, and which of them have rows.
@@ -142,17 +139,15 @@ void RigidSystem::take_stages(const RigidScene& scene) {
     for (const Collider& collider : scene.colliders)
         if (collider.shape.kind == ShapeKind::triangle && model_.stages.runs(Stage::collision) && !meshes)
             throw std::invalid_argument("meshes need the stage meet_meshes");
+    bool solved = false;
     if (model_.stages.take(Stage::assemble_rows)) {
         const bool block = model_.stages.take(Stage::solve_block),
                    iterative = model_.stages.take(Stage::solve_iterative);
         const bool pivot = model_.stages.take(Stage::pivot);
-        if (joints)
-            model_.solver = iterative ? RigidSolver::iterative
-                            : block   ? RigidSolver::block
-                            : pivot   ? RigidSolver::pivot
-                                      : RigidSolver::none;
+        solved = block || iterative || pivot;
+        model_.bilateral = joints && block && !iterative;
     }
-    if (joints && model_.solver == RigidSolver::none)
+    if (joints && !solved)
         throw std::invalid_argument("joints need the stage assemble_rows and one that solves them");
     forces_.take_stages(scene);
     model_.stages.take(Stage::string_stiffness);
@@ -191,8 +186,7 @@ void RigidSystem::reset(StageClock* clock) {
     if (model_.stiff) bilateral_.stiffness.find_tensions();
     if (model_.half_step || corrected) curvature_.begin();
     if (model_.half_step && !may_touch) half_step_.start();
-    if (corrected && !may_touch && model_.solver == RigidSolver::block && !model_.curved)
-        curvature_.begin_where_it_stands();
+    if (corrected && !may_touch && model_.bilateral && !model_.curved) curvature_.begin_where_it_stands();
     rows_.matrix.clear_counters();
     plane_.begin();
     if (model_.half_step && may_touch)

@@ -40,8 +40,8 @@ public:
     RigidSystem(const RigidSystem&) = delete;  // its parts point at each other
 
     const StageList& stages() const noexcept { return model_.stages; }
-    /// How stages run that have several ways, for those that ask.
-    void tell(StageChoices& choices) const;
+    /// How stages run that have several ways.
+    const StageNotes& notes() const noexcept { return notes_; }
 
     // For run_loop:
     void advance(std::int64_t steps);
@@ -141,6 +141,7 @@ private:
     OverlapProjection projection_;
     EnergyMade energy_;
     RigidReadings readings_;
+    StageNotes notes_;
 
     Snapshot saved_, before_solve_ahead_;       // the latter: before solve_ahead(), with contacts
     Snapshot before_waking_;                    // before the velocities of a step in which some body may wake

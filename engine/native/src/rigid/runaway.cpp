@@ -71,7 +71,7 @@ const char* cause_of_runaway(const RigidModel& model, const JointSet& joints,
                ? "ran away: its joints carry more than so light a body can take in a step (T h²/(m l) is "
                  "above 0.3), and their load changes within one, while string_stiffness knows that of "
                  "the step before; use composition=\"order4\" without it, or a smaller time step"
-           : touching || model.solver != RigidSolver::block
+           : touching || !model.bilateral
                ? "ran away: its joints carry more tension than so light a body can take in a step "
                  "(T h²/(m l) is above 0.3); use a smaller time step"
                : "ran away: its joints carry more tension than so light a body can take in a step "

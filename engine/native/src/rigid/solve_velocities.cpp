@@ -83,7 +83,7 @@ void MixedRows::begin() {
     pivot_ = PivotSolver{};
     pivot_.floor = model_.method.floor;
     pivot_.refinements = model_.method.refinements;
-    live_.last_rows = model_.solver == RigidSolver::block ? LastRows::block : LastRows::mixed;
+    live_.last_rows = model_.bilateral ? LastRows::block : LastRows::mixed;
     begin_again();
 }
 
@@ -91,7 +91,7 @@ void MixedRows::begin_again() {
     rounds = pgs_iterations = 0;
     contacts_ = fresh_contacts_;
     system = MixedSystem{};
-    if (!contacts_ && model_.solver != RigidSolver::pivot && model_.solver != RigidSolver::iterative) return;
+    if (!contacts_ && model_.solver != Solver::pivot && model_.solver != Solver::iterative) return;
     system.mass.assign(model_.constrained.size(), Mat6{});
     system.momentum.resize(model_.constrained.size());
     system.velocity.resize(model_.constrained.size());
@@ -360,7 +360,7 @@ double MixedRows::pgs_tolerance() const {
 
 /// Holds PGS over joints alone to what contacts are held to.
 void MixedRows::judge_pgs() {
-    if (model_.solver != RigidSolver::iterative) return;
+    if (model_.solver != Solver::iterative) return;
     const RowsResidual worst = rows_residual(system, {}, model_.method.friction);
     live_.residual = std::max(live_.residual, worst.residual);
     if (!(worst.residual > pgs_tolerance())) return;
@@ -453,7 +453,7 @@ void MixedRows::fill_rows(bool solved) {
 /// rounds bound the next step by this one.
 bool MixedRows::solve_joints() {
     load_dependent_.begin();
-    const bool iterative = model_.solver == RigidSolver::iterative;
+    const bool iterative = model_.solver == Solver::iterative;
     bool same_matrix = false;
     for (int round = 0;; ++round) {
         bool finite = true;

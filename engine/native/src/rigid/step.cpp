@@ -90,11 +90,11 @@ bool RigidSystem::wake_met() {
 /// By the solver of the method; rows that all hold go to one factorisation as long as nothing touches.
 void RigidSystem::solve_velocities() {
     const ContactStage* contacts = mixed_.contacts();
-    if (!mixed_.touching() && model_.solver == RigidSolver::none) {
+    if (!mixed_.touching() && model_.solver == Solver::none) {
         for (int i : model_.constrained) forces_.kick_free_body(i);  // bodies that could touch but do not
         return clock_.mark({Stage::apply_gravity, Stage::apply_loads});
     }
-    if (!mixed_.touching() && model_.solver == RigidSolver::block && live_.sleep.sleepers == 0) {
+    if (!mixed_.touching() && model_.bilateral && live_.sleep.sleepers == 0) {
         if (!bilateral_.find(contacts)) return;
         if (!contacts || !mixed_.find_late_contacts()) return bilateral_.take_velocities(contacts);
     }

@@ -23,7 +23,7 @@ template <class System, class Kept> Kept kept_by(void (System::*keep)(Kept&) con
 ///   void count(RunReport&, int64 steps) const  the work of so many steps
 ///   std::vector<double> final_state()
 ///   void keep(Kept&) const, void go_back(const Kept&), void place(span)   for a run one holds
-///   void tell(StageChoices&) const             optional: how it runs a stage, where only building it shows
+///   const StageNotes& notes() const            optional: how it runs stages that have several ways
 /// and two functions beside it
 ///   StageChoices choose_stages(const Scene&, bool observing)   which stages the scene needs, and why
 ///   Sampler sampler_of(System&, const QuantityRequest&)        throws std::invalid_argument
@@ -36,7 +36,10 @@ public:
         : choices_(choose_stages(scene, reads_while_running(observations))),
           system_(scene, StageList(choices_)),
           recorder_(samplers_of(system_, quantities), std::move(observations)) {
-        if constexpr (requires { system_.tell(choices_); }) system_.tell(choices_);
+        if constexpr (requires { system_.notes(); })
+            for (const auto& [stage, how] : system_.notes())
+                if (StageChoice& choice = choices_[static_cast<std::size_t>(stage)]; choice.kept)
+                    choice.how = how;
     }
 
     Program(const Program&) = delete;  // the samplers point into the system

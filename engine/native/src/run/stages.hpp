@@ -28,8 +28,17 @@ inline constexpr std::size_t STAGES = static_cast<std::size_t>(Stage::observe) +
 
 struct StageChoice {
     bool kept = false;
-    std::string reason;
+    std::string reason, how;  // why; how it is run, where it has several ways
+
+    std::string told() const { return how.empty() ? reason : reason + ": " + how; }
 };
+
+/// How a system runs stages.
+struct StageNote {
+    Stage stage;
+    std::string how;
+};
+using StageNotes = std::vector<StageNote>;
 
 /// One choice per stage, in the order of the step.
 using StageChoices = std::array<StageChoice, STAGES>;
