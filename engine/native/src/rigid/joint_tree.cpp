@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "rigid/joint_forest.hpp"
 #include "rigid/rotation.hpp"
 #include "rigid/tolerances.hpp"
 
@@ -43,78 +44,6 @@ bool may_be_a_forest(std::span<const BodyConstants> constants, const JointSet& j
     return true;
 }
 
-/// A body, with the block of the joint it is attached by (−1: it floats) to another (−1: the world).
-struct Hung {
-    int body, block, parent;
-};
-
-/// Every body as near to the world as it can be, by breadth: parents stand first.
-class BreadthFirst {
-public:
-    BreadthFirst(std::span<const BodyConstants> constants, const JointSet& joints)
-        : constants_(constants), joints_(joints), place_(constants.size(), -1) {}
-
-    /// False if the bodies `tied` are not all held by joints of a forest.
-    bool find(std::span<const int> tied) {
-        hang_on(-1);
-        follow();
-        for (int body : tied) {  // what nothing holds to the world floats with the first of its bodies
-            if (place_[body] >= 0) continue;
-            const std::size_t root = found_.size();
-            take({body, -1, -1});
-            follow();
-            if (is_held_since(root)) return false;
-        }
-        return found_.size() == tied.size();
-    }
-    std::span<const Hung> found() const noexcept { return found_; }
-
-private:
-    bool moves(int body) const noexcept { return body >= 0 && constants_[body].moves(); }
-    void take(const Hung& one) {
-        place_[one.body] = static_cast<int>(found_.size());
-        found_.push_back(one);
-    }
-    void follow() {
-        for (; next_ < found_.size(); ++next_) hang_on(found_[next_].body);
-    }
-    /// Takes what is attached to a body, or to the world.
-    void hang_on(int parent) {
-        const auto blocks = joints_.blocks();
-        for (std::size_t k = 0; k < blocks.size(); ++k) {
-            const JointBlock& block = blocks[k];
-            for (const bool backwards : {false, true}) {
-                if (block.axial) continue;
-                const int holder = backwards ? block.second : block.first;
-                const int body = backwards ? block.first : block.second;
-                if (!moves(body) || place_[body] >= 0) continue;
-                if (parent < 0 ? moves(holder) : holder != parent) continue;
-                int turns = 0, slides = 0;
-                Vec3 axes[3];
-                const JointConstants& joint = joints_.constants(block.joint);
-                if (!at_one_place(joint) || !freedom(joint, backwards, turns, slides, axes)) continue;
-                take({body, static_cast<int>(k), parent});
-            }
-        }
-    }
-    /// Whether one of the bodies from `root` on is held after all, by a joint not known here.
-    bool is_held_since(std::size_t root) const noexcept {
-        for (const JointBlock& block : joints_.blocks())
-            for (const bool second : {false, true}) {
-                const int end = second ? block.second : block.first,
-                          other = second ? block.first : block.second;
-                if (moves(end) && place_[end] >= static_cast<int>(root) && !moves(other)) return true;
-            }
-        return false;
-    }
-
-    std::span<const BodyConstants> constants_;
-    const JointSet& joints_;
-    std::vector<int> place_;  // of a body in found_
-    std::vector<Hung> found_;
-    std::size_t next_ = 0;
-};
-
 }  // namespace
 
 Refusal JointTree::analyse(std::span<const BodyConstants> constants, const JointSet& joints,
@@ -150,15 +79,23 @@ Refusal JointTree::attach(std::span<const int> tied, const LargeArray<BodyState>
     return order() ? nullptr : "its band is too wide";
 }
 
-/// The forest, its nodes by depth.
+/// The forest, its nodes by branches.
 bool JointTree::hang_up(std::span<const int> tied, bool particles) {
-    BreadthFirst bodies(constants_, *joints_);
-    if (!may_be_a_forest(constants_, *joints_) || tied.size() > 2000 || !bodies.find(tied)) return false;
+    if (!may_be_a_forest(constants_, *joints_) || tied.size() > 2000) return false;
+    JointForest forest(constants_, *joints_);
+    const auto holds = [this](const JointBlock& block, bool backwards) {
+        int turns = 0, slides = 0;
+        Vec3 axes[3];
+        const JointConstants& joint = joints_->constants(block.joint);
+        return at_one_place(joint) && freedom(joint, backwards, turns, slides, axes);
+    };
+    if (!forest.grow(tied, holds)) return false;
     nodes_.clear();
     node_of_.assign(constants_.size(), -1);
     trees_ = 0;
     double scale = 0.0;
-    const auto add = [&](const auto& self, const Hung& one) -> void {
+    for (const Hung& one : forest.by_branches(false)) {
+        if (constants_[one.body].particle && (!particles || one.block >= 0)) return false;
         Node node = node_held_by(one.block, one.body);
         node.parent = one.parent < 0 ? -1 : node_of_[one.parent];
         node.tree = one.parent < 0 ? trees_++ : nodes_[static_cast<std::size_t>(node.parent)].tree;
@@ -166,16 +103,10 @@ bool JointTree::hang_up(std::span<const int> tied, bool particles) {
         coordinates_ += node.coordinates();
         const Vec3 i = node.inertia;
         scale += (i.x + i.y + i.z) / 3.0 + node.mass * dot(node.arm, node.arm);
-        const std::size_t at = nodes_.size();
-        node_of_[one.body] = static_cast<int>(at);
+        node_of_[one.body] = static_cast<int>(nodes_.size());
         nodes_.push_back(node);
-        for (const Hung& next : bodies.found())
-            if (next.parent == one.body) self(self, next);
-        nodes_[at].end = static_cast<int>(nodes_.size());
-    };
-    for (const Hung& one : bodies.found()) {
-        if (constants_[one.body].particle && (!particles || one.block >= 0)) return false;
-        if (one.parent < 0) add(add, one);
+        for (int at = node_of_[one.body]; at >= 0; at = nodes_[at].parent)
+            nodes_[at].end = static_cast<int>(nodes_.size());
     }
     scale_ = scale / static_cast<double>(std::max<std::size_t>(1, nodes_.size()));
     courses_.assign(nodes_.size(), Course{});
