@@ -26,7 +26,7 @@ def test_a_new_solver_touches_the_files_that_are_said() -> None:
     said = re.findall(
         r"`(engine/[\w./]+)`", SECTION.split("One that a scene can ask for")[1].split("\n- ")[0]
     )
-    names_it = r"SolverKind::|Stage::solve_iterative|RigidSolver::iterative|enum class RigidSolver|SPOOK_NAMED_ENUM\(SolverKind"
+    names_it = r"SolverKind::|Stage::solve_iterative|Solver::iterative|SPOOK_NAMED_ENUM\(Solver"
     sources = [
         path for room in ("contacts", "rigid", "run") for path in (NATIVE / "src" / room).rglob("*.?pp")
     ]

@@ -1,8 +1,10 @@
-// The first hour in the core, as CONTRIBUTING tells it: a joint and a solver of one's own, a few lines each, and the
+// The first hour in the core, as CONTRIBUTING tells it: a joint, a solver and a shape of one's own, a few lines each, and the
 // number each is held to.
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
+#include "collision/narrow_phase.hpp"
 #include "contacts/contact_islands.hpp"
 #include "contacts/mass_factors.hpp"
 #include "expect.hpp"
@@ -69,6 +71,23 @@ FrictionReport row_by_row(MixedSystem& system, std::vector<FrictionPoint>&, Dire
     return report;
 }
 
+// A shape: where it reaches, and where it touches. This one is an ellipsoid with these half axes, m, in its own axes.
+Vec3 scaled(Vec3 by, Vec3 v) { return {by.x * v.x, by.y * v.y, by.z * v.z}; }
+
+Vec3 reach(Vec3 half, const Pose& at, Vec3 way) {
+    const Vec3 across = scaled(half, local(at.rotation, way));
+    return apply(at, (1.0 / norm(across)) * scaled(half, across));
+}
+
+Manifold ellipsoid_plane(Vec3 half, const Pose& at, const Primitive& plane, const Pose& at_plane,
+                         double margin) {
+    Manifold manifold;
+    const Vec3 normal = at_plane.rotation * plane.normal, lowest = reach(half, at, -1.0 * normal);
+    const double gap = dot(normal, lowest - at_plane.position);
+    if (gap <= margin) manifold.add(lowest - 0.5 * gap * normal, normal, gap, 0);
+    return manifold;
+}
+
 FrictionReport directly(MixedSystem& system, std::vector<FrictionPoint>& points, DirectSolver& solver) {
     return solve_friction_direct(system, points, FrictionModel::cone, solver);
 }
@@ -126,9 +145,34 @@ void its_damping_is_that_of_the_row() {
     EXPECT_NEAR(system.velocity[0][2] + system.velocity[1][2], 0.5 * 8.0 / 9.0, 1e-14);
 }
 
+/// A ball where its half axes are equal. Else its lowest point is on the surface, Σ (xᵢ/aᵢ)² = 1, whose gradient there is along the
+/// plane's normal, and what is further than the margin does not touch.
+void the_ellipsoid_touches_where_its_surface_is_level() {
+    const Primitive plane = Primitive::plane({0.36, -0.48, 0.8});
+    const Pose still, at{{0.3, 0.2, 0.6}, rotation(Quat{0.7, 0.5, -0.5, 0.1})};
+    const Manifold round = ellipsoid_plane({0.5, 0.5, 0.5}, at, plane, still, 0.1),
+                   ball = collide(Primitive::sphere(0.5), at, plane, still, 0.1);
+    EXPECT(round.count == 1 && ball.count == 1);
+    EXPECT_NEAR(round.points[0].gap, ball.points[0].gap, 1e-15);
+    EXPECT_NEAR(norm(round.points[0].position - ball.points[0].position), 0.0, 1e-15);
+
+    const Vec3 half{0.4, 0.7, 0.2};
+    const Manifold touch = ellipsoid_plane(half, at, plane, still, 1.0);
+    EXPECT(touch.count == 1);
+    const ContactPoint& point = touch.points[0];
+    const Vec3 x = local(at.rotation, point.position + 0.5 * point.gap * point.normal - at.position),
+               over = {x.x / half.x, x.y / half.y, x.z / half.z},
+               gradient = at.rotation * Vec3{over.x / half.x, over.y / half.y, over.z / half.z};
+    EXPECT_NEAR(dot(over, over), 1.0, 1e-14);
+    EXPECT_NEAR(norm(cross(gradient, point.normal)), 0.0, 1e-14);
+    EXPECT(dot(gradient, point.normal) < 0.0);
+    EXPECT(ellipsoid_plane(half, at, plane, still, point.gap - 1e-9).count == 0);
+}
+
 }  // namespace
 
 int main() {
+    the_ellipsoid_touches_where_its_surface_is_level();
     its_damping_is_that_of_the_row();
     the_pulley_is_atwoods_machine();
     the_solver_agrees_with_the_direct_one();
