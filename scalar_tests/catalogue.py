@@ -92,6 +92,7 @@ TOPICS: dict[
         "gears": "gears",
         "slider_crank": "slider_crank",
         "loose_bearing": "loose_bearing",
+        "latch": "latch",
     },
     "ropes and wires": {
         "hanging_chain": "hanging_chain.question",
@@ -117,6 +118,7 @@ TOPICS: dict[
         "robot_arm": "robot_arm",
         "arm_path": "arm_path",
         "grasp": "grasp",
+        "box_push": "box_push",
     },
     "multibody library": {
         "simple_pendulum": "multibody.simple_pendulum",

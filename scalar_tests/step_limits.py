@@ -33,6 +33,8 @@ REAL_TIME = (
             "robot_arm",
             "arm_path",
             "grasp",
+            "box_push",
+            "latch",
             "conveyor",
             "sorting",
             "gears",

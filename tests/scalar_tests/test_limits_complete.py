@@ -42,6 +42,8 @@ BRIDGE = f"{C}.test_a_bridge_carries_what_limit_analysis_allows"
 BEND = f"{M}.test_a_bend_passes_on_what_a_tyre_takes_its_speed_too_large_by"
 COIN = "tests.scalar_tests.test_coin_limits.test_a_coin_in_steps_is_left_with_the_square_of_its_own_turn"
 BOWL = f"{M}.test_many_facets_make_a_round_bowl_and_few_of_them_slow_a_ball_down_at_corners"
+R = "tests.scalar_tests.test_robot_limits"
+PUSH = f"{R}.test_box_push_is_late_by_two_steps_and_its_hand_by_what_damped_rows_let_through"
 TURNING = f"{M}.test_a_turning_rope_is_longer_by_what_its_damped_rows_let_through"
 
 FOUND = {  # test: metric: what finds it again without the engine
@@ -101,6 +103,8 @@ FOUND = {  # test: metric: what finds it again without the engine
         "held_error": f"{A}.test_two_weak_joints_fall_as_steps_of_theirs_do",
     },
     "falling_chain": {"sunk": f"{S}.test_an_end_that_turns_comes_in_by_what_its_path_bends_in_a_step"},
+    "box_push": dict.fromkeys(("torque_error", "push_error", "place_error"), PUSH),
+    "latch": {"opening_error": f"{R}.test_a_nose_goes_back_as_the_door_gains_energy"},
     "sinking_sphere": {"swing_error": WAVE},
     "climb": dict.fromkeys(("speed_error", "spin_error", "transfer_error"), CLIMB),
     "slider_crank": dict.fromkeys(("place_error", "torque_error"), LAGS),
