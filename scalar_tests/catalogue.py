@@ -70,6 +70,7 @@ TOPICS: dict[
         "turntable": "turntable",
         "sorting": "sorting",
         "rolling_friction": "rolling_friction",
+        "coin_field": "coin_field",
         "grain": "grain",
         "seams": "seams",
     },
@@ -113,12 +114,15 @@ TOPICS: dict[
         "climb": "climb",
         "suspension": "suspension",
         "cornering": "cornering",
+        "rover": "rover",
     },
     "robots": {
         "robot_arm": "robot_arm",
         "arm_path": "arm_path",
         "grasp": "grasp",
         "box_push": "box_push",
+        "quadruped": "quadruped",
+        "humanoid": "humanoid",
     },
     "multibody library": {
         "simple_pendulum": "multibody.simple_pendulum",

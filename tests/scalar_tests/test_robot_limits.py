@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spook_tracker.scalar_tests import box_push, latch
+from spook_tracker.scalar_tests import box_push, coin_field, humanoid, latch, quadruped, rover
+from spook_tracker.scalar_tests.standing import GRAVITY, Robot
 from tests.scalar_tests.limits import band, measurement
 
 TINY = 1e-4  # s, between the places of a motion that differences are taken of
@@ -125,3 +126,105 @@ def test_a_nose_goes_back_as_the_door_gains_energy() -> None:
         angle += h * speed
     limit = limits("latch", "let go")["opening_error"]
     assert limit == pytest.approx(0.5 * h * rate) and 0.5 * limit < angle - turned < 1.2 * limit
+
+
+ROBOTS = {"quadruped": quadruped.robot(), "humanoid": humanoid.robot()}
+
+
+def gone(robot: Robot, joint: Any, turn: float) -> float:
+    """Work [J] of all weights and loads of feet where one joint has turned [rad]: bodies beyond it go round its axis."""
+    beyond, at, axis = robot.beyond(joint), np.array(joint.at), np.array(joint.axis)
+
+    def moved(place: Any) -> Any:
+        arm = np.array(place) - at
+        level = axis * (axis @ arm)
+        return level + math.cos(turn) * (arm - level) + math.sin(turn) * np.cross(axis, arm) - arm
+
+    lifted = (-GRAVITY * body.mass * moved(body.position)[2] for body in robot.bodies if body.name in beyond)
+    pushed = (moved(place) @ np.array(force) for foot, (place, force) in robot.feet.items() if foot in beyond)
+    return float(sum(lifted) + sum(pushed))
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_joints_of_what_stands_carry_the_work_of_weights_and_feet(name: str) -> None:
+    robot = ROBOTS[name]
+    for joint in robot.joints:
+        work = (gone(robot, joint, TINY) - gone(robot, joint, -TINY)) / (2.0 * TINY)
+        assert robot.torques()[joint.name] == pytest.approx(-work, abs=1e-6)
+    assert band(name, "weakest")[0] < 1.0 < band(name, "weakest")[1]
+
+
+@pytest.mark.parametrize(("name", "moments"), [("quadruped", False), ("humanoid", True)])
+def test_feet_bear_the_weight_and_nothing_else_can_be(name: str, moments: bool) -> None:
+    """Forces and moments of the whole balance; and no loads of the feet, with moments of flat ones, leave every joint's torque
+    and that balance as they are."""
+    robot, weights = ROBOTS[name], np.zeros(6)
+    for body in robot.bodies:
+        pull = np.array((0.0, 0.0, -GRAVITY * (body.mass or 0.0)))
+        weights += np.concatenate((pull, np.cross(body.position, pull)))
+    for place, force in robot.feet.values():
+        weights += np.concatenate((force, np.cross(place, force)))
+    np.testing.assert_allclose(weights, 0.0, atol=1e-9)
+    columns = []
+    for foot, (place, _) in robot.feet.items():
+        chain = [(joint, joint.name) for joint in robot.joints if foot in robot.beyond(joint)]
+        for unit in np.eye(3):
+            for load, turn in ((unit, 0.0 * unit), (0.0 * unit, unit))[: 2 if moments else 1]:
+                of = {
+                    name: np.cross(place - np.array(j.at), load) @ j.axis + turn @ j.axis for j, name in chain
+                }
+                whole = np.concatenate((load, np.cross(place, load) + turn))
+                columns.append([*whole, *(of.get(joint.name, 0.0) for joint in robot.joints)])
+    values = np.linalg.svd(np.array(columns), compute_uv=False)
+    assert len(values) == 12 and values.min() > 1e-3 * values.max()
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_pose_of_balance_is_one_at_any_step(name: str) -> None:
+    """A step's impulses are h times forces that cancel: nothing gains speed, springs stay as long as they are."""
+    module = {"quadruped": quadruped, "humanoid": humanoid}[name]
+    assert band(name, "longest-step") == (module.LONGEST, module.LONGEST)
+    robot = ROBOTS[name]
+    springs = {joint.name: joint.spring for joint in module.scene().constraints}
+    for joint, torque in robot.torques().items():
+        assert springs[joint].stiffness * springs[joint].rest == pytest.approx(torque, abs=1e-12)
+
+
+def test_six_wheels_slip_and_climb_where_coulomb_and_work_say() -> None:
+    v = rover
+    low, high = band("rover", "steepest")
+    assert low < v.FRICTION < high
+    assert v.TORQUE > v.FRICTION * v.WEIGHT * v.RADIUS, "a wheel that bears all spins"
+    reached = v.SPEED * (v.LEVEL - 0.5 * v.SPEED / (v.FRICTION * v.GRAVITY))
+    edge = math.sqrt(v.RADIUS**2 - (v.RADIUS - v.STEP) ** 2)
+    assert reached < v.FIRST - v.AXLES["front"] - edge, "no wheel has met a step"
+    low, high = band("rover", "weakest")
+    lifted = v.WEIGHT * v.HILL / math.hypot(1.0, v.HILL)  # J a metre of road
+    assert low * 6.0 / v.RADIUS < lifted < high * 6.0 / v.RADIUS
+    places = np.array([(v.CHASSIS + 6.0 * v.WHEEL, 0.0), (v.LOAD, v.AHEAD)])
+    assert pytest.approx(places[:, 0] @ places[:, 1] / places[:, 0].sum()) == v.CENTRE
+
+
+@pytest.mark.parametrize("slope", [0.0, coin_field.SLOPE])
+def test_a_coin_loses_in_a_metre_what_rolling_friction_takes(slope: float) -> None:
+    """Energy of way and spin against the weight's work and ρ N times the angle; and where it stands these are equal."""
+    c = coin_field
+    tilt = math.atan(slope)
+    work = c.MASS * c.GRAVITY * (math.sin(tilt) - c.ROLLING / c.RADIUS * math.cos(tilt))  # J a metre
+    inertia = 0.5 * c.MASS * c.RADIUS**2
+    gain = 0.5 * (c.MASS + inertia / c.RADIUS**2)  # of the square of its speed
+    assert 2.0 * c.acceleration(slope) == pytest.approx(work / gain, rel=1e-12)
+    low, high = band("coin_field", "slope")
+    assert c.acceleration(low) < 0.0 < c.acceleration(high)
+
+
+@pytest.mark.parametrize("time_step", [1.0 / 60.0, coin_field.LONGEST])
+def test_a_coin_is_slowed_alike_in_steps_of_any_length(time_step: float) -> None:
+    """Three steps of its spin and way: friction keeps it rolling, rolling friction takes what there is and no more."""
+    c = coin_field
+    assert band("coin_field", "longest-step")[1] == c.LONGEST
+    speed = c.SPEED
+    for k in range(3):
+        taken = min(time_step * c.ROLLING * c.MASS * c.GRAVITY, 1.5 * c.MASS * speed * c.RADIUS)
+        speed -= taken / (1.5 * c.MASS * c.RADIUS)
+        assert speed == pytest.approx(c.gone(0.0, np.array((k + 1.0) * time_step)), abs=1e-12)
