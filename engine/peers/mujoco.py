@@ -53,6 +53,8 @@ class MuJoCo:
         rolling_friction=True,
         joint_friction=True,
         motors=True,
+        limits=True,
+        springs=True,
         kinematic=SURFACES_MOVE,
         springs_aside=True,
         surface_velocity=SURFACES_MOVE,
@@ -95,7 +97,7 @@ class MuJoCo:
             expected_order=1.0,
             options={"joints": False, "option": f'integrator="Euler" {CAREFUL}', "stiff": True},
             # It has them of degrees of freedom, and here those of joints are none.
-            lacks=("joint_friction", "motors"),
+            lacks=("joint_friction", "motors", "limits", "springs"),
         ),
     )
 
@@ -158,6 +160,7 @@ class _Run:
             option=f'timestep="{task.time_step!r}" {options["option"]}',
             row=hard if options["stiff"] else "",
             hard=hard,
+            damping=2.0 * task.time_step,
         )
         try:
             self.model = mujoco.MjModel.from_xml_string(self.made.xml)

@@ -64,16 +64,18 @@ def numbers(values: Iterable[float]) -> str:
     return '"' + " ".join(repr(float(value)) for value in values) + '"'
 
 
-def model(scene: Scene, *, joint_coordinates: bool, option: str, row: str, hard: str = "") -> Model:
+def model(
+    scene: Scene, *, joint_coordinates: bool, option: str, row: str, hard: str = "", damping: float = 0.0
+) -> Model:
     """The whole model; `option` and `row`, how stiff what holds and touches is, are XML attributes of the configuration, and
-    so is `hard`, how stiff motors are."""
+    so is `hard`, how stiff motors are; `damping` [s] is that of springs in joints that state none."""
     nodes = grown(scene) if joint_coordinates else alone(scene)
-    return _Writer(scene, nodes, row, hard).write(option)
+    return _Writer(scene, nodes, row, hard, damping).write(option)
 
 
 class _Writer:
-    def __init__(self, scene: Scene, nodes: dict[str, Node], row: str, hard: str) -> None:
-        self.scene, self.nodes, self.row, self.hard = scene, nodes, row, hard
+    def __init__(self, scene: Scene, nodes: dict[str, Node], row: str, hard: str, damping: float) -> None:
+        self.scene, self.nodes, self.row, self.hard, self.damping = scene, nodes, row, hard, damping
         self.normal = plane_of_motion(scene)
         self.tree = {node.tie.name: name for name, node in nodes.items() if node.tie is not None}
         self.equalities: dict[str, tuple[int, ...]] = {}
@@ -200,12 +202,14 @@ class _Writer:
                 assert isinstance(tie, Hinge | Prismatic)
                 axes = [np.array(tie.axis)]
         where = numbers(turned_back(turn, at - place))
-        name = ""
+        name = held = ""
         if isinstance(tie, AxialJoint):
             name = f" name={quoteattr(tie.name)}"
             self._motor(tie, 1.0 if second else -1.0)
+            held = self._held(tie, 1.0 if second else -1.0)
         return "".join(
-            f'<joint{name} type="{kind}" pos={where} axis={numbers(turned_back(turn, axis))} {self._loss(tie)}{_armature(tie)}/>'
+            f'<joint{name} type="{kind}" pos={where} axis={numbers(turned_back(turn, axis))} '
+            f"{self._loss(tie)}{_armature(tie)}{held}/>"
             for axis in axes
         )
 
@@ -221,6 +225,19 @@ class _Writer:
             f'<joint joint={quoteattr(tie.name)} coef="{sign!r}"/></fixed>'
         )
         self.speeds[name] = float(motor.speed)  # type: ignore[arg-type]
+
+    def _held(self, tie: AxialJoint, sign: float) -> str:
+        """Stops, as stiff as everything else, and a spring; of a joint that is written the other way round with `sign` −1."""
+        text = ""
+        if tie.limit is not None:
+            ends = sorted((sign * tie.limit.lower, sign * tie.limit.upper))
+            stiff = self.row.replace("solref", "solreflimit").replace("solimp", "solimplimit")
+            text += f" range={numbers(ends)} {stiff}"
+        if tie.spring is not None:
+            size, rest = tie.spring.stiffness, sign * float(tie.spring.rest)  # type: ignore[arg-type]
+            lag = self.damping if tie.spring.damping is None else tie.spring.damping
+            text += f' stiffness="{size!r}" springref="{rest!r}" damping="{size * lag!r}"'
+        return text
 
     def _loss(self, tie: Constraint) -> str:
         """Dry friction of a slide [N] or a hinge [N m], as stiff as everything else."""
@@ -311,10 +328,10 @@ class _Writer:
             return
         assert isinstance(constraint, Joint)
         if any(frictions(constraint)[0]) or any(
-            getattr(constraint, name, None) for name in ("armature", "motor")
+            getattr(constraint, name, None) for name in ("armature", "motor", "limit", "spring")
         ):
             raise NotSupported(
-                "mujoco does not support friction, armature or a motor in an equality constraint, as "
+                "mujoco does not support friction, armature, a motor, a limit or a spring in an equality constraint, as "
                 f"{constraint.name!r} would be"
             )
         at = joint_point(self.scene, constraint)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import replace
 from typing import Any
@@ -18,6 +19,9 @@ from spook_tracker.engine import (
     Energy,
     Final,
     Hinge,
+    JointCoordinate,
+    JointSpring,
+    Limit,
     Lock,
     Material,
     MaximumAbsolute,
@@ -32,7 +36,7 @@ from spook_tracker.engine import (
 )
 from spook_tracker.engine.find import find
 from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.scalar_tests import resting_stack, rolling_friction
+from spook_tracker.scalar_tests import humanoid, latch, resting_stack, rolling_friction
 from spook_tracker.scalar_tests.inclined_plane.scene import scene as inclined
 
 pytest.importorskip("mujoco", reason="the extra mujoco is not installed: pip install 'spook-tracker[mujoco]'")
@@ -242,3 +246,38 @@ def test_nothing_hangs_on_a_kinematic_body_and_none_turns_about_a_place_that_mov
         with pytest.raises(NotSupported, match="the kinematic 'k'"):
             simulate(scene, "rk4", time_step=0.01, steps=1)
     assert simulate(Scene(bodies=(plane, body)), "rk4", time_step=0.01, steps=1).status == "completed"
+
+
+@pytest.mark.parametrize("backwards", [False, True])
+def test_a_spring_carries_an_arm_and_a_stop_ends_its_fall(backwards: bool) -> None:
+    """A level rod of 1 kg and 1 m: its weight's moment is that of the spring's rest, and without one it falls by 0.3 rad."""
+    sign, joint = (
+        -1.0 if backwards else 1.0,
+        Hinge(
+            name="axle",
+            between=("arm", "wall") if backwards else ("wall", "arm"),
+            at=(0.0, 0.0, 0.0),
+            axis=(0.0, 1.0, 0.0),
+            compliance=0.0,
+        ),
+    )
+    wall = RigidBody(name="wall", motion="static", position=(0.0, 0.0, 0.0))
+    arm = RigidBody(name="arm", mass=1.0, inertia=(0.01, 0.1, 0.1), position=(0.5, 0.0, 0.0))
+    for held, angle in (
+        (JointSpring(stiffness=20.0, rest=-sign * 0.5 * 9.81 / 20.0), 0.0),
+        (Limit(lower=-0.3, upper=0.3, compliance=0.0), sign * 0.3),
+    ):
+        one = replace(joint, spring=held) if isinstance(held, JointSpring) else replace(joint, limit=held)
+        scene = Scene(bodies=(wall, arm), constraints=(one,), gravity=GRAVITY)
+        observe = {"q": Final(quantity=JointCoordinate("axle"))}
+        found = simulate(scene, "implicit", time_step=1 / 240, duration=2.0, observe=observe)
+        assert float(found["q"]) == pytest.approx(angle, abs=2e-3)
+
+
+def test_a_humanoid_stands_and_a_latch_holds_with_the_forces_of_statics() -> None:
+    ours = functools.partial(simulate, configuration="implicit")
+    standing, held = humanoid.rest(ours), latch.hold(ours)
+
+    assert standing["stood"] == humanoid.STANDS
+    assert standing["load_error"] < 1e-4 and standing["torque_error"] < 1e-2
+    assert held["held_error"] < 1e-4 and held["hinge_error"] < 1e-4
