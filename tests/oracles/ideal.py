@@ -19,6 +19,7 @@ from spook_tracker.engine import (
     Hinge,
     Load,
     Lock,
+    Penetration,
     Plane,
     Prismatic,
     Scene,
@@ -27,6 +28,7 @@ from spook_tracker.engine import (
 from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.protocol import Capabilities, Configuration, Task
 from spook_tracker.engine.recording import Recording
+from spook_tracker.scalar_tests import humanoid, quadruped
 from tests.oracles import constrained
 from tests.oracles import ideal_contacts as contacts
 from tests.oracles import ideal_motions as motions
@@ -55,6 +57,9 @@ FORMS: dict[str, Form] = {  # of each question that has a physical limit
     "flywheel": motions.turning,
     "rolling_beats": contacts.rolling,
     "grasp": contacts.between_fingers,
+    "quadruped": contacts.on_feet(quadruped.robot()),
+    "humanoid": contacts.on_feet(humanoid.robot()),
+    "rover": contacts.up_steps,
     "four_bars": motions.parallel_rods,
     "squeezer": constrained.moved,
     "bricard": constrained.moved,
@@ -69,8 +74,8 @@ class Ideal:
     capabilities = Capabilities(
         shapes=frozenset({Box, Capsule, ConvexHull, Cylinder, Plane, Sphere}),
         joints=frozenset({Distance, Hinge, Lock, Prismatic}), forces=frozenset({CentralGravity, Load}),
-        shows=frozenset({ConstraintForce, ContactForce}), compliance=True, friction=True, restitution=True,
-        tangential_restitution=True, kinematic=True,
+        shows=frozenset({ConstraintForce, ContactForce, Penetration}), compliance=True, friction=True, restitution=True,
+        tangential_restitution=True, kinematic=True, motors=True, springs=True,
     )  # fmt: skip
     configurations: tuple[Configuration, ...] = (Configuration(name="exact", reason="closed forms"),)
 

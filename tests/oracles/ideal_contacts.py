@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import nnls
 
 from spook_tracker.engine import ConvexHull, Hinge, Lock, RigidBody, Scene
+from spook_tracker.scalar_tests import rover
 from spook_tracker.scalar_tests.door.scene import least_norm_forces
+from spook_tracker.scalar_tests.standing import Robot
 from tests.oracles import constrained
 from tests.oracles.ideal_motions import Found
 
@@ -121,6 +124,47 @@ def between_fingers(scene: Scene, times: np.ndarray) -> Found:
     each[0, 2] = gain
     t = times[:, None, None]
     return {"positions": standing(scene, times) + 0.5 * each * t**2, "velocities": each * t}
+
+
+def on_feet(robot: Robot) -> Callable[[Scene, np.ndarray], Found]:
+    """A robot in a pose of balance stands there, its feet and joints with the loads of statics."""
+
+    def form(scene: Scene, times: np.ndarray) -> Found:
+        pairs = zip(robot.joints, robot.torques().values(), strict=True)
+        turning = {
+            joint.name: np.concatenate((np.zeros(3), torque * np.array(joint.axis)))
+            for joint, torque in pairs
+        }
+        return {
+            "positions": standing(scene, times),
+            "contact_forces": {
+                (foot, "floor"): np.tile(f, (len(times), 1)) for foot, (_, f) in robot.feet.items()
+            },
+            "constraint_forces": {name: np.tile(force, (len(times), 1)) for name, force in turning.items()},
+        }
+
+    return form
+
+
+def up_steps(scene: Scene, times: np.ndarray) -> Found:
+    """Spinning wheels drive with µ g up to ω r; what is past the edge of a step is up there."""
+    v, places = rover, standing(scene, times)
+    spun = v.SPEED / (v.FRICTION * v.GRAVITY)
+    way = np.where(times < spun, 0.5 * v.FRICTION * v.GRAVITY * times**2, v.SPEED * (times - 0.5 * spun))
+    velocities = np.zeros_like(places)
+    for k, body in enumerate(scene.bodies):
+        if body.motion == "dynamic":
+            places[:, k, 0] += way
+            velocities[:, k, 0] = v.speeds(times)
+            places[:, k, 2] += sum(v.STEP * (places[:, k, 0] > v.FIRST + v.DEEP * step) for step in range(2))
+    share = np.tile((0.0, 0.0, v.WEIGHT / len(v.WHEELS)), (len(times), 1))
+    forces = {(wheel, "floor"): share for wheel in v.WHEELS}
+    return {
+        "positions": places,
+        "velocities": velocities,
+        "contact_forces": forces,
+        "penetration": np.zeros(len(times)),
+    }
 
 
 def on_a_turntable(scene: Scene, times: np.ndarray) -> Found:
