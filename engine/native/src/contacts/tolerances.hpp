@@ -110,7 +110,7 @@ inline constexpr double direction_hysteresis =
 inline constexpr std::size_t few_blocks = 24;  // pivoting shares their loads evenly at little cost
 inline constexpr int plain_rounds = 3;         // most systems settle within these
 inline constexpr double poor = 1e-4;           // a residual, of the speeds: beyond it another way is tried
-inline constexpr double fair = 1e-9;           // one that is an answer
+inline constexpr double fair = 1e-10;          // one that is an answer
 inline constexpr double near = 1e-6, redundant_near = 3e-5;  // residuals, of the speeds: answers
 // Beside joints Newton's method, which takes a factor of all bodies an iteration, comes first from so many points on, redundant ones,
 // if there is one in so many bodies; and follows no convex part then.
