@@ -111,8 +111,11 @@ void JointSet::follow_turns(const Joint& joint, std::span<const BodyState> bodie
                             BlockRight& right) const noexcept {
     const BodyState &first = state_of(joint.first, bodies), &second = state_of(joint.second, bodies);
     const double turn = turn_in_step(time_step_, first, second);
-    double share = share_of_bend(turn);
-    if (!(share > 0.0)) return;
+    if (!(share_of_bend(turn) > 0.0)) return;
+    const int linear = joint.constants.holds.linear();
+    const double of_point = linear < 3 ? turn
+                                       : turn_of_arms(time_step_, first, carried(first, joint.constants.first_arm),
+                                                      second, carried(second, joint.constants.second_arm));
     BodyState behind[2] = {first, second}, next[2] = {first, second}, ahead[2];
     for (int i = 0; i < 2; ++i) {
         const int body = i == 0 ? joint.first : joint.second;
@@ -122,10 +125,10 @@ void JointSet::follow_turns(const Joint& joint, std::span<const BodyState> bodie
     double on[6], back[6];
     joint_curvature(joint.constants, next[0], next[1], ahead[0], ahead[1], time_step_, OpenGap::stays, on);
     joint_curvature(joint.constants, first, second, behind[0], behind[1], -time_step_, OpenGap::stays, back);
-    const int linear = joint.constants.holds.linear();
     for (int k = 0; k < joint.constants.rows; ++k) {
         const double relaxation = 0.25 * (1.0 / joint.gain[k].upsilon - 1.0);
-        if (k == linear) share *= share_of_angles(turn);
+        const double share =
+            k < linear ? share_of_bend(of_point) : share_of_bend(turn) * share_of_angles(turn);
         right.right[k] -= share * joint.gain[k].violation * (0.25 * (on[k] + back[k]) + relaxation * on[k]);
     }
 }

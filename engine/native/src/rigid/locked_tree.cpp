@@ -81,10 +81,11 @@ void LockedTree::follow_turns(std::size_t k, std::span<const BodyState> bodies, 
     const Twist back = bend(here, behind, -loads.time_step);
     const auto lead = [&](int i, Vec3 after, Vec3 before) {
         const double relaxation = 0.25 * (1.0 / gain.upsilon[i] - 1.0);
-        return share_of_bend(turn) * gain.violation[i] * (0.25 * (after + before) + relaxation * after);
+        return gain.violation[i] * (0.25 * (after + before) + relaxation * after);
     };
-    work.left.linear -= lead(0, on.linear, back.linear);
-    work.left.angular -= share_of_angles(turn) * lead(1, on.angular, back.angular);
+    const double of_point = turn_of_arms(loads.time_step, child, work.arm, other, work.other_arm);
+    work.left.linear -= share_of_bend(of_point) * lead(0, on.linear, back.linear);
+    work.left.angular -= share_of_bend(turn) * share_of_angles(turn) * lead(1, on.angular, back.angular);
 }
 
 /// Leaves first. The first time K is found as well; then what the velocities so far leave of rows and momenta.

@@ -71,6 +71,18 @@ inline double turn_in_step(double h, const BodyState& first, const BodyState& se
                                   dot(second.angular_velocity, second.angular_velocity)));
 }
 
+/// The larger turn in a step h [rad] of two arms that bodies hold a point by: what lies along a spin is not led about by it.
+inline double turn_of_arms(double h, const BodyState& first, Vec3 first_arm, const BodyState& second,
+                           Vec3 second_arm) noexcept {
+    const auto square = [](Vec3 spin, Vec3 arm) {
+        const Vec3 way = cross(spin, arm);
+        const double length = dot(arm, arm);
+        return length > 0.0 ? dot(way, way) / length : 0.0;
+    };
+    return h * std::sqrt(std::max(square(first.angular_velocity, first_arm),
+                                  square(second.angular_velocity, second_arm)));
+}
+
 /// A step back and a step on of a body that goes on as it came: its spin turns on with the body (`next`). All three begin as it is.
 void look_around(const BodyConstants& body, double h, BodyState& behind, BodyState& next,
                  BodyState& ahead) noexcept;
