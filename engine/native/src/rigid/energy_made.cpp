@@ -18,6 +18,7 @@ void EnergyMade::begin() {
     live_.energy.most_kinetic = kinetic_energy(model_, live_, joints_);
     live_.energy.begun = live_.energy.most = live_.energy.most_kinetic + forces_.potential_energy();
     live_.energy.is_powered = false;
+    live_.energy.noted = -1;
     if (model_.composed) return;
     // Of rows that begin violated, and of limits that begin overstepped, nothing says how much they give.
     double off[6];
@@ -41,16 +42,37 @@ bool EnergyMade::has_power() const noexcept {
 }
 
 bool EnergyMade::is_due() const noexcept {
-    if (model_.half_step || live_.energy.is_powered) return false;
-    // In a plane each look costs a tenth of a step, and space is to answer alike.
-    return model_.curved || live_.moved % steps_between_looks == 0;
+    if (live_.energy.is_powered) return false;
+    // In a plane each look costs a tenth of a step, and space is to answer alike. Half steps are noted in pairs.
+    return model_.curved || live_.moved % steps_between_looks <= (model_.half_step ? 1 : 0);
+}
+
+/// What the mean of the velocities half a step before and after has less than theirs in the mean [J].
+double EnergyMade::lost_in_the_mean() const noexcept {
+    double sum = 0.0;
+    for (int i = 0; i < model_.bodies(); ++i) {
+        if (!model_.constants[i].moves()) continue;
+        const Vec3 dv = live_.bodies[i].velocity - live_.before[i].velocity,
+                   dl = live_.bodies[i].angular_momentum - live_.before[i].angular_momentum;
+        sum += 0.125 * model_.constants[i].mass * dot(dv, dv);
+        sum += 0.125 * dot(turned_by(model_.constants[i], live_.bodies[i], dl), dl);
+    }
+    return sum;
 }
 
 void EnergyMade::note(double penetration) {
     live_.energy.is_powered = has_power() || (live_.moved == 1 && penetration > initial_overstep);
-    const double kinetic = kinetic_energy(model_, live_, joints_);
-    live_.energy.most_kinetic = std::max(live_.energy.most_kinetic, kinetic);
-    live_.energy.most = std::max(live_.energy.most, kinetic + forces_.potential_energy());
+    RigidState::Energy& known = live_.energy;
+    const double kinetic = kinetic_energy(model_, live_, joints_), potential = forces_.potential_energy();
+    known.most_kinetic = std::max(known.most_kinetic, kinetic);
+    double met = kinetic + potential;
+    if (model_.half_step) {
+        met = known.noted == live_.moved - 1
+                  ? 0.5 * (known.kinetic + kinetic) - lost_in_the_mean() + known.potential
+                  : known.begun;
+        known.noted = live_.moved, known.kinetic = kinetic, known.potential = potential;
+    }
+    known.most = std::max(known.most, met);
 }
 
 /// Asked once the final state was read.
@@ -61,8 +83,7 @@ void EnergyMade::judge(RunReport& report) const {
     if (live_.energy.is_powered || has_power()) return;
     const double kinetic = kinetic_energy(model_, live_, joints_),
                  most = std::max(live_.energy.most_kinetic, kinetic);
-    double reached =
-        model_.composed || !model_.half_step ? kinetic + forces_.potential_energy() : live_.energy.most;
+    double reached = kinetic + forces_.potential_energy();
     if (!model_.composed) reached = std::max(reached, live_.energy.most);
     double least = rounding * std::abs(live_.energy.begun);
     if (!model_.composed) {  // what a step's fall is worth: the first order of the step

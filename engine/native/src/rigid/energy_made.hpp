@@ -13,7 +13,7 @@ public:
         : model_(model), live_(live), joints_(joints), forces_(forces) {}
 
     void begin();
-    /// Whether this step is to be noted, where position and velocity are of one moment: what it came to.
+    /// Whether this step is to be noted: what it came to, or with velocities at mid-step what the one before came to.
     bool is_due() const noexcept;
     void note(double penetration);
     /// Asked once the final state was read.
@@ -21,6 +21,7 @@ public:
 
 private:
     bool has_power() const noexcept;
+    double lost_in_the_mean() const noexcept;
 
     const RigidModel& model_;
     RigidState& live_;

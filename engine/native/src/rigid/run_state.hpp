@@ -48,6 +48,9 @@ struct RigidState {
     struct Energy {                      // see energy_made.cpp
         double begun = 0.0, most = 0.0, most_kinetic = 0.0;  // J
         bool is_powered = false;  // some came, or may have come, from what is in no book
+        // With velocities at mid-step: the step noted last, where it ended and how fast it went there.
+        std::int64_t noted = -1;
+        double potential = 0.0, kinetic = 0.0;  // J
     } energy;
     // Compositions:
     double pending = 0.0;  // s: half a stage still to be kicked
