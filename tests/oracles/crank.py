@@ -10,7 +10,12 @@ from spook_tracker.scalar_tests import slider_crank
 
 
 def cranked(crank: float, speed: float, steps: int, guided: bool = False) -> np.ndarray:
-    """Places of the slider [m], or, `guided`, of the rod's far end, which then has nothing but its row across the guide.
+    """Places of the slider [m], or, `guided`, of the rod's far end, which then has nothing but its row across the guide."""
+    return stepped(crank, speed, steps, guided)[0]
+
+
+def stepped(crank: float, speed: float, steps: int, guided: bool = False) -> tuple[np.ndarray, np.ndarray]:
+    """The same, and what the motor carries [N m] in each step.
 
     Rows are as many as there are speeds, so no mass has a say: G v₊ = −a g + (1 − b) G v of pin and wrist, the crank's speed
     as the motor wants; a step turns by h w. It ends where h w of the rod reaches 1.
@@ -31,7 +36,8 @@ def cranked(crank: float, speed: float, steps: int, guided: bool = False) -> np.
     leaning = -speed * crank * math.cos(turn) / (s.ROD * math.cos(lean))
     moving = speed * crank * across(along(turn)) + leaning * 0.5 * s.ROD * across(along(lean))
     sliding = -speed * crank * math.sin(turn) - leaning * s.ROD * math.sin(lean)
-    v, found = np.array((speed, *moving, leaning, sliding)), [slider]  # of crank, rod, rod's turn, slider
+    v, found, carried = np.array((speed, *moving, leaning, sliding)), [slider], []  # of crank, rod, rod's turn, slider
+    masses = np.array((s.TURNING, s.ROD_MASS, s.ROD_MASS, s.ROD_MASS * s.ROD**2 / 12.0, s.SLIDER))
     for _ in range(steps):
         arm, end = 0.5 * s.ROD * along(lean), np.array((slider, 0.0))
         rows, off = np.zeros((5, 5)), np.zeros(5)
@@ -48,10 +54,11 @@ def cranked(crank: float, speed: float, steps: int, guided: bool = False) -> np.
             )  # the slider is but where the end is
         right = (rows @ v - 4.0 / h * off) / spread
         right[0] = speed
-        v = np.linalg.solve(rows, right)
+        before, v = v, np.linalg.solve(rows, right)
+        carried.append(float(np.linalg.solve(rows.T, masses * (v - before))[0]) / h)
         if abs(h * v[3]) >= 1.0:
             break
         turn, lean = turn + h * v[0], lean + h * v[3]
         middle, slider = middle + h * v[1:3], slider + h * v[4]
         found.append(float((middle + 0.5 * s.ROD * along(lean))[0]) if guided else slider)
-    return np.array(found)
+    return np.array(found), np.array(carried)
