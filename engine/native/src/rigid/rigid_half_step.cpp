@@ -51,7 +51,8 @@ void HalfStep::start() {
 }
 
 /// Contacts have no accelerations to ask for: half of what a whole step would change once its impacts are over. So a step
-/// is solved twice from the same places, and the first takes the impacts.
+/// is solved twice from the same places, and the first takes the impacts. What those of the second change, where bodies go to and fro
+/// within a step, `before` has less.
 void HalfStep::start_touching(const std::function<void()>& find_velocities,
                               const std::function<void()>& begin_again) {
     const RigidState start = live_;
@@ -70,6 +71,7 @@ void HalfStep::start_touching(const std::function<void()>& find_velocities,
     start_from(once);
     find_velocities();
     const LargeArray<BodyState> whole = live_.bodies;
+    const LargeArray<BodyMomenta> less = live_.before;
     std::vector<double> gained;  // by rotors
     for (const int k : rotors) gained.push_back(rotor_change(joints_, k));
     start_from(start.bodies);
@@ -78,8 +80,9 @@ void HalfStep::start_touching(const std::function<void()>& find_velocities,
     for (int i = 0; i < model_.bodies(); ++i) {
         if (!model_.constants[i].moves()) continue;
         BodyState& s = live_.bodies[i];
-        s.velocity -= 0.5 * (whole[i].velocity - once[i].velocity);
-        s.angular_momentum -= 0.5 * (whole[i].angular_momentum - once[i].angular_momentum);
+        s.velocity -= 0.5 * (whole[i].velocity - once[i].velocity - (once[i].velocity - less[i].velocity));
+        s.angular_momentum -= 0.5 * (whole[i].angular_momentum - once[i].angular_momentum -
+                                     (once[i].angular_momentum - less[i].angular_momentum));
         if (!model_.constants[i].particle) refresh(model_.constants[i], s);
     }
 }
