@@ -47,7 +47,7 @@ from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.tyres import Tyre
 
 Array = npt.NDArray[np.float64]
-MOST_MADE = 0.05  # of the largest kinetic energy, as energy_made.cpp has it
+MOST_MADE = 0.05  # of the largest kinetic energy, as energy_made.hpp has it
 ROUNDING = 1e-9  # of the energy, which counts heights from anywhere
 PREFIX = "books: "
 

@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "run/composition.hpp"
 #include "run/watch.hpp"
@@ -41,7 +42,9 @@ ParticleComposition::ParticleComposition(ParticleParts& parts, int order)
       saddle_(parts.saddle),
       solver_(parts.solver),
       h_(parts.h),
-      gammas_(composition_stages(order)) {
+      gammas_(composition_stages(order)),
+      longest_(h_ * longest_stage(order)) {
+    pull_.resize(nodes_.x.size());
     upper_.resize(rows_.size());
     impulse_.resize(rows_.size());
     state_.history.resize(3 * rows_.size() * gammas_.size());
@@ -51,14 +54,20 @@ ParticleComposition::ParticleComposition(ParticleParts& parts, int order)
     }
 }
 
-void ParticleComposition::start(StageClock* clock) {
+void ParticleComposition::start(StageClock* clock, double energy) {
     clock_ = clock;
-    state_.newton_iterations = 0;
-    state_.pending = 0.0;
-    state_.stage_steps = 0;
-    state_.halved_steps = 0;
-    state_.lost = false;
-    std::fill(state_.history.begin(), state_.history.end(), 0.0);
+    std::vector<double> history = std::move(state_.history);
+    std::fill(history.begin(), history.end(), 0.0);
+    state_ = {};
+    state_.history = std::move(history);
+    state_.energy.begun = energy, state_.energy.most_kinetic = kinetic_energy();
+}
+
+double ParticleComposition::kinetic_energy() const noexcept {
+    double sum = 0.0;
+    for (std::size_t node = 0; node < nodes_.v.size(); ++node)
+        if (nodes_.w[node] > 0.0) sum += 0.5 * dot(nodes_.v[node], nodes_.v[node]) / nodes_.w[node];
+    return sum;
 }
 
 void ParticleComposition::advance(std::int64_t steps) {
@@ -72,12 +81,39 @@ void ParticleComposition::advance(std::int64_t steps) {
         }
         return;
     }
-    for (; steps > 0; --steps) constrained_step(h_, 0);
+    for (; steps > 0; --steps) {
+        const int parts = state_.parts;
+        for (int part = 0; part < parts; ++part) constrained_step(h_ / parts, 0);
+        state_.halved_steps += parts - 1;
+        state_.energy.most_kinetic = std::max(state_.energy.most_kinetic, kinetic_energy());
+    }
 }
 
-/// One step of length h. Where the equations have no solution near (a whip cracks within the step), the step is
-/// taken back and done in two halves, and so on; the order stays, `halved_steps` counts it. When the smallest part
-/// has none either, the state is lost: not a number from here on.
+/// Whether a step of that length was too long for the tension that its stages found; then those to come are parted.
+/// Of K = Σ (T/l)(I − u uᵀ), pulling rows alone, M⁻¹ K has no eigenvalue above 2/m Σ T/l of some node: |b − a|² <= 2 |a|² + 2 |b|².
+bool ParticleComposition::is_too_taut(double length) noexcept {
+    const std::size_t count = rows_.size();
+    std::fill(pull_.begin(), pull_.end(), 0.0);
+    for (std::size_t k = 0; k < count; ++k) {
+        double force = 0.0;
+        for (std::size_t stage = 0; stage < gammas_.size(); ++stage)
+            force = std::min(force, state_.history[3 * count * stage + k]);
+        const double stiffness = -force * rows_.row[k].rest_inverse;
+        pull_[static_cast<std::size_t>(rows_.row[k].a)] += stiffness;
+        pull_[static_cast<std::size_t>(rows_.row[k].b)] += stiffness;
+    }
+    double rate = 0.0;
+    for (std::size_t node = 0; node < pull_.size(); ++node)
+        rate = std::max(rate, 2.0 * nodes_.w[node] * pull_[node]);
+    const int parts = static_cast<int>(std::lround(h_ / length)),
+              needed = parts_for_tension(longest_ * longest_ * rate, parts);
+    state_.parts = std::max(state_.parts, needed);
+    return needed > parts;
+}
+
+/// One step of length h. Where the equations have no solution near (a whip cracks within the step), or tension is too much for its
+/// length, the step is taken back and done in two halves, and so on; the order stays, `halved_steps` counts it. When the smallest
+/// part has none either, the state is lost: not a number from here on.
 void ParticleComposition::constrained_step(double length, int depth) {
     const std::size_t count = rows_.size();
     if (state_.lost) return;
@@ -91,8 +127,9 @@ void ParticleComposition::constrained_step(double length, int depth) {
     for (std::size_t stage = 0; stage < gammas_.size() && solved; ++stage)
         solved = constrained_stage(gammas_[stage] * length, state_.history.data() + 3 * count * stage);
     ++state_.stage_steps;
-    if (solved) return;
-    if (depth + 1 == MOST_HALVINGS) {
+    const bool last = depth + 1 == MOST_HALVINGS;
+    if (solved && (!is_too_taut(length) || last)) return;
+    if (last) {
         state_.lost = true;
         for (Vec3& speed : nodes_.v) speed.x = std::numeric_limits<double>::quiet_NaN();
         return;
@@ -297,6 +334,7 @@ void ParticleComposition::solve_rigidly() {
 
 /// Kicks up to where the step ended, by forces as they were: what is set from outside acts from there on.
 void ParticleComposition::catch_up() {
+    state_.energy.is_powered = true;
     if (state_.pending == 0.0) return;
     find_kicks();
     const double part = state_.pending / h_;

@@ -117,7 +117,7 @@ void ParticleSystem::reset(StageClock* clock) {
     seen_.v = nodes_.v;
     if (stiff_strings_) find_tensions();
     unread_ = -1;
-    if (composition_) composition_->start(clock);
+    if (composition_) composition_->start(clock, readings_.kinetic_energy() + readings_.potential_energy());
     else if (half_step_) half_kick_back();
     save();
 }

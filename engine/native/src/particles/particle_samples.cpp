@@ -6,6 +6,8 @@
 #include <limits>
 #include <stdexcept>
 
+#include "run/energy_made.hpp"
+
 namespace spook {
 
 void ParticleSystem::observe(Recorder& recorder, std::int64_t sample) {
@@ -122,6 +124,18 @@ void ParticleSystem::count(RunReport& report, std::int64_t steps) const {
         report.counters["block_operations"] = composition_->newton_iterations() * blocks;
     }
     report.residual = parts_.pgs.work.residual;
+}
+
+/// Asked once the final state was read: compositions keep energy, and their rows can add to it.
+void ParticleSystem::judge_end(RunReport& report) const {
+    const auto loaded = [](const ParticleBody& body) { return norm(body.load) > 0.0; };
+    if (!composition_ || rows_.size() == 0 || std::ranges::any_of(scene_.bodies, loaded)) return;
+    const ParticleComposition::State::Energy& ran = composition_->state().energy;
+    if (ran.is_powered) return;
+    const double kinetic = readings_.kinetic_energy();
+    const auto lightest = std::ranges::min_element(scene_.bodies, {}, &ParticleBody::mass);
+    judge_energy({ran.begun, kinetic + readings_.potential_energy(), std::max(ran.most_kinetic, kinetic)},
+                 static_cast<int>(lightest - scene_.bodies.begin()), taut_cure, report);
 }
 
 std::vector<double> ParticleSystem::places() const {

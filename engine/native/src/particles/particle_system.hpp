@@ -53,6 +53,7 @@ public:
     /// Back to the start state; `clock` null means stages are not timed.
     void reset(StageClock* clock);
     void count(RunReport& report, std::int64_t steps) const;
+    void judge_end(RunReport& report) const;
     std::vector<double> final_state();
     /// The same without a solve: velocities are NaN.
     std::vector<double> places() const;

@@ -9,6 +9,7 @@
 #include "rigid/energy_made.hpp"
 #include "rigid/readings.hpp"
 #include "rigid/tolerances.hpp"
+#include "run/energy_made.hpp"
 
 namespace spook {
 
@@ -85,29 +86,20 @@ void EnergyMade::judge(RunReport& report) const {
                  most = std::max(live_.energy.most_kinetic, kinetic);
     double reached = kinetic + forces_.potential_energy();
     if (!model_.composed) reached = std::max(reached, live_.energy.most);
-    double least = rounding * std::abs(live_.energy.begun);
+    double least = 0.0;
     if (!model_.composed) {  // what a step's fall is worth: the first order of the step
         const double fall = model_.h * norm(model_.gravity);
         for (const int i : model_.constrained)
             if (model_.constants[i].moves()) least += model_.constants[i].mass * fall * fall;
     }
-    const double gained = reached - live_.energy.begun;
-    if (!(gained > max_gain * most + least)) return;
-    report.status = Status::unsettled;
-    report.failed_step = report.steps;
-    report.failed_body = *std::min_element(
+    const int lightest = *std::min_element(
         model_.constrained.begin(), model_.constrained.end(),
         [this](int a, int b) { return model_.constants[a].mass < model_.constants[b].mass; });
-    char said[220];
-    std::snprintf(
-        said, sizeof said, "was found to move with %.3g J that came out of nothing, of %.3g J at most; %s",
-        gained, most,
-        model_.method.runge_kutta ? "take smaller steps, or give the method a smaller tolerance"
-        : model_.composed
-            ? "where light bodies carry much tension, T h²/(m l) above 0.3, take smaller steps or no "
-              "composition"
-            : "where bodies turn far in a step, take smaller steps or no corrections");
-    report.reason = said;
+    judge_energy({live_.energy.begun, reached, most, least}, lightest,
+                 model_.method.runge_kutta ? "take smaller steps, or give the method a smaller tolerance"
+                 : model_.composed ? taut_cure
+                                   : "where bodies turn far in a step, take smaller steps or no corrections",
+                 report);
 }
 
 }  // namespace spook

@@ -147,14 +147,12 @@ double RigidComposition::tension_rate(double allowed) {
 
 /// Steps whose longest stage is too long for the tension are taken in parts, in halves of halves; once parted they remain so.
 void RigidComposition::look_at_tension() {
-    double longest = 0.0;
-    for (const double stage : composition_stages(model_.method.composition))
-        longest = std::max(longest, model_.h * std::abs(stage));
-    int parts = live_.parts;
+    const double longest = model_.h * longest_stage(model_.method.composition);
+    const double near = near_limit * max_tension_turn;
     const double turned =
-        longest * longest * tension_rate(near_limit * max_rate * parts * parts / (longest * longest));
-    while (turned > max_rate * parts * parts && parts < max_parts) parts *= 2;
-    live_.tension_look = turned > near_limit * max_rate * parts * parts ? often : seldom;
+        longest * longest * tension_rate(near * live_.parts * live_.parts / (longest * longest));
+    const int parts = parts_for_tension(turned, live_.parts);
+    live_.tension_look = turned > near * parts * parts ? often : seldom;
     if (parts == live_.parts) return;
     live_.parts = parts;
     live_.stage_steps = 0;

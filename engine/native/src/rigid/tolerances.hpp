@@ -9,8 +9,6 @@ namespace spook {
 
 // energy_made.cpp
 namespace tolerances::energy_made {
-inline constexpr double max_gain = 0.05;          // of the largest kinetic energy
-inline constexpr double rounding = 1e-9;          // of the energy, which counts heights from anywhere
 inline constexpr double initial_overstep = 1e-9;  // m or rad, of rows and overlaps
 inline constexpr int steps_between_looks = 16;    // of joints alone: a look costs a tenth of a plane step
 }  // namespace tolerances::energy_made
@@ -70,10 +68,8 @@ inline constexpr std::size_t few_members = 8;     // bodies of an island: most a
 // rigid_composition.cpp
 namespace tolerances::rigid_composition {
 inline constexpr int max_differences = 8;    // of a stage's forces from step to step, the zeroth included
-inline constexpr double max_rate = 2.0;      // of τ² times the tension's rate: a stage τ is unstable above 4
 inline constexpr int power_iterations = 24;  // for that rate
 inline constexpr double rate_safety = 2.0;   // times what it finds, which comes near from below
-inline constexpr int max_parts = 1024;       // of a step
 inline constexpr double near_limit = 1.0 / 64.0;  // of that: nearer than this tension is looked at often
 inline constexpr std::int64_t often = 8, seldom = 256;  // steps
 }  // namespace tolerances::rigid_composition

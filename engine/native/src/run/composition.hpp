@@ -1,6 +1,8 @@
 // Symmetric compositions: a symmetric second-order step Φ done with h γ_1, …, h γ_s is of higher order.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <span>
 #include <stdexcept>
 
@@ -34,6 +36,24 @@ inline std::span<const double> composition_stages(int order) {
         case 8: return EIGHT;
         default: throw std::invalid_argument("there is no composition of this order; there are 4, 6 and 8");
     }
+}
+
+/// Of τ² times the square of the rate of tension: a stage τ is unstable above 4.
+inline constexpr double max_tension_turn = 2.0;
+inline constexpr int max_tension_parts = 1024;  // of a step
+
+/// The longest stage of an order, in time steps.
+inline double longest_stage(int order) {
+    double longest = 0.0;
+    for (const double stage : composition_stages(order)) longest = std::max(longest, std::abs(stage));
+    return longest;
+}
+
+/// Into how many parts, halves of halves, a step is to be taken that is in `parts` so far: `turned` is of its longest stage as a whole.
+/// A light body under much tension is turned back at many times the rate of its swing.
+inline int parts_for_tension(double turned, int parts) noexcept {
+    while (turned > max_tension_turn * parts * parts && parts < max_tension_parts) parts *= 2;
+    return parts;
 }
 
 }  // namespace spook
