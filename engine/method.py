@@ -81,8 +81,8 @@ class Method:
     impacts            simultaneous: all that touch take part in one impact (a ball on four gives −.6 and four times .4);
                        what flies, balls of which one pair meets at a time or a single body of any shape, does so one after the
                        other, each at its time, as often as it meets; any other pair is hit once, as the step begins, and
-                       stops without rebound where it approaches again (counters["stopped_impacts"]; substeps tell such
-                       impacts apart); so does a joint's stop that bodies touch, another is connected to, or that flies
+                       stops without rebound where it approaches again (counters["stopped_impacts"]; "unsettled" where that
+                       loses a twentieth of the largest kinetic energy; substeps tell such impacts apart); so does a joint's stop that bodies touch, another is connected to, or that flies
                        where surfaces may touch, else it is met at its times, too;
                        successive: one pair after the other until none approaches, as if there were small gaps (the
                        last ball leaves, no energy is lost at restitution 1); those that are open as a step begins in

@@ -36,7 +36,11 @@ def stepped(crank: float, speed: float, steps: int, guided: bool = False) -> tup
     leaning = -speed * crank * math.cos(turn) / (s.ROD * math.cos(lean))
     moving = speed * crank * across(along(turn)) + leaning * 0.5 * s.ROD * across(along(lean))
     sliding = -speed * crank * math.sin(turn) - leaning * s.ROD * math.sin(lean)
-    v, found, carried = np.array((speed, *moving, leaning, sliding)), [slider], []  # of crank, rod, rod's turn, slider
+    v, found, carried = (
+        np.array((speed, *moving, leaning, sliding)),
+        [slider],
+        [],
+    )  # of crank, rod, rod's turn, slider
     masses = np.array((s.TURNING, s.ROD_MASS, s.ROD_MASS, s.ROD_MASS * s.ROD**2 / 12.0, s.SLIDER))
     for _ in range(steps):
         arm, end = 0.5 * s.ROD * along(lean), np.array((slider, 0.0))

@@ -25,6 +25,8 @@ struct ContactBodies {
     int solver_body(const Contact& contact) const noexcept {
         return std::max(solver_index[contact.first], solver_index[contact.second]);
     }
+    /// One of them, by its index in the scene.
+    int mover(const Contact& contact) const noexcept { return body_of[solver_body(contact)]; }
     /// Of both, −1 for what does not move by itself.
     template <class Pair> std::pair<int, int> solver_pair(const Pair& contact) const noexcept {
         return {solver_index[contact.first], solver_index[contact.second]};

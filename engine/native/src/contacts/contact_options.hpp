@@ -30,8 +30,7 @@ struct ContactOptions {
 struct ContactCounters {  // exact, equal on every machine
     std::uint64_t contacts = 0, impacts = 0, corrections = 0, friction_rounds = 0, pivots = 0,
                   pgs_iterations = 0,
-                  unsettled = 0,  // solves that stopped at a limit of rounds
-        stopped = 0;              // impacts that were to rebound and did not
+                  unsettled = 0;  // solves that stopped at a limit of rounds
     void add(const FrictionReport& report) noexcept {
         friction_rounds += static_cast<std::uint64_t>(report.rounds);
         pivots += static_cast<std::uint64_t>(report.pivots);

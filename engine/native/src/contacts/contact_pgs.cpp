@@ -132,7 +132,7 @@ void ContactPgs::store_unanswered(ContactPoints& points) const {
 
 void ContactPgs::deliver(MixedSystem& system, bool unsettled, const StepMotion& motion,
                          const ContactPoints& points, EnergyLimit& energy, std::vector<char>& has_rows,
-                         std::vector<CachedContact>& cache, ContactCounters& counters) const {
+                         std::vector<CachedContact>& cache, StoppedImpacts& stopped) const {
     const ContactBodies& bodies = motion.bodies();
     const auto pushes = [this](std::size_t k) {
         const double* z = solver_.impulse(static_cast<int>(k));
@@ -153,7 +153,7 @@ void ContactPgs::deliver(MixedSystem& system, bool unsettled, const StepMotion& 
         const Vec3 along =
             (impulse[1] * axis_scale[0]) * point.tangent + (impulse[2] * axis_scale[1]) * across;
         cache_contact(rows, system, point, impulse[0], along, cache);
-        counters.stopped += motion.is_stopped(point, impulse[0]);
+        stopped.note(motion.given_back(point, impulse[0]), bodies.mover(point.contact));
         if (impulse[0] == 0.0 && impulse[1] == 0.0 && impulse[2] == 0.0) continue;
         for (const int body : {point.contact.first, point.contact.second})
             if (bodies.moves(body)) has_rows[bodies.solver_index[body]] = 1;

@@ -43,7 +43,7 @@ public:
     /// Caches what each point did, and marks bodies that some push; an unsettled answer is shortened.
     void deliver(MixedSystem& system, bool unsettled, const StepMotion& motion, const ContactPoints& points,
                  EnergyLimit& energy, std::vector<char>& has_rows, std::vector<CachedContact>& cache,
-                 ContactCounters& counters) const;
+                 StoppedImpacts& stopped) const;
     /// By key: iterations take points as they are found.
     void order(std::vector<CachedContact>& cache) { order_by_key(cache, unordered_, places_); }
 

@@ -178,8 +178,7 @@ ContactStage::SolveEnd ContactStage::solve(MixedSystem& system, const std::vecto
         order_points();
     }
     mark_rows(system.mass.size(), system.rows);  // the last round may have brought some
-    quality_ =
-        resting_.deliver(system, joints, judged(), points_, energy_, state_.cache.points, state_.counters);
+    quality_ = resting_.deliver(system, joints, judged(), points_, energy_, state_.cache.points);
     if (finite) correct_events(system);
     return {.finite = finite};
 }

@@ -43,7 +43,7 @@ struct StopRow {
     double other = 0.0;        // right side of a row for the other end
     double given = 0.0;        // what bodies that move as they are told give to its rate, m/s or rad/s
     bool both = false;         // the other end has its row, too
-    bool cut = false;          // its rebound is slower than its restitution says, to end at the other end
+    double cut = 0.0;          // J per N s of its impulse: what its rebound lacks, to end at the other end
     bool asks = false;         // left out, to find what forces give to its rate
     bool may_be_late = false;  // hit within the step if it pushes
 };

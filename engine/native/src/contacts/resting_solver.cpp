@@ -49,8 +49,8 @@ void RestingSolver::store(const MixedSystem& system, std::size_t joints, const C
 
 SolveQuality RestingSolver::deliver(MixedSystem& system, std::size_t joints, const JudgedStep& step,
                                     ContactPoints& points, EnergyLimit& energy,
-                                    std::vector<CachedContact>& cache, ContactCounters& counters) {
-    const SolveQuality quality = judge(step, system, friction_, report_);
+                                    std::vector<CachedContact>& cache) {
+    SolveQuality quality = judge(step, system, friction_, report_);
     if (!report_.converged) {
         const auto pushes = [&](std::size_t k) {
             const RowBlock& block = system.rows[joints + k];
@@ -68,7 +68,8 @@ SolveQuality RestingSolver::deliver(MixedSystem& system, std::size_t joints, con
         StepContact& point = points.all[k];
         const Vec3 along = store_solution(step.motion.bodies(), system.rows[joints + k], points, point);
         CachedContact& cached = cache_contact(rows, system, point, point.normal, along, cache);
-        counters.stopped += step.motion.is_stopped(point, point.normal);
+        quality.stopped.note(step.motion.given_back(point, point.normal),
+                             step.motion.bodies().mover(point.contact));
         std::copy_n(points.extras(point).turning, 3, cached.turning);
     }
     return quality;

@@ -21,8 +21,7 @@ public:
                       ContactPoints& points);
     /// How near to its law the last solve is, shortened where it did not settle; what each point did is cached.
     SolveQuality deliver(MixedSystem& system, std::size_t joints, const JudgedStep& step,
-                         ContactPoints& points, EnergyLimit& energy, std::vector<CachedContact>& cache,
-                         ContactCounters& counters);
+                         ContactPoints& points, EnergyLimit& energy, std::vector<CachedContact>& cache);
 
     IslandSolver& islands() noexcept { return islands_; }
     const IslandSolver& islands() const noexcept { return islands_; }

@@ -101,7 +101,7 @@ ContactStage::PgsSolveEnd ContactStage::solve_by_pgs(MixedSystem& system) {
         if (model_->bodies.moves(b) && motion_.event_time[b] >= 0.0)
             has_rows_[model_->bodies.solver_index[b]] = 1;
     pgs_.deliver(system, !report.converged, motion_, points_, energy_, has_rows_, state_.cache.points,
-                 state_.counters);
+                 quality_.stopped);
     correct_events(system);
     pgs_.order(state_.cache.points);
     return {};

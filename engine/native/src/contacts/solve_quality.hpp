@@ -1,6 +1,7 @@
 // How far the solves of a step have left their rows from their law, and which body is to be named for it.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <vector>
 
@@ -11,11 +12,32 @@
 
 namespace spook {
 
+/// Impacts that were to rebound and were stopped instead.
+struct StoppedImpacts {
+    std::uint64_t count = 0;
+    double energy = 0.0;  // J, that they would have given back
+    double most = 0.0;    // J, of the one that loses most
+    int body = -1;        // of that one
+    void note(double given_back, int of) noexcept {
+        if (!(given_back > 0.0)) return;
+        ++count, energy += given_back;
+        if (given_back > most) most = given_back, body = of;
+    }
+    /// Whether one of these loses more than all before.
+    bool add(const StoppedImpacts& others) noexcept {
+        const bool more = others.most > most;
+        count += others.count, energy += others.energy;
+        if (more) most = others.most, body = others.body;
+        return more;
+    }
+};
+
 struct SolveQuality {
     double residual = 0.0;  // the last solve's or impact's rows_residual(), m/s
     int body = -1;          // whose rows it left further from their law than `unsettled_residual`; −1: none
     double by = 0.0;        // m/s
     bool sunk = false;      // no row is off, but the body was left in another
+    StoppedImpacts stopped;
 };
 
 /// What a solve is judged by: bodies and v before it, points, and how deep pairs overlapped where the run began.

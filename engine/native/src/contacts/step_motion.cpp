@@ -101,10 +101,12 @@ double StepMotion::surface_speed(const StepContact& point, Vec3 direction) const
                               poses[b].rotation * surfaces[b].surface_velocity);
 }
 
-bool StepMotion::is_stopped(const StepContact& point, double normal) const {
-    const double fall = std::abs(relative_velocity(point, point.contact.point.normal, whole_dv_ext));
-    return normal > 0.0 && point.approach < -(point.rounding + fall) &&
-           model_->surfaces.pair(point.contact).restitution > 0.0;
+double StepMotion::given_back(const StepContact& point, double normal) const {
+    const double fall = std::abs(relative_velocity(point, point.contact.point.normal, whole_dv_ext)),
+                 speed = -point.approach - (point.rounding + fall);
+    if (!(normal > 0.0 && speed > 0.0)) return 0.0;
+    const double psi = model_->surfaces.pair(point.contact).restitution;
+    return 0.5 * psi * psi * normal * speed;
 }
 
 }  // namespace spook

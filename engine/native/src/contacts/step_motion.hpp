@@ -68,8 +68,9 @@ struct StepMotion {
     }
     /// How fast the surfaces move along themselves, the first against the second, along `direction`, m/s.
     double surface_speed(const StepContact& point, Vec3 direction) const noexcept;
-    /// Whether a point that is to rebound was stopped instead, faster than a fall in a step.
-    bool is_stopped(const StepContact& point, double normal) const;
+    /// What a point that was stopped by the impulse `normal` [N s] would have given back, J, where it was to rebound and came faster
+    /// than a fall in a step; else 0. Newton's impact gives back psi² of what the plastic one takes, ½ Σ nu |C v₋| without friction.
+    double given_back(const StepContact& point, double normal) const;
 
     std::vector<Pose> poses;             // where the step begins
     std::vector<Vec6> velocity, dv_ext;  // v, and what is still to come of h M⁻¹ f

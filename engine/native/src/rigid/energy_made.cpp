@@ -1,5 +1,6 @@
 // Energy that comes out of nothing: an outcome, not "completed". Asked of compositions, by the final state, and of corrections, on the
 // way: they keep energy, and their rows can add to it. Plain SPOOK dissipates, and is asked by the books (engine/books.py).
+// And energy that impacts were to give back and did not, by whatever method.
 //
 // reads: places and velocities of bodies, drives. writes: what the run has known of its energy.
 #include <algorithm>
@@ -74,6 +75,23 @@ void EnergyMade::note(double penetration) {
         known.noted = live_.moved, known.kinetic = kinetic, known.potential = potential;
     }
     known.most = std::max(known.most, met);
+}
+
+/// What was stopped without the rebound that is asked for is lost; what is plastic, or nearly, may be.
+void judge_stopped(const RigidModel& model, const RigidState& live, RunReport& report) {
+    const auto& stopped = live.stopped;
+    if (report.status != Status::completed || !(stopped.energy > max_energy_share * stopped.most_kinetic))
+        return;
+    report.status = Status::unsettled;
+    report.failed_step = (stopped.step + model.method.substeps - 1) / model.method.substeps;
+    report.failed_body = stopped.body;
+    char said[220];
+    std::snprintf(
+        said, sizeof said,
+        "was stopped where it was to rebound; such impacts have lost %.3g J, of %.3g J at most; take "
+        "smaller steps, or more substeps, each of which meets others",
+        stopped.energy, stopped.most_kinetic);
+    report.reason = said;
 }
 
 /// Asked once the final state was read.

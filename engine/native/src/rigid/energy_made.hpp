@@ -29,4 +29,7 @@ private:
     const Forces& forces_;
 };
 
+/// Energy that impacts were to give back and did not. Asked at the end of a run.
+void judge_stopped(const RigidModel& model, const RigidState& live, RunReport& report);
+
 }  // namespace spook

@@ -3,6 +3,7 @@
 //
 // reads: points, masses and rows of joints. writes: velocities of bodies and scratch_.velocities, impulses of impacts, share_ (the part of
 // the forces still to act after an event), stops that were hit.
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -79,6 +80,38 @@ bool MixedRows::find_pushes() {
     return true;
 }
 
+/// J, that a solve takes from a body.
+static double energy_taken(const Mat6& mass, const BodyState& begun, const Vec6& after) {
+    const Vec3 v = begun.velocity, w = begun.angular_velocity;
+    const Vec6 before{v.x, v.y, v.z, w.x, w.y, w.z};
+    double taken = 0.0;
+    for (int i = 0; i < 6; ++i)
+        for (int j = 0; j < 6; ++j)
+            taken += 0.5 * mass[6 * i + j] * (before[i] * before[j] - after[i] * after[j]);
+    return taken;
+}
+
+/// Takes over what the contact stage has found of its last solve. What was stopped has lost no more than the solve took from all.
+void MixedRows::judge_contacts() {
+    const SolveQuality& found = contacts_->quality();
+    live_.residual = std::max(live_.residual, found.residual);
+    if (found.body >= 0) live_.note_unsettled(found.body, found.by, found.sunk);
+    if (found.stopped.count == 0) return;
+    double taken = 0.0;
+    for (std::size_t k = 0; k < system.mass.size(); ++k)
+        taken += energy_taken(system.mass[k], live_.bodies[model_.constrained[k]], system.velocity[k]);
+    StoppedImpacts stopped = found.stopped;
+    stopped.energy = std::min(stopped.energy, std::max(0.0, taken));
+    live_.note_stopped(stopped);
+}
+
+/// A stop whose rebound, of that impulse, ends at the other end.
+void MixedRows::note_cut(std::size_t k, double impulse) {
+    StoppedImpacts cut;
+    cut.note(system.rows[k].stop.cut * std::abs(impulse), model_.mover(joints_.blocks()[k]));
+    live_.note_stopped(cut);
+}
+
 /// Rows are those of the velocities before, and after it of those it leaves.
 void MixedRows::impact() {
     fill_momenta(false);
@@ -108,6 +141,7 @@ void MixedRows::impact() {
             const bool once = model_.method.impacts == ImpactOrder::simultaneous || stop.limit_reached;
             state.rebounds = once ? unbounded : again * std::abs(stop.rebound);
             if (!stop.answered) continue;
+            note_cut(k, scratch_.impulses[k][stop.row]);
             if (stop.rebound == 0.0) state.met = system.rows[k].lower[stop.row] == 0.0 ? 1 : -1;
         }
     fill_rows();

@@ -42,14 +42,18 @@ double JointStops::right(double inwards, double violation, double rate, const Re
     const double closing = std::min(gap / time_step_, unreachable_rate + unreachable_ratio * std::abs(rate));
     double value = open ? -inwards * closing : row.upsilon * rate - row.violation_gain * violation;
     stop.touching = !open || state.met * inwards > 0.0;
-    stop.rebound = 0.0;
+    stop.rebound = stop.cut = 0.0;
     stop.hit = approach > state.rebounds && (open ? time_step_ * approach > gap : hit);
     if (is_met(open, approach, restitution, state, stop))
         value = meet(inwards, violation, rate, restitution, state, stop);
-    else if (stop.cut = restitution > 0.0 && stop.hit && restitution * approach > room / time_step_;
-             restitution > 0.0 && stop.hit)
-        value = stop.rebound = inwards * std::min(restitution * approach, std::max(0.0, room) / time_step_);
-    else if (!open && hit)  // plastic: the SPOOK row would let a part of the speed in and send it back
+    else if (restitution > 0.0 && stop.hit) {
+        const double due = restitution * approach, sent = std::min(due, std::max(0.0, room) / time_step_);
+        // To and fro, each end taking its part, it would have so much left when the step is over.
+        const double way = stop.range > 0.0 ? time_step_ * due / stop.range : 0.0,
+                     left = std::max(sent, due / (1.0 + way * (1.0 - restitution) / restitution));
+        stop.cut = 0.5 * (left - sent) * (left + sent) / (approach + sent);
+        value = stop.rebound = inwards * sent;
+    } else if (!open && hit)  // plastic: the SPOOK row would let a part of the speed in and send it back
         value = -row.violation_gain * violation;
     state.closed = open ? 0 : inwards > 0.0 ? 1 : -1;
     return value;
@@ -85,7 +89,6 @@ double JointStops::meet(double inwards, double violation, double rate, double re
     state.folds = some_overstepped_ = true;
     state.fold_to = state.angle - violation + inwards * at;
     stop.room = unbounded;
-    stop.cut = false;
     return stop.rebound = inwards * speed;
 }
 

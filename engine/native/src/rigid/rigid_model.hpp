@@ -28,6 +28,7 @@ struct RigidModel {
     bool bilateral = false;  // there are joints, and a direct solver for rows that all hold
     // How the method goes beyond plain SPOOK; `curved`: whether RowCurvature does its corrections.
     bool composed = false, half_step = false, stiff = false, curved = false;
+    bool rebounds = false;                // some surface or stop does
     LargeArray<BodyConstants> constants;  // the loads in them may be set between steps, see Forces
     LargeArray<BodyState> start;
     std::vector<int> constrained;   // dynamic bodies that have rows

@@ -198,4 +198,11 @@ struct RigidScene {
     RigidMethod method;
 };
 
+/// Whether the stop of some joint does.
+inline bool stops_rebound(const RigidScene& scene) {
+    return std::ranges::any_of(scene.joints, [](const JointSpec& joint) {
+        return joint.restitution > 0.0 || (joint.limit && joint.limit->restitution > 0.0);
+    });
+}
+
 }  // namespace spook

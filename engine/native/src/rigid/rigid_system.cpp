@@ -73,6 +73,10 @@ RigidSystem::RigidSystem(const RigidScene& scene, StageList stages)
     const RigidMethod& method = model_.method;
     const bool may_touch = mixed_.may_touch();
     model_.composed = method.composition > 2;
+    model_.rebounds =
+        stops_rebound(scene) || std::ranges::any_of(scene.bodies, [](const RigidBodySpec& body) {
+            return body.material.restitution > 0.0;
+        });
     model_.half_step = model_.stages.runs(Stage::half_step) && !model_.composed;
     model_.stiff = model_.stages.runs(Stage::string_stiffness) && model_.bilateral;
     model_.curved =
@@ -283,6 +287,7 @@ RigidSystem::Work RigidSystem::work_done() const noexcept {
 
 void RigidSystem::judge_end(RunReport& report) const {
     energy_.judge(report);
+    judge_stopped(model_, live_, report);
     judge_open_joints(model_, live_, joints_, report);
 }
 
@@ -314,7 +319,7 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
         report.counters["asleep"] = static_cast<std::int64_t>(live_.sleep.sleepers);
         report.counters["slept_steps"] = live_.sleep.slept;
     }
-    put("stopped_impacts", live_.stopped);
+    put("stopped_impacts", live_.stopped.count);
     put("contacts", 0);  // the same names with and without a collision stage, so that runs can be compared
     report.counters["force_evaluations"] = substeps * forces_.evaluations();
     report.residual = live_.residual;
@@ -334,7 +339,6 @@ void RigidSystem::count(RunReport& report, std::int64_t steps) const {
     const ContactCounters contact = mixed_.contacts()->counters();
     put("contacts", contact.contacts);
     put("impacts", contact.impacts);
-    put("stopped_impacts", contact.stopped + live_.stopped);
     put("corrections", contact.corrections);
     put("friction_rounds", contact.friction_rounds);
     put("pivots", contact.pivots);

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "contacts/solve_quality.hpp"
 #include "linear/large_array.hpp"
 #include "linear/vec.hpp"
 #include "rigid/joint_set.hpp"
@@ -40,7 +41,10 @@ struct RigidState {
     Unsettled unsettled;
     int whirling = -1;  // a body that tension has made turn by a radian a step
     Sleep sleep;
-    std::uint64_t stopped = 0;  // stops of joints whose rebound ended at their other end
+    struct Stopped : StoppedImpacts {  // by contacts, or by a stop's other end
+        std::int64_t step = 0;         // of the one that lost most
+        double most_kinetic = 0.0;     // J, as steps begin
+    } stopped;
     // Velocities at mid-step:
     bool velocity_ready = false;         // the velocities of the coming step are found already
     LargeArray<BodyMomenta> before;      // those of the step before
@@ -77,6 +81,9 @@ struct RigidState {
     LastRows last_rows = LastRows::block;
 
     bool asleep(int body) const noexcept { return sleep.sleepers > 0 && sleep.island[body] != 0; }
+    void note_stopped(const StoppedImpacts& these) noexcept {
+        if (stopped.add(these)) stopped.step = step;
+    }
     void note_unsettled(int body, double residual, bool sunk = false) {
         if (unsettled.body < 0) unsettled.body = body, unsettled.step = step, unsettled.sunk = sunk;
         unsettled.residual = std::max(unsettled.residual, residual);

@@ -55,9 +55,6 @@ void MixedRows::take_contacts(const RigidScene& scene) {
         if (!model_.stages.runs(Stage::move_surfaces)) materials.back().surface_velocity = {};
         if (!model_.stages.runs(Stage::roll)) materials.back().rolling = materials.back().torsional = 0.0;
     }
-    const bool stops_rebound = std::ranges::any_of(scene.joints, [](const JointSpec& joint) {
-        return joint.restitution > 0.0 || (joint.limit && joint.limit->restitution > 0.0);
-    });
     std::vector<PairFriction> pairs = scene.pair_frictions;
     for (PairFriction& pair : pairs) {
         if (!model_.stages.runs(Stage::friction)) pair.friction = 0.0;
@@ -69,7 +66,7 @@ void MixedRows::take_contacts(const RigidScene& scene) {
         Detection(scene.colliders, dynamic, scene.no_contact), materials, model_.solver_index,
         ContactOptions{model_.h, model_.method.friction, solver, model_.method.iterations,
                        model_.method.residual_tolerance, model_.method.floor, model_.method.refinements,
-                       model_.method.impacts, stops_rebound, model_.method.unsettled_residual},
+                       model_.method.impacts, stops_rebound(scene), model_.method.unsettled_residual},
         joint_pairs, yielding, std::move(pairs));
     for (const JointBlock& block : joints_.blocks())
         for (const int body : {block.first, block.second})
@@ -173,7 +170,7 @@ void MixedRows::take_multipliers() {
         double* multiplier = state.multipliers(blocks[k].axial);
         for (int i = 0; i < blocks[k].size; ++i)
             multiplier[i] = system.rows[k].multiplier[i] + scratch_.impulses[k][i];
-        live_.stopped += system.rows[k].stop.cut;
+        note_cut(k, system.rows[k].multiplier[std::max(0, system.rows[k].stop.row)]);
         if (breaks_ && !blocks[k].axial) joints_.break_overloaded(blocks[k].joint, live_.step);
     }
     std::size_t row = blocks.size();
@@ -369,13 +366,6 @@ void MixedRows::judge_pgs() {
         model_.mover(
             joints_.blocks()[worst.row < blocks ? worst.row : scratch_.other_ends[worst.row - blocks]]),
         worst.residual);
-}
-
-/// Takes over what the contact stage has found of its last solve.
-void MixedRows::judge_contacts() {
-    const SolveQuality& found = contacts_->quality();
-    live_.residual = std::max(live_.residual, found.residual);
-    if (found.body >= 0) live_.note_unsettled(found.body, found.by, found.sunk);
 }
 
 /// The bodies of a row beyond its first two: into it those that move by themselves, of others their speed.

@@ -63,6 +63,8 @@ void RigidSystem::find_velocities() {
 /// What the velocities of a step begin with, however often they are found: those of the step before, and loads that follow the time.
 void RigidSystem::begin_velocities() {
     scratch_.begin();
+    if (model_.rebounds)
+        live_.stopped.most_kinetic = std::max(live_.stopped.most_kinetic, readings_.kinetic_energy());
     if (model_.half_step) half_step_.note_before();
     if (sleeping_.is_on()) sleeping_.note_velocities();
     if (forces_.follow_the_time()) forces_.follow_time();
