@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from functools import cache
 from importlib import import_module
 
 from spook_tracker.scalar_tests import case
@@ -136,17 +137,17 @@ QUESTIONS = {name: module for tests in TOPICS.values() for name, module in tests
 TOPIC = {name: topic for topic, tests in TOPICS.items() for name in tests}
 
 
+@cache
+def _test(name: str) -> case.ScalarTest:
+    test: case.ScalarTest = import_module(f"{__package__}.{QUESTIONS[name]}").TEST
+    return replace(test, topic=TOPIC[name])
+
+
 class Catalogue(Mapping[str, case.ScalarTest]):
     """The table; a test is imported when it is asked for, so that a few are had without what all the others need."""
 
-    def __init__(self) -> None:
-        self._found: dict[str, case.ScalarTest] = {}
-
     def __getitem__(self, name: str) -> case.ScalarTest:
-        if name not in self._found:
-            test: case.ScalarTest = import_module(f"{__package__}.{QUESTIONS[name]}").TEST
-            self._found[name] = replace(test, topic=TOPIC[name])
-        return self._found[name]
+        return _test(name)
 
     def __iter__(self) -> Iterator[str]:
         return iter(QUESTIONS)
