@@ -258,7 +258,7 @@ PATH_LIMIT, FALL_LIMIT = 0.1055, 0.0295  # rad, by the steps of joint coordinate
 
 TEST = case.ScalarTest(
     title="Robot arm along a path",
-    question="Do torques computed from a path lead a six-joint arm along it, and do weak drives let it fall as they must?",
+    question="Do torques computed from a path lead a six-joint arm along it, as far as its drives reach?",
     why="Computed torque is how robots are controlled: the model's torques are sent to the arm. An engine whose arm answers "
     "otherwise than Newton and Euler trains controllers for another machine.",
     model="The six-joint arm: led without drives by loads that are its inverse dynamics along a path; its drives following the "

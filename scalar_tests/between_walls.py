@@ -1,4 +1,4 @@
-"""Does a ball thrown between floor and ceiling lose the speed and take the spin that each blow gives it?"""
+"""Does a ball thrown between floor and ceiling leave each impact with the velocity it must have?"""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def _draw(simulate: case.Simulate) -> case.Drawing:
 
 TEST = case.ScalarTest(
     title="Ball between walls",
-    question="Does a ball thrown between floor and ceiling lose the speed and take the spin that each blow gives it?",
+    question="Does a ball thrown between floor and ceiling leave each impact with the velocity it must have?",
     why="From the second blow on the ball comes with spin: a wrong lever or sign that one blow hides adds up.",
     model="A ball flies between floor and ceiling without gravity, elastic, rough; six blows.",
     parameters=(

@@ -1,4 +1,4 @@
-"""Do billiard balls leave a hit, and roll on after it, as impulse and friction say?"""
+"""Do billiard balls move after a hit as impulse and friction say?"""
 
 from __future__ import annotations
 
@@ -257,7 +257,7 @@ def _draw(simulate: case.Simulate) -> case.Drawing:
 
 TEST = case.ScalarTest(
     title="Billiards",
-    question="Do billiard balls leave a hit, and roll on after it, as impulse and friction say?",
+    question="Do billiard balls move after a hit as impulse and friction say?",
     why="Follow and draw live on spin that a hit must leave alone and friction must turn into speed; an engine that "
     "rubs at a blow in the wrong direction, or twice, misses every pocket.",
     model="A cue ball hits a smooth object ball full or half, rolling, sliding or turning backwards, and rolls again; "

@@ -1,4 +1,4 @@
-"""Does a blow change what it touches by Coulomb's and Newton's laws, and nothing else?"""
+"""Does an impact change velocities by Coulomb's and Newton's laws alone?"""
 
 from __future__ import annotations
 
@@ -221,7 +221,7 @@ LAW = "closed form of one impulse; rounding and the solver's tolerance remain"
 
 TEST = case.ScalarTest(
     title="Blows",
-    question="Does a blow change what it touches by Coulomb's and Newton's laws, and nothing else?",
+    question="Does an impact change velocities by Coulomb's and Newton's laws alone?",
     why="Engines drop the friction of a rebound, and let bodies collide that only pass each other.",
     model="A thrown ball bounces on a rough floor; two balls meet off their centres, or pass with a gap of 1 cm; "
     "a ball and a box slide without friction over the seam of two boxes.",

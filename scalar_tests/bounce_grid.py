@@ -1,4 +1,4 @@
-"""Does a ball come back as high as its restitution says, whatever that is and whatever the step?"""
+"""Does a ball come back as high as its restitution says, whatever its value or the step?"""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def _at(restitution: float, per_second: int) -> case.Measurement:
 
 TEST = case.ScalarTest(
     title="Grid of bounces",
-    question="Does a ball come back as high as its restitution says, whatever that is and whatever the step?",
+    question="Does a ball come back as high as its restitution says, whatever its value or the step?",
     why="A restitution that is a spring's damping, or is lost where a step ends beside the impact, is right at one step only.",
     model="A ball is dropped on a plane, with four restitutions at three steps; its height after the second bounce is read.",
     parameters=(

@@ -1,4 +1,4 @@
-"""Does a ball bounce as high as its restitution allows, and come to rest in time?"""
+"""Does a ball bounce as its restitution says until it is at rest?"""
 
 from __future__ import annotations
 
@@ -196,7 +196,7 @@ def gentlest_impact(simulate: case.Simulate) -> case.BreakPoint:
 GENTLEST = GRAVITY * TIME_STEP / RESTITUTION  # m/s: what is left of it, gravity takes in the same step
 TEST = case.ScalarTest(
     title="Bouncing ball",
-    question="Does a ball bounce as high as its restitution allows, and come to rest in time?",
+    question="Does a ball bounce as its restitution says until it is at rest?",
     why="Impacts are where engines gain or lose energy by accident, and where a ball may jitter for ever.",
     model="A ball falls from rest on a plane with restitution 0.8 and bounces until it stops.",
     parameters=(

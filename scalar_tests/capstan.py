@@ -187,7 +187,7 @@ STEADY = (
 
 TEST = case.ScalarTest(
     title="Capstan and winch",
-    question="Does a wire round a bar hold e^(µφ) times the pull in front, and does a winch lift what its torque can?",
+    question="Does a wire round a bar or a drum hold what its friction, e^(µφ), and the torque allow?",
     why="Ships are moored and loads are lowered by a few turns of rope. The pull grows exponentially along the wrap: a friction "
     "bound that is a step late, or taken from one side alone, lets go far too early or never.",
     model="A wire runs one and a half times round a fixed bar without size, with a kilogram on one end and a heavier weight on "

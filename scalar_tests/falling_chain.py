@@ -1,4 +1,4 @@
-"""Do a chain of capsules and a ragdoll that fall on the floor keep the books of momentum, and lose energy only?"""
+"""Do a chain of capsules and a ragdoll that fall on the floor obey the balances of momentum and energy?"""
 
 from __future__ import annotations
 
@@ -266,7 +266,7 @@ def _asked(configuration: str, scene: engine.Scene, note: str, deep: float) -> c
 
 TEST = case.ScalarTest(
     title="Falling chain",
-    question="Do a chain of capsules and a ragdoll that fall on the floor keep the books of momentum, and lose energy only?",
+    question="Do a chain of capsules and a ragdoll that fall on the floor obey the balances of momentum and energy?",
     why="Chains and ragdolls are where contacts and joints act on the same bodies at once: a blow runs through all of them. "
     "Momentum from nowhere or energy gained in a step is what makes them jitter and explode.",
     model="Five capsules on ball joints fall in a zigzag onto a rough floor, pushed sideways. A ragdoll of eleven parts tumbles "

@@ -1,4 +1,4 @@
-"""Do gears keep their ratios, and does every casing feel the torque that they do not balance?"""
+"""Do gears turn each other and their casings as their ratios say?"""
 
 from __future__ import annotations
 
@@ -201,7 +201,7 @@ EXACT = "a step turns each by h ω, and the rows ask the ratio of ω: rounding r
 
 TEST = case.ScalarTest(
     title="Gears",
-    question="Do gears keep their ratios, and does every casing feel the torque that they do not balance?",
+    question="Do gears turn each other and their casings as their ratios say?",
     why="Gears, racks, screws, belts and differentials are one kind of row: a linear relation between coordinates. A "
     "planetary set asks it of joints that sit on each other.",
     model="A planetary set of 20, 30 and 80 teeth with its ring held: driven at the sun for 10 s; in balance under 2 N m "

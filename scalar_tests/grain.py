@@ -1,4 +1,4 @@
-"""Does a box slide askew where friction differs with the direction, and where does it begin to slide?"""
+"""Does a box slide as friction that differs with the direction lets it?"""
 
 from __future__ import annotations
 
@@ -237,7 +237,7 @@ THROWN = "as above, of up to 60 steps one after the other: what one leaves turns
 
 TEST = case.ScalarTest(
     title="Sliding on a grain",
-    question="Does a box slide askew where friction differs with the direction, and where does it begin to slide?",
+    question="Does a box slide as friction that differs with the direction lets it?",
     why="Wood, boards with grooves, blades and tracks hold one way and let go the other. A law that takes each direction "
     "by itself, or acts against the slip, sends bodies the wrong way, or gains energy.",
     model="A box on a board with a grain 20° from x. It slides down a slope of tan θ = 0.6 from rest, is thrown askew on "

@@ -1,4 +1,4 @@
-"""Do two fingers hold a capsule by friction, and let it slip when they press too little?"""
+"""Do two fingers hold a capsule just as long as they press enough for friction?"""
 
 from __future__ import annotations
 
@@ -191,7 +191,7 @@ def _asked(time_step: float) -> case.Measurement:
 
 TEST = case.ScalarTest(
     title="Grasp",
-    question="Do two fingers hold a capsule by friction, and let it slip when they press too little?",
+    question="Do two fingers hold a capsule just as long as they press enough for friction?",
     why="Grasps slip slowly out of the fingers in engines whose friction creeps, the faster the longer the step (Erez, "
     "Tassa and Todorov 2015). A hand that holds must hold, and at the least force there is.",
     model="A capsule lies across between the upright faces of two fingers, which are guided sideways and press with "

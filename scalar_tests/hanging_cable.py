@@ -1,4 +1,4 @@
-"""Does a cable of rigid links hang in its catenary, and pull at its ends as statics says?"""
+"""Does a cable of rigid links hang as the statics of its catenary says?"""
 
 from __future__ import annotations
 
@@ -197,7 +197,7 @@ def _asked(count: int, time_step: float) -> case.Measurement:
 
 TEST = case.ScalarTest(
     title="Hanging cable",
-    question="Does a cable of rigid links hang in its catenary, and pull at its ends as statics says?",
+    question="Does a cable of rigid links hang as the statics of its catenary says?",
     why="A cable's pull comes from its shape alone: joints that give way, or forces that leak along the chain, change it.",
     model="Thin uniform rods on ball joints hang between two points of the same height, at rest where statics puts them.",
     parameters=(

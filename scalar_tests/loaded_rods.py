@@ -1,4 +1,4 @@
-"""How heavy a load do ten light rods carry, and does it swing with its period?
+"""How heavy a load can swing with its period on ten light rods?
 
 A rod under a tension T turns back like a stiff spring, T l per radian. Frozen within a step that stiffness is stepped
 explicitly; taken implicitly it bounds nothing.
@@ -224,7 +224,7 @@ HOLDS = (
 )
 TEST = case.ScalarTest(
     title="Loaded rods",
-    question="How heavy a load do ten light rods carry, and does it swing with its period?",
+    question="How heavy a load can swing with its period on ten light rods?",
     why="Cranes, bridges and legs are light parts under heavy loads; there rigid-body engines tremble, or blow up.",
     model="Ten rods in a row on ball joints under a heavy load, let go 0.01 rad off the vertical.",
     parameters=(

@@ -1,4 +1,4 @@
-"""How thin may a masonry arch be, and does it fall when it is thinner?"""
+"""How thin may a masonry arch be before it falls?"""
 
 from __future__ import annotations
 
@@ -225,7 +225,7 @@ def _asked(count: int) -> case.Measurement:
 
 TEST = case.ScalarTest(
     title="Masonry arch",
-    question="How thin may a masonry arch be, and does it fall when it is thinner?",
+    question="How thin may a masonry arch be before it falls?",
     why="Nothing but contact and friction holds an arch, and whether it stands is decided by geometry alone: every "
     "stone's edges, weight and place must be right to a per cent of its thickness.",
     model="Straight-sided wedges form a semicircle of 1 m mean radius on rough ground, touching and at rest. They touch "

@@ -1,4 +1,4 @@
-"""Does a motor reach its set speed, with the torque it is allowed and no more?"""
+"""Does a motor reach its set speed with no more than the torque it is allowed?"""
 
 from __future__ import annotations
 
@@ -145,7 +145,7 @@ SPEED_ERROR = case.Metric(
 
 TEST = case.ScalarTest(
     title="Motor",
-    question="Does a motor reach its set speed, with the torque it is allowed and no more?",
+    question="Does a motor reach its set speed with no more than the torque it is allowed?",
     why="Winches, wheels and robots are motors with a bound. One that is too strong, or that takes its bound for an "
     "impulse, drives a different machine at every time step.",
     model="A wheel of 2 kg m² at rest on a hinge to the world; a motor drives it to 10 rad/s with at most 4 N m, for "

@@ -1,4 +1,4 @@
-"""Does a stack of plates hang over by half the harmonic series, and fall beyond?"""
+"""Is half the harmonic series the farthest that a stack of plates can hang over?"""
 
 from __future__ import annotations
 
@@ -142,7 +142,7 @@ def _at_most(name: str, description: str, unit: str, limit: float, source: str) 
 
 TEST = case.ScalarTest(
     title="Leaning plates",
-    question="Does a stack of plates hang over by half the harmonic series, and fall beyond?",
+    question="Is half the harmonic series the farthest that a stack of plates can hang over?",
     why="At its limit every interface is about to open: a solver that leaves a part of the load out, or softens it, "
     "falls early or stands when it must not.",
     model="Ten plates hang over each other at 0.99 of the limit; one plate tips at 1.01 of it; three plates at 1.01 "

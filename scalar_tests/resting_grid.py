@@ -1,4 +1,4 @@
-"""Does whatever lies on something lie still, and press on it with its weight?"""
+"""Is whatever lies on something in equilibrium?"""
 
 from __future__ import annotations
 
@@ -193,7 +193,7 @@ SCENES: tuple[tuple[str, engine.Scene, Mapping[str, float]], ...] = (
 
 TEST = case.ScalarTest(
     title="Grid of what rests",
-    question="Does whatever lies on something lie still, and press on it with its weight?",
+    question="Is whatever lies on something in equilibrium?",
     why="A box, a ball, a cylinder, a capsule, boxes on boxes, a heavy one on a light one: the first scenes that are tried, "
     "and each is touched at other points.",
     model="Each of them lies on a plane, touching from the start, for two seconds; then its place and the force under it are read.",

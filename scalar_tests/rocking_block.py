@@ -1,4 +1,4 @@
-"""Does a rocking block lose at each blow what Housner's rule says, and take its time?"""
+"""Does a block rock from impact to impact as Housner's rule says?"""
 
 from __future__ import annotations
 
@@ -235,7 +235,7 @@ def draw(simulate: case.Simulate) -> case.Drawing:
 
 TEST = case.ScalarTest(
     title="Rocking block",
-    question="Does a rocking block lose at each blow what Housner's rule says, and take its time?",
+    question="Does a block rock from impact to impact as Housner's rule says?",
     why="Columns and statues in earthquakes rock from corner to corner. The blow must act at the new corner alone: an "
     "engine that spreads it over both stops the block, one that lets it bounce never does.",
     model="A slender block leans on its lower edge on rough ground and is let go; plastic contact, no restitution.",

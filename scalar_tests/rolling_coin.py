@@ -228,7 +228,7 @@ SHAKEN = abs(COIN.spin) * step(COIN)
 
 TEST = case.ScalarTest(
     title="Rolling coin",
-    question="Does a coin roll steadily on its circle, and Euler's disk turn with its centre at rest?",
+    question="Do a coin on its circle and Euler's disk keep their steady motion?",
     why="A coin that rolls leaning is held by gyroscopic moments and by friction that does no work, at one point that "
     "wanders round its edge. Contact, rotation and friction must agree at every moment.",
     model="A coin of 0.5 kg, 0.1 m radius and 4 mm thickness rolls on a rough floor: leaning by 30° on a circle of 0.5 m, "

@@ -133,7 +133,7 @@ ROUNDED = "constant torque is exact in a step; the solver stops at 1e-10 of the 
 
 TEST = case.ScalarTest(
     title="Rolling friction",
-    question="Does a ball with rolling friction stop where it must, stand on the slope it may and spin down in time?",
+    question="Is a ball stopped by rolling friction as its coefficients say?",
     why="Without rolling friction a ball on the floor never stops, and no heap of balls has a slope.",
     model="A ball of 2 kg rolls, or spins on the spot, on a rough level floor, and is put down on slopes. The torque "
     "against rolling is at most ρ N, against turning on the spot at most σ N.",

@@ -1,4 +1,4 @@
-"""Does a log roll at the rate its metacentre says, and stand upright up to where that sinks below its centre?"""
+"""Does a log roll at the rate its metacentre says as long as that lies above its centre?"""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def draw(simulate: case.Simulate) -> case.Drawing:
 
 TEST = case.ScalarTest(
     title="Rolling log",
-    question="Does a log roll at the rate its metacentre says, and stand upright up to where that sinks below its centre?",
+    question="Does a log roll at the rate its metacentre says as long as that lies above its centre?",
     why="Ships are judged by their metacentre. It is a difference of large moments: what is lost of them shows in the roll "
     "first, and at the densities where a log falls on its side.",
     model="The square log of the floating box, nudged by 1e-4 rad: its roll is timed at four densities, and it stands or falls "

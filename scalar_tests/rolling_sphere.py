@@ -1,4 +1,4 @@
-"""Does a sphere on a slope roll while friction can hold its contact, and slide beyond?"""
+"""Does a sphere on a slope roll just as long as friction can hold its contact?"""
 
 from __future__ import annotations
 
@@ -143,7 +143,7 @@ def ladder_error(simulate: case.Simulate, time_step: float, method: engine.Metho
 
 TEST = case.ScalarTest(
     title="Rolling and sliding sphere",
-    question="Does a sphere on a slope roll while friction can hold its contact, and slide beyond?",
+    question="Does a sphere on a slope roll just as long as friction can hold its contact?",
     why="Rolling couples friction, rotation and translation: any error in one of them shows as a wrong acceleration.",
     model="A solid sphere starts from rest on a plane under tilted gravity; speed and spin are read after 2 s.",
     parameters=(

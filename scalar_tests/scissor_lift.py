@@ -203,7 +203,7 @@ ROUNDING = (
 
 TEST = case.ScalarTest(
     title="Scissor lift",
-    question="What force holds a scissor lift, and how fast does it rise when its foot is driven?",
+    question="Do force and speed of a scissor lift follow from its geometry?",
     why="Forces add up along the arms: twenty stages multiply the load by twenty over the tangent of a small angle, "
     "through forty bars of a thousandth of its mass. Loops of light bars under heavy loads are where solvers fail.",
     model="One to twenty pairs of crossed arms of 2 m and 5 kg, a platform with a load of 1 t (5 kg to 5000 t) on top, a "

@@ -1,4 +1,4 @@
-"""Does a block on a shaken floor rock as Housner's equations say, and fall over when it must?"""
+"""Does a block on a shaken floor rock as Housner's equations say until it falls over?"""
 
 from __future__ import annotations
 
@@ -256,7 +256,7 @@ STEPS = tuple(rocking().blow / (n + 0.5) for n in (64, 128, 256, 512, 1024))
 
 TEST = case.ScalarTest(
     title="Shaken block",
-    question="Does a block on a shaken floor rock as Housner's equations say, and fall over when it must?",
+    question="Does a block on a shaken floor rock as Housner's equations say until it falls over?",
     why="Columns, shelves and reactors stand or fall in earthquakes by rocking. The floor moves as it is told, whatever "
     "rocks on it: its speed must reach the block through friction and contact at the right moment.",
     model="A slender block stands on a rough floor that is shaken sideways by 1.5 times the least that lifts an edge, 2 Hz: "

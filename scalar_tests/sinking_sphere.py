@@ -149,7 +149,7 @@ def lightest(simulate: case.Simulate) -> case.BreakPoint:
 
 TEST = case.ScalarTest(
     title="Sinking sphere",
-    question="Does a stone sink at its terminal speed, and swing under water as its lost weight says?",
+    question="Does a stone move under water as drag and buoyancy say?",
     why="Drag and buoyancy decide how fast things fall through a fluid. The terminal speed is exact for every time "
     "step, so whatever differs from it is a fault of the force.",
     model="A stone ball of 0.1 m radius sinks from rest in deep still water with quadratic drag of C_d = 0.47. The same "

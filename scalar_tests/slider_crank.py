@@ -1,4 +1,4 @@
-"""Does a slider-crank move as its geometry says, and does its motor carry what inverse dynamics asks?"""
+"""Does a driven slider-crank follow geometry and inverse dynamics?"""
 
 from __future__ import annotations
 
@@ -256,7 +256,7 @@ def draw(simulate: case.Simulate) -> case.Drawing:
 
 TEST = case.ScalarTest(
     title="Slider-crank",
-    question="Does a slider-crank move as its geometry says, and does its motor carry what inverse dynamics asks?",
+    question="Does a driven slider-crank follow geometry and inverse dynamics?",
     why="Engines, pumps and presses are slider-cranks. A loop of joints closes over a turning and a sliding body, with a "
     "row too many; the motor feels every mass behind it.",
     model="A motor turns a crank steadily; a uniform rod drives a slider along its guide. No gravity, no clearance.",

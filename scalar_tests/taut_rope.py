@@ -1,4 +1,4 @@
-"""Does a taut rope of links carry waves at √(T/ρ), and how tight may it be?"""
+"""How tight may a rope of links be that carries waves at √(T/ρ)?"""
 
 from __future__ import annotations
 
@@ -164,7 +164,7 @@ FASTER = ((math.pi / PIECES) ** 2 + (TIME_STEP * rate(1)) ** 2) / 24.0
 
 TEST = case.ScalarTest(
     title="Taut rope",
-    question="Does a taut rope of links carry waves at √(T/ρ), and how tight may it be?",
+    question="How tight may a rope of links be that carries waves at √(T/ρ)?",
     why="Cranes, cables and tendons are ropes under tension. Their waves show whether rows pass on a pull across a link as well "
     "as along it; and the pull is what makes light links run away.",
     model="Twenty rods on ball joints in a row, held at one end and drawn at a slide at the other, are bent by 0.1 mm into one of "

@@ -170,7 +170,7 @@ SLOW = (CIRCLE * TIME_STEP) ** 2 / 3.0
 
 TEST = case.ScalarTest(
     title="Turntable",
-    question="Does a ball on a turntable circle at 2/7 of its rate, and does the table throw off what it must?",
+    question="Do bodies on a turntable roll or slide as mechanics says?",
     why="The ball's circle is a classic that no engine gets by chance: rolling, spin and a moving surface must all be "
     "right. Sorting tables rest on the radius at which friction loses.",
     model="A solid ball rolls without slip on a rough table that turns at 3 rad/s. Boxes ride on the same table.",

@@ -274,7 +274,7 @@ STEADY = "a steady force is exact in the velocities of the discrete step; roundi
 
 TEST = case.ScalarTest(
     title="Wires and ropes",
-    question="Do wires over pulleys share their loads, and does a rope that snaps taut give the right blow?",
+    question="Do wires pull as mechanics says, over pulleys or as they snap taut?",
     why="Cranes, lifts and winches hang on wires that only pull. A wire that pushes, loses load at a pulley or throws "
     "energy in when it snaps taut drives machines that do not exist.",
     model="Atwood's machine over eyes without friction, and over a drum on which the wire does not slip; tackles of two "

@@ -1,4 +1,4 @@
-"""Which oscillations does damping of two time steps remove, and how fast?"""
+"""How fast does damping of two time steps remove each oscillation?"""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def _left(period: int) -> case.Metric:
 
 TEST = case.ScalarTest(
     title="Oscillator: filter",
-    question="Which oscillations does damping of two time steps remove, and how fast?",
+    question="How fast does damping of two time steps remove each oscillation?",
     why="Damping of two time steps is the default. What it takes away from motion that is meant to be there must be "
     "known, and must not change unnoticed.",
     model="A mass of 1 kg on a distance row of compliance 1/κ with damping 2 h; κ gives 100 down to 0.1 steps a "
