@@ -65,9 +65,15 @@ def clone(tmp_path: Path) -> Clone:
     made = Clone(folder)
     for tag in made.git("tag").split():
         made.git("tag", "-d", tag)
-    for name in ("release", "subjects"):
-        shutil.copy(ROOT / ".ci" / name, folder / ".ci" / name)
-    shutil.copy(ROOT / "CHANGELOG.md", folder)
+    for name in (
+        ".ci/release",
+        ".ci/subjects",
+        ".ci/version",
+        ".ci/build_backend.py",
+        "CHANGELOG.md",
+        "VERSION",
+    ):
+        shutil.copy(ROOT / name, folder / name)
     made.git("add", "-A")
     made.commit("Take over what is not committed yet")
     made.git("tag", "-a", "v0.0.1", "-m", "where subjects are counted from")
@@ -89,9 +95,67 @@ def test_a_release_dates_the_changelog_and_tags_it(clone: Clone) -> None:
         assert re.findall(r"spook-tracker\[standard\](\S*?)\"?(?:\s|$)", text) == ["==1.0.0"], name
     assert clone.git("cat-file", "-t", "v1.0.0") == "tag"
     assert clone.git("rev-parse", "v1.0.0^{commit}") == clone.git("rev-parse", "HEAD")
+    assert (clone.folder / "VERSION").read_text() == "1.0.0\n"
     assert clone.version() == "1.0.0"
     clone.commit("One more")
     assert re.fullmatch(r"1\.0\.0\.post1\+g[0-9a-f]{9}", clone.version())
+
+
+def told(folder: Path) -> str:
+    """The version a build is told there; empty where the build asks git itself."""
+    done = subprocess.run(["sh", ".ci/version"], cwd=folder, capture_output=True, text=True, check=True)
+    return done.stdout.strip()
+
+
+def test_without_tags_the_version_is_that_of_the_last_release_and_compare_takes_it_as_printed(
+    clone: Clone, tmp_path: Path
+) -> None:
+    assert told(clone.folder) == "", "no release yet: git counts"
+    assert clone.release("1.0.0").returncode == 0
+    assert told(clone.folder) == "", "git has the tag"
+    clone.git("tag", "-d", "v0.0.1", "v1.0.0")
+    versions = [told(clone.folder)]
+    clone.commit("One more")
+    versions.append(told(clone.folder))
+    short = f"g{clone.git('rev-parse', '--short=9', 'HEAD')}"
+    assert versions == ["1.0.0", f"1.0.0.post1+{short}"]
+
+    asked = "import sys; sys.path[:0] = ['.ci']; import build_backend as b; b.prepare_metadata_for_build_wheel('built')"
+    (clone.folder / "built").mkdir()
+    made = clone.run(sys.executable, "-c", asked)
+    assert made.returncode == 0, made.stderr
+    (metadata,) = (clone.folder / "built").glob("*.dist-info/METADATA")
+    assert f"\nVersion: {versions[1]}\n" in metadata.read_text(), "pip builds without the Makefile"
+    shutil.rmtree(clone.folder / "built")
+
+    kept = {
+        "TRACKER_DB": str(tmp_path / "history.db"),
+        "PYTHONPATH": str(TOYS),
+        "TRACKER_ENGINE": "toy_engine",
+    }
+    kept |= {"TRACKER_CATALOGUE": "toy_creep:CATALOGUE", "TOY_ERROR": "1.0", "TOY_PARENT": ""}
+    tracker = (sys.executable, "-m", "spook_tracker")
+    for version, commit in zip(versions, ("HEAD^", "HEAD"), strict=True):
+        build = {"TOY_VERSION": version, "TOY_HASH": clone.git("rev-parse", commit)}
+        build["TOY_TIME"] = clone.git("log", "-1", "--format=%cI", commit)
+        assert clone.run(*tracker, "run", "--workers", "0", **kept, **build).returncode == 0
+    for after in (versions[1], "1.0.0.post1"):
+        compared = clone.run(*tracker, "compare", "1.0.0", after, **kept)
+        assert compared.returncode == 0, compared.stdout + compared.stderr
+
+    clone.folder.joinpath("VERSION").chmod(0o755)
+    assert told(clone.folder) == f"1.0.0.post1+{short}.dirty"
+    subprocess.run(
+        ["git", "clone", "-q", "--depth", "1", f"file://{clone.folder}", str(tmp_path / "few")], check=True
+    )
+    assert told(tmp_path / "few") == f"1.0.0+shallow.{short}"
+    (tmp_path / "unpacked").mkdir()
+    subprocess.run(
+        f"git -C {clone.folder} archive HEAD | tar x -C {tmp_path}/unpacked", shell=True, check=True
+    )
+    assert told(tmp_path / "unpacked") == f"1.0.0+archive.{short}"
+    (tmp_path / "unpacked" / "PKG-INFO").touch()  # an archive that a build has made says its version there
+    assert told(tmp_path / "unpacked") == ""
 
 
 def test_a_release_that_cannot_be_is_refused_before_anything_changes(clone: Clone) -> None:
