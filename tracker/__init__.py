@@ -8,7 +8,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from spook_tracker.tracker.library import (
+    from .library import (
         History,
         NightlyReport,
         RunOptions,
@@ -38,7 +38,7 @@ __all__ = [
 def __getattr__(name: str) -> object:
     if name not in __all__:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    from spook_tracker.tracker import library
+    from . import library
 
     found: object = getattr(library, name)
     return found

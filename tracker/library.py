@@ -59,7 +59,7 @@ class History(StoredHistory):
         `ladder`: its error against run time [s] instead, all configurations and engines. The traces are those of the
         website. UnknownName for what is not recorded; TrackerError without Plotly.
         """
-        from spook_tracker.tracker.notebook import ladder_figure, trend_figure
+        from .notebook import ladder_figure, trend_figure
 
         return ladder_figure(self, test) if ladder else trend_figure(self, test, metric)
 

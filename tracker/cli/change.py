@@ -6,8 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from spook_tracker.tracker.cli.options import complain
 from spook_tracker.tracker.measure.bounds import MEMORY, TIME_LIMIT
+
+from .options import complain
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.judge.accepted import Accepted
@@ -28,10 +29,11 @@ def beside_its_base(
     folder: Path,
 ) -> CompareDocument:
     """What changed from the base to the commit that is checked out. Raises TrackerError."""
-    from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.document.errors import TrackerError
     from spook_tracker.tracker.measure.commits import full_hash
     from spook_tracker.tracker.pairs import compare_by_pairs
+
+    from .console import say
 
     head = full_hash(team.repository, "HEAD")
     if team.has_local_changes():
@@ -55,9 +57,10 @@ def beside_its_base(
 
 def _usual(database: str, machine: str, rungs: Mapping[str, Sequence[str]]) -> Mapping[str, float]:
     """The spread of run times between the last nights of a machine; nothing without a history."""
-    from spook_tracker.tracker.cli.history import history_of
     from spook_tracker.tracker.document.errors import TrackerError
     from spook_tracker.tracker.pairs import usual_spreads
+
+    from .recorded import history_of
 
     try:
         with history_of(database) as history:
@@ -69,10 +72,11 @@ def _usual(database: str, machine: str, rungs: Mapping[str, Sequence[str]]) -> M
 
 def _base_of(team: TeamRepository, base: str, head: str, database: str) -> str:
     """A revision, or a name that the history knows; fork-point is where git says that it leaves the main line."""
-    from spook_tracker.tracker.cli.history import history_of
     from spook_tracker.tracker.library import FORK_POINT
     from spook_tracker.tracker.measure.commits import CommitError, full_hash
     from spook_tracker.tracker.store.git import merge_base
+
+    from .recorded import history_of
 
     if base == FORK_POINT:
         found = merge_base(team.repository, head)

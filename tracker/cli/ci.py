@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, TypedDict, Unpack
 
 import click
 
-from spook_tracker.tracker.cli.options import (
+from .options import (
     GREEN,
     RED,
     UNUSABLE,
@@ -32,8 +32,8 @@ from spook_tracker.tracker.cli.options import (
     workers_option,
     write,
 )
-from spook_tracker.tracker.cli.past import KEPT
-from spook_tracker.tracker.cli.settings import present
+from .past import KEPT
+from .settings import present
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.judge.comparison_document import CompareDocument
@@ -92,13 +92,14 @@ def night(
     **asked: Unpack[AskedOfNight],
 ) -> None:  # fmt: skip
     """Read the history, run `tracker nightly`, and write the history back."""
-    from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.history import accepted_levels, history_of
-    from spook_tracker.tracker.cli.main import nightly
-    from spook_tracker.tracker.cli.report_ci import commands_of, night_markdown
     from spook_tracker.tracker.document.errors import TrackerError
     from spook_tracker.tracker.library import judge_run
     from spook_tracker.tracker.store.months import export_months
+
+    from .console import say
+    from .measuring import nightly
+    from .recorded import accepted_levels, history_of
+    from .report_ci import commands_of, night_markdown
 
     try:
         history.mkdir(parents=True, exist_ok=True)
@@ -170,11 +171,12 @@ def change(
     Values are compared exactly, run times between fresh processes of both, interleaved. If nothing says how a commit is
     built, the working tree is measured and compared with the history, without run times.
     """
-    from spook_tracker.tracker.cli.change import beside_its_base, run_options
-    from spook_tracker.tracker.cli.history import accepted_levels, history_of
-    from spook_tracker.tracker.cli.main import run_command
     from spook_tracker.tracker.library import compare
     from spook_tracker.tracker.measure.builds import team_repository
+
+    from .change import beside_its_base, run_options
+    from .measuring import run_command
+    from .recorded import accepted_levels, history_of
 
     refuse_unwritable(comment_file)
     if comment_file:
@@ -212,9 +214,9 @@ def _on_command_line(context: click.Context, name: str) -> bool:
 
 def _compared(context: click.Context, document: CompareDocument, comment_file: Path | None) -> None:
     """Say what a comparison came to, wherever it is read, and end with its exit code."""
-    from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.report_comment import comment, workflow_commands
-    from spook_tracker.tracker.cli.report_compare import compare_markdown, compare_table
+    from .console import say
+    from .report_comment import comment, workflow_commands
+    from .report_compare import compare_markdown, compare_table
 
     kept = True
     say(compare_table(document))

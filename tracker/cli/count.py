@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import click
 
-from spook_tracker.tracker.cli.options import example, source_options
-from spook_tracker.tracker.cli.settings import present
+from .options import example, source_options
+from .settings import present
 
 
 @click.command(epilog=example("tracker count pendulum --steps 100"))
@@ -24,8 +24,9 @@ def count(tests: tuple[str, ...], steps: int, engine: str, catalogue: str) -> No
     For machines without a hardware counter, as most virtual machines; takes about a minute a test. Independent of the
     clock.
     """
-    from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.measure.callgrind import count_instructions
+
+    from .console import say
 
     for test in tests:
         found = count_instructions(engine, catalogue, test, steps, present().folder)

@@ -2,64 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from spook_tracker.tracker.cli.filters import (
+from .filters import (
     engine_option,
     json_option,
     kind_options,
     of_engine,
     test_option,
 )
-from spook_tracker.tracker.cli.options import (
-    ACCEPTED,
+from .options import (
     DEFAULT_DATABASE,
     NOT_COMPARABLE,
     RED,
     UNUSABLE,
     accepted_option,
-    complain,
     database_option,
     example,
     refuse_unwritable,
     source_options,
     write,
 )
-from spook_tracker.tracker.cli.settings import present
+from .recorded import accepted_levels, history_of
+from .settings import present
 
 if TYPE_CHECKING:
     from spook_tracker.scalar_tests.case import ScalarTest
     from spook_tracker.tracker.document.run_document import RunDocument
-    from spook_tracker.tracker.judge.accepted import Accepted
     from spook_tracker.tracker.judge.choice import Choice
     from spook_tracker.tracker.judge.comparison_document import CompareDocument
     from spook_tracker.tracker.judge.tonight import Finding
     from spook_tracker.tracker.past import OldAnswers
     from spook_tracker.tracker.store.history import History
     from spook_tracker.tracker.store.versions import RunInfo
-
-
-@contextmanager
-def history_of(database: str) -> Iterator[History]:
-    """The history in a database, for reading; what is dated ahead is said."""
-    from spook_tracker.tracker.store.history import History
-
-    with History.open(database) as history:
-        if history.ahead:
-            complain(history.dated_ahead())
-        yield history
-
-
-def accepted_levels(file: Path | None = None) -> Sequence[Accepted]:
-    """Entries of accepted.toml in the folder one works in."""
-    from spook_tracker.tracker.judge.accepted import read_accepted
-
-    return read_accepted(file or Path(ACCEPTED))
 
 
 @click.command(
@@ -117,15 +96,16 @@ def compare(
     that V2 builds on. If V1 and V2 are names of engines, they are ranked: which is ahead at equal error, and by what
     factor. The formats comment and annotations are for pull requests, and empty when nothing became worse.
     """
-    from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.judge.choice import Choice
     from spook_tracker.tracker.library import FORK_POINT
     from spook_tracker.tracker.library import compare as compared
 
+    from .console import say
+
     levels, choice = accepted_levels(accepted), Choice(tests=tests, kinds=kinds, roles=roles)
     with history_of(database) as history:
         if form == "table" and _are_engines(history, (before, after)):
-            import spook_tracker.tracker.cli.rank as ranking
+            from . import rank as ranking
 
             say("\n".join(ranking.table_lines(history, (before, after), tests)))  # neither regressed
             return
@@ -137,11 +117,11 @@ def compare(
 
         click.echo(readable(document))
     elif form == "junit":
-        from spook_tracker.tracker.cli.report_junit import junit_of_comparison
+        from .report_junit import junit_of_comparison
 
         click.echo(junit_of_comparison(document), nl=False)
     elif form in ("comment", "annotations"):
-        from spook_tracker.tracker.cli.report_comment import comment, workflow_commands
+        from .report_comment import comment, workflow_commands
 
         words = comment(document) if form == "comment" else workflow_commands(document)
         if words and form == "comment":
@@ -149,11 +129,11 @@ def compare(
         elif words:
             click.echo(words)  # they are meant to be commands, and hold nothing else that is one
     elif form == "markdown":
-        from spook_tracker.tracker.cli.report_compare import compare_markdown
+        from .report_compare import compare_markdown
 
         say(compare_markdown(document).rstrip("\n"))
     else:
-        from spook_tracker.tracker.cli.report_compare import compare_table
+        from .report_compare import compare_table
 
         say(compare_table(document, everything))
     _exit_as(document, fail_on)
@@ -222,10 +202,11 @@ def judge_command(
     machines within a day is reported, too. Exit code 1 if anything is red; 3 if the run measured nothing, or if some
     values of old questions could not be compared.
     """
-    from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.report_compare import finding_lines, findings_json, old_answer_lines
     from spook_tracker.tracker.judge.choice import Choice
     from spook_tracker.tracker.library import idle_entries, judge_run
+
+    from .console import say
+    from .report_compare import finding_lines, findings_json, old_answer_lines
 
     refuse_unwritable(junit_file)
     kept = True
@@ -237,7 +218,7 @@ def judge_command(
         findings = choice.of_findings(findings)
         then = _by_old_questions(history, history.resolve(run), findings, choice) if old_questions else []
     if junit_file:
-        from spook_tracker.tracker.cli.report_junit import junit_of_night
+        from .report_junit import junit_of_night
 
         kept = write(junit_file, junit_of_night(findings, then))
     if as_json:
@@ -259,8 +240,9 @@ def _by_old_questions(
 ) -> list[OldAnswers]:
     """Answers of this engine to the questions of earlier commits, in the repository where one stands."""
     import spook_tracker.tracker.past as past
-    from spook_tracker.tracker.cli.past import KEPT
     from spook_tracker.tracker.measure.commits import ask_today, checked_out, repository_at
+
+    from .past import KEPT
 
     repository = repository_at(Path.cwd())
     kept = Path(KEPT).resolve()
@@ -305,10 +287,11 @@ def trend(
 
     Exit code 1 if one of them is red in its newest night.
     """
-    from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.judge.choice import Choice
     from spook_tracker.tracker.library import trend as told_of
     from spook_tracker.tracker.library import trend_of_maps
+
+    from .console import say
 
     levels, choice = accepted_levels(accepted), Choice(kinds=kinds, roles=roles)
     with history_of(database) as history:
@@ -321,11 +304,11 @@ def trend(
     )
     code = RED if red else 0
     if as_json:
-        from spook_tracker.tracker.cli.report_json import trend_json
+        from .report_json import trend_json
 
         click.echo(trend_json(trends, maps))
         click.get_current_context().exit(code)
-    from spook_tracker.tracker.cli.report_trend import (
+    from .report_trend import (
         FEW,
         gates_first,
         map_lines,
@@ -372,9 +355,10 @@ def list_tests(
     from contextlib import nullcontext
     from fnmatch import fnmatchcase
 
-    from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.report_catalogue import catalogue_table
     from spook_tracker.tracker.measure.run import Questions
+
+    from .console import say
+    from .report_catalogue import catalogue_table
 
     source = Questions(
         catalogue=catalogue, engine=engine, limits=present().limits_of(engine), folder=present().modules
@@ -387,8 +371,8 @@ def list_tests(
         and (not roles or {metric.role for _, metric in test.metrics()} & set(roles))
     }
     if coverage:
-        from spook_tracker.tracker.cli.report_catalogue import coverage_rows, coverage_table
-        from spook_tracker.tracker.cli.report_json import coverage_json
+        from .report_catalogue import coverage_rows, coverage_table
+        from .report_json import coverage_json
 
         unmeasured = database == DEFAULT_DATABASE and not Path(database.removeprefix("sqlite:///")).exists()
         with nullcontext() if unmeasured else history_of(database) as history:
@@ -398,7 +382,7 @@ def list_tests(
         else:
             say(coverage_table(rows))
     elif as_json:
-        from spook_tracker.tracker.cli.report_json import list_json
+        from .report_json import list_json
 
         click.echo(list_json(found))
     else:
@@ -426,9 +410,10 @@ def _kinds_of(test: ScalarTest) -> set[str]:
 @source_options
 def show(test: str, form: str, as_json: bool, engine: str, catalogue: str) -> None:
     """Show one test: question, model, theory, limits and their sources."""
-    from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.report_catalogue import card
     from spook_tracker.tracker.measure.run import Questions, select
+
+    from .console import say
+    from .report_catalogue import card
 
     tests = select(
         Questions(
@@ -437,7 +422,7 @@ def show(test: str, form: str, as_json: bool, engine: str, catalogue: str) -> No
         [test],
     )
     if as_json:
-        from spook_tracker.tracker.cli.report_json import show_json
+        from .report_json import show_json
 
         click.echo(show_json(test, tests[test]))
     elif form == "mjcf":
@@ -457,11 +442,12 @@ def show(test: str, form: str, as_json: bool, engine: str, catalogue: str) -> No
 @source_options
 def explain(test: str, cost: bool, as_json: bool, engine: str, catalogue: str) -> None:
     """Say which stages of the engine a test's scene needs, which are left out, and why."""
-    from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.report_catalogue import stage_table
     from spook_tracker.tracker.measure.cards import explained
     from spook_tracker.tracker.measure.run import Questions, select
     from spook_tracker.tracker.measure.step_cost import leaving_out, step_cost
+
+    from .console import say
+    from .report_catalogue import stage_table
 
     source = Questions(
         catalogue=catalogue, engine=engine, limits=present().limits_of(engine), folder=present().modules
@@ -474,7 +460,7 @@ def explain(test: str, cost: bool, as_json: bool, engine: str, catalogue: str) -
         out = leaving_out(tests[test], simulate)
         costs = step_cost(tests[test], simulate)
     if as_json:
-        from spook_tracker.tracker.cli.report_json import explain_json
+        from .report_json import explain_json
 
         click.echo(explain_json(test, explained(tests[test], source.module()), costs, out))
     else:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from spook_tracker.tracker.cli.options import example
+from .options import example
 
 
 @click.command("init", epilog=example("tracker init pebble", "tracker init mujoco"))
@@ -39,7 +39,8 @@ def init(engine: str, build: str, url: str) -> None:
         home,
         write_first_files,
     )
-    from spook_tracker.tracker.cli.console import say
+
+    from .console import say
 
     here, at = Path.cwd(), home(url)
     files = first_files(engine, build or build_command(here), at)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from spook_tracker.tracker.cli.options import example
+from .options import example
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.measure.model_packages import Looked
@@ -44,9 +44,10 @@ def models_command(
     workers: int,
 ) -> None:
     """List the MJCF, URDF and SDF files of installed packages, and say which are models and which load."""
-    from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.report_models import markdown_of, standing_lines
     from spook_tracker.tracker.measure.model_packages import files_of, loaded, looked_at, stood
+
+    from .console import say
+    from .report_models import markdown_of, standing_lines
 
     paths = [path for package in packages for path in files_of(package)]
     if not paths:

@@ -19,8 +19,9 @@ from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 import click
 
-import spook_tracker.tracker.cli.settings as tracker_toml
 from spook_tracker.tracker.measure.bounds import LOOK, MEMORY, TIME_LIMIT
+
+from . import settings as tracker_toml
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.website.options import SiteOptions

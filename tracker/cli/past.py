@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from spook_tracker.tracker.cli.filters import kind_options
-from spook_tracker.tracker.cli.options import RED, accepted_option, database_option, example
-from spook_tracker.tracker.cli.settings import present
+from .filters import kind_options
+from .options import RED, accepted_option, database_option, example
+from .settings import present
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.run_document import RunDocument
@@ -51,10 +51,11 @@ def bisect(
     found.
     """
     import spook_tracker.tracker.past as past
-    from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.report_compare import red_lines
     from spook_tracker.tracker.judge.choice import Choice
     from spook_tracker.tracker.measure.commits import subject
+
+    from .console import say
+    from .report_compare import red_lines
 
     repository, measure = _commits(folder.resolve(), (test,), say)
     if good is None or bad is None:
@@ -80,9 +81,10 @@ def bisect(
 
 def _from_history(test: str, accepted: Path | None, database: str) -> tuple[str, str]:
     """The narrowest range of commits that the history blames for what is red in a test now."""
-    from spook_tracker.tracker.cli.history import accepted_levels, history_of
     from spook_tracker.tracker.document.errors import UnknownName
     from spook_tracker.tracker.library import trend
+
+    from .recorded import accepted_levels, history_of
 
     with history_of(database) as history:
         ends = []
@@ -102,11 +104,12 @@ def backfill_commits(
     names: Sequence[str], tests: Sequence[str], options: Sequence[str], folder: Path, database: str
 ) -> None:
     """Measure and record commits, oldest first; one that is recorded already is left as it is."""
-    from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.library import record
     from spook_tracker.tracker.measure.commits import CommitError, commits_named
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.history import History
+
+    from .console import say
 
     repository, measure = _commits(folder.resolve(), tests, say)
     commits = commits_named(repository, names)

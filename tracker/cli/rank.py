@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from spook_tracker.tracker.cli.filters import test_option
-from spook_tracker.tracker.cli.options import database_option, example
+from .filters import test_option
+from .options import database_option, example
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.run_document import EngineVersion, Sample, SeriesDefinition
@@ -29,8 +29,8 @@ def rank(engines: tuple[str, ...], tests: tuple[str, ...], database: str) -> Non
     ENGINE is a name or name@version; by default every recorded engine. A name stands for the latest run; tests that it
     did not include are taken from earlier runs on the same machine, of the same version or of earlier commits.
     """
-    from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.history import history_of
+    from .console import say
+    from .recorded import history_of
 
     with history_of(database) as history:
         names = engines or tuple(dict.fromkeys(run.engine.name for run in history.runs()))
@@ -46,8 +46,9 @@ def table_lines(history: History, names: Sequence[str], tests: Sequence[str] = (
     from fnmatch import fnmatchcase
 
     import spook_tracker.tracker.judge.rank as ranks
-    from spook_tracker.tracker.cli.console import NARROW, Column, clean, table, width
     from spook_tracker.tracker.document.wording import day
+
+    from .console import NARROW, Column, clean, table, width
 
     runs = {name: history.resolve(name if "@" in name else f"{name}@latest") for name in names}
     titles = _titles([run.engine for run in runs.values()])
@@ -126,7 +127,7 @@ def _time(seconds: float | None) -> str:
 
 def _ahead(leads: Sequence[Lead], errors: Sequence[float]) -> list[str]:
     """Scenes down, errors across: which gets there first, and by what factor."""
-    from spook_tracker.tracker.cli.console import Column, table, width
+    from .console import Column, table, width
 
     if not leads:
         return ["neither reaches any of these errors"]

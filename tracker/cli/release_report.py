@@ -7,7 +7,6 @@ import textwrap
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
-from spook_tracker.tracker.cli.release_models import model_page, only_models, without_models
 from spook_tracker.tracker.judge.comparison_document import Change
 from spook_tracker.tracker.judge.release_notes import (
     Changelog,
@@ -28,6 +27,8 @@ from spook_tracker.tracker.judge.release_order import (
     scenes,
     told_of,
 )
+
+from .release_models import model_page, only_models, without_models
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.store.history import History

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from spook_tracker.tracker.cli.options import (
+from .options import (
     Seconds,
     catalogue_option,
     database_option,
@@ -92,12 +92,13 @@ def backfill(
     """
     import spook_tracker.tracker.measure.catalogues as catalogues
     import spook_tracker.tracker.measure.releases as releases
-    from spook_tracker.tracker.cli.console import say
+
+    from .console import say
 
     if engine is None:
-        from spook_tracker.tracker.cli.change import run_options
-        from spook_tracker.tracker.cli.past import KEPT as COMMITS
-        from spook_tracker.tracker.cli.past import backfill_commits
+        from .change import run_options
+        from .past import KEPT as COMMITS
+        from .past import backfill_commits
 
         if not versions:
             raise click.UsageError(
@@ -125,8 +126,9 @@ def backfill(
         say(f"the releases in {folder} take {taken:.0f} MB; delete the folder when you are done measuring")
     _tell(engine, database, None, False)
     if out is not None:
-        from spook_tracker.tracker.cli.history import accepted_levels
         from spook_tracker.tracker.library import History, publish
+
+        from .recorded import accepted_levels
 
         with History.open(database) as history:
             publish(history, out, accepted_levels(None))
@@ -198,10 +200,11 @@ def releases_command(engine: str, changelog: Path | None, markdown: bool, databa
 
 
 def _tell(engine: str, database: str, changelog: Path | None, markdown: bool) -> None:
-    from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.history import history_of
-    from spook_tracker.tracker.cli.release_report import page, steps_between, text_lines
     from spook_tracker.tracker.judge.release_notes import read_changelog
+
+    from .console import say
+    from .recorded import history_of
+    from .release_report import page, steps_between, text_lines
 
     read = None if changelog is None else read_changelog(changelog)
     with history_of(database) as history:

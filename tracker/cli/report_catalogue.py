@@ -10,13 +10,14 @@ from typing import TYPE_CHECKING
 import click
 
 from spook_tracker.scalar_tests.case import LimitKind, Measurement, Metric, ScalarTest
-from spook_tracker.tracker.cli.console import Column, table, width
-from spook_tracker.tracker.cli.report_sweep import seconds
-from spook_tracker.tracker.cli.report_table import number
 from spook_tracker.tracker.document.coverage import HEADINGS, Coverage, Rungs, coverage, rungs, summary
 from spook_tracker.tracker.document.coverage import saved as told_saving
 from spook_tracker.tracker.measure.cards import explained
 from spook_tracker.tracker.measure.step_cost import LeavingOut, StepCost
+
+from .console import Column, table, width
+from .report_sweep import seconds
+from .report_table import number
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.measure.questions import Engine

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from spook_tracker.tracker.cli.report_comment import command_of
-from spook_tracker.tracker.cli.report_compare import escape, summary, value
 from spook_tracker.tracker.document.addresses import page_of
 from spook_tracker.tracker.document.wording import clock, version
 from spook_tracker.tracker.judge.causes import causes_tonight
 from spook_tracker.tracker.judge.tonight import Finding
+
+from .report_comment import command_of
+from .report_compare import escape, summary, value
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.store.versions import RunInfo

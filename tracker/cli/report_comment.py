@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from spook_tracker.tracker.cli.report_compare import both, escape, name_of, red_lines, where
 from spook_tracker.tracker.document.wording import clean
 from spook_tracker.tracker.judge.choice import worst_change
 from spook_tracker.tracker.judge.comparison_document import CompareDocument
+
+from .report_compare import both, escape, name_of, red_lines, where
 
 MOST = 10  # series in a comment: more are counted
 

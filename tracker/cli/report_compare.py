@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from spook_tracker.tracker.cli.console import NARROW, Column, clean, table, width
 from spook_tracker.tracker.document.addresses import page_of
 from spook_tracker.tracker.document.json_form import Number, readable
 from spook_tracker.tracker.judge.causes import causes_tonight
@@ -20,6 +19,8 @@ from spook_tracker.tracker.judge.judged import BY_TIME, Judged
 from spook_tracker.tracker.judge.tonight import Finding, not_compared
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import OVERALL, QUIET, WORDS, besides, spaced
+
+from .console import NARROW, Column, clean, table, width
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.json_form import Writable

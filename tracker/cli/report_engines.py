@@ -5,7 +5,8 @@ from __future__ import annotations
 import textwrap
 
 from spook_tracker.engine.find import EngineMissing, find, known
-from spook_tracker.tracker.cli.console import width
+
+from .console import width
 
 
 def engine_lines() -> list[str]:

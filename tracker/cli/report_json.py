@@ -6,12 +6,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from spook_tracker.scalar_tests.case import ScalarTest
-from spook_tracker.tracker.cli.report_compare import accused
 from spook_tracker.tracker.document.coverage import HEADINGS, Coverage
 from spook_tracker.tracker.document.json_form import Number, Writable, readable
 from spook_tracker.tracker.judge.judged import Judged
 from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.series_history import Told
+
+from .report_compare import accused
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.measure.questions import Stage

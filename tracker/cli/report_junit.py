@@ -9,14 +9,15 @@ from typing import TYPE_CHECKING, NamedTuple
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import spook_tracker.tracker.document.outside as outside
-from spook_tracker.tracker.cli.report_compare import red_line, where
-from spook_tracker.tracker.cli.report_table import limit, measured, pairs
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
 from spook_tracker.tracker.judge.events import in_full
 from spook_tracker.tracker.judge.standing import FOLLOWED, is_red
 from spook_tracker.tracker.judge.tonight import Finding
 from spook_tracker.tracker.judge.vocabulary import WORSE_THAN_EXPECTED
+
+from .report_compare import red_line, where
+from .report_table import limit, measured, pairs
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.past import OldAnswers

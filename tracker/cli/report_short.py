@@ -7,8 +7,11 @@ from collections import Counter
 
 import click
 
-from spook_tracker.tracker.cli.console import Column, table, width
-from spook_tracker.tracker.cli.report_table import (
+from spook_tracker.tracker.document.run_document import RunDocument
+from spook_tracker.tracker.judge.standing import FOLLOWED, is_red
+
+from .console import Column, table, width
+from .report_table import (
     Pair,
     failures,
     limit,
@@ -21,8 +24,6 @@ from spook_tracker.tracker.cli.report_table import (
     verdict_styles,
     word,
 )
-from spook_tracker.tracker.document.run_document import RunDocument
-from spook_tracker.tracker.judge.standing import FOLLOWED, is_red
 
 FEW = 3  # tests of which every limit is shown
 COLUMNS = (

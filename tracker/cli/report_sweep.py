@@ -7,10 +7,11 @@ from collections.abc import Sequence
 
 import click
 
-from spook_tracker.tracker.cli.console import NARROW, Column, table
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
 from spook_tracker.tracker.judge.standing import NO_VALUE
 from spook_tracker.tracker.judge.vocabulary import spaced
+
+from .console import NARROW, Column, table
 
 Pair = tuple[SeriesDefinition, Sample]
 

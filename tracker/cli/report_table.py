@@ -9,8 +9,6 @@ from collections.abc import Sequence
 
 import click
 
-from spook_tracker.tracker.cli.console import NARROW, Column, Style, cells, clean, table, width
-from spook_tracker.tracker.cli.report_sweep import sweep_table
 from spook_tracker.tracker.document.run_document import (
     LEFT_OUT,
     MapData,
@@ -31,6 +29,9 @@ from spook_tracker.tracker.judge.standing import (
 )
 from spook_tracker.tracker.judge.verdict import cell_rank
 from spook_tracker.tracker.judge.vocabulary import CLASSES
+
+from .console import NARROW, Column, Style, cells, clean, table, width
+from .report_sweep import sweep_table
 
 NAMED = 24  # columns that tell one metric's configurations apart; where fewer are left, the margin goes
 ROLES = {"gate": 0, "companion": 1, "reported": 2, "explaining": 3}

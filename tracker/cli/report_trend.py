@@ -8,8 +8,6 @@ from collections.abc import Iterator, Sequence
 
 import click
 
-from spook_tracker.tracker.cli.console import NARROW, Column, clean, sparkline, table, width
-from spook_tracker.tracker.cli.report_table import ROLES, limit, number
 from spook_tracker.tracker.document.run_document import Run, SeriesDefinition
 from spook_tracker.tracker.document.wording import day
 from spook_tracker.tracker.judge.events import in_full, name_of
@@ -17,6 +15,9 @@ from spook_tracker.tracker.judge.judged import BY_TIME, Judged, blame, commit_of
 from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.series_history import Told, is_noisy, lanes_of, on_one_clock
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, STATES, besides, spaced
+
+from .console import NARROW, Column, clean, sparkline, table, width
+from .report_table import ROLES, limit, number
 
 FEW = 6  # series that are shown night by night; of more, those that are red
 SMALL = 12  # columns of a small sparkline

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from spook_tracker.tracker.cli.filters import json_option
-from spook_tracker.tracker.cli.options import database_option, example
+from .filters import json_option
+from .options import database_option, example
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.store.partition import Kind
@@ -33,9 +33,10 @@ if TYPE_CHECKING:
 @database_option
 def export(versions: tuple[str, ...], out: Path | None, form: str, database: str) -> None:
     """Write runs (all, or those named) as JSON documents, or all values as one table."""
-    from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.history import history_of
     from spook_tracker.tracker.store.transfer import encoded, export_runs
+
+    from .console import say
+    from .recorded import history_of
 
     if form != "json" and (out is None or (versions and form == "months")):
         raise click.UsageError(
@@ -156,10 +157,11 @@ def upgrade(database: str) -> None:
 @database_option
 def check(database: str) -> None:
     """Check everything that is stored; exit code 1 if anything is wrong."""
-    from spook_tracker.tracker.cli.console import say
-    from spook_tracker.tracker.cli.options import RED
     from spook_tracker.tracker.store.database import open_database
     from spook_tracker.tracker.store.database_check import check as faults_of
+
+    from .console import say
+    from .options import RED
 
     opened = open_database(database, readonly=True)
     try:
@@ -202,10 +204,11 @@ def partition(kind: Kind) -> None:
 @database_option
 def stats(as_json: bool, database: str) -> None:
     """Print how much is stored."""
-    from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.store.damage import told_of_damage
     from spook_tracker.tracker.store.database import open_database
     from spook_tracker.tracker.store.storage_counts import statistics
+
+    from .console import say
 
     opened = open_database(database, readonly=True)
     try:
@@ -214,7 +217,7 @@ def stats(as_json: bool, database: str) -> None:
     finally:
         opened.dispose()
     if as_json:
-        from spook_tracker.tracker.cli.report_json import stats_json
+        from .report_json import stats_json
 
         click.echo(stats_json(found))
         return
@@ -232,11 +235,12 @@ def stats(as_json: bool, database: str) -> None:
 @database_option
 def remove(run: str, database: str) -> None:
     """Remove a run from the history for good, named by id, start of id, or version."""
-    from spook_tracker.tracker.cli.console import say
     from spook_tracker.tracker.document.wording import clean, clock, version
     from spook_tracker.tracker.store.database import session_on
     from spook_tracker.tracker.store.history import History
     from spook_tracker.tracker.store.remove import remove as take_out
+
+    from .console import say
 
     with session_on(database) as session:
         found = History(session).resolve(run)

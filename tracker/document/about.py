@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from datetime import UTC, datetime
 from typing import TYPE_CHECKING
 
-from spook_tracker.tracker.document.wording import instant
+from .wording import instant
 
 if TYPE_CHECKING:
-    from spook_tracker.tracker.document.run_document import Run
+    from .run_document import Run
 
 
 def about(runs: Sequence[Run]) -> str:

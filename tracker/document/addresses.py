@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from spook_tracker.tracker.document.wording import slug
+from .wording import slug
 
 
 def page_of(test: str) -> str:

@@ -9,8 +9,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from spook_tracker.tracker.document.run_document import Sample, Saving, SeriesDefinition
-from spook_tracker.tracker.document.wording import number
+from .run_document import Sample, Saving, SeriesDefinition
+from .wording import number
 
 SMALL = 1e-4  # an error that every ladder should come down to, in its own unit
 HEADINGS = ("Error against run time", "Stability", "Leaving out")

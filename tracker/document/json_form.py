@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import msgspec
 
-from spook_tracker.tracker.document.outside import escaped
+from .outside import escaped
 
 SPECIAL = ("nan", "inf", "-inf")  # how JSON says what is not finite
 Part = TypeVar("Part")

@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from itertools import combinations, pairwise
 
-from spook_tracker.tracker.document.middle import median
+from .middle import median
 
 FEWEST_POINTS = 3
 

@@ -8,7 +8,7 @@ from itertools import chain, repeat
 from operator import sub
 from typing import overload
 
-from spook_tracker.tracker.document.run_document import Point, Runs, Said, Sample, SeriesDefinition
+from .run_document import Point, Runs, Said, Sample, SeriesDefinition
 
 
 class Stretches(Sequence[Said]):

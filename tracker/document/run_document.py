@@ -14,7 +14,7 @@ from typing import Annotated, Literal, NamedTuple, Protocol
 
 import msgspec
 
-from spook_tracker.tracker.document.json_form import Number, Numbers
+from .json_form import Number, Numbers
 
 SCHEMA_VERSION = 1
 

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
-from spook_tracker.tracker.document.json_form import schema_hook
-from spook_tracker.tracker.document.run_document import SCHEMA_VERSION, RunDocument
+from .json_form import schema_hook
+from .run_document import SCHEMA_VERSION, RunDocument
 
 if TYPE_CHECKING:
-    from spook_tracker.tracker.document.json_form import Writable
+    from .json_form import Writable
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
 

@@ -11,8 +11,8 @@ import re
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-import spook_tracker.tracker.document.outside as outside
-from spook_tracker.tracker.document.run_document import EngineVersion, SeriesDefinition
+from . import outside
+from .run_document import EngineVersion, SeriesDefinition
 
 clean = outside.clean  # the website takes it from here
 SUPERSCRIPTS = str.maketrans("0123456789-", "⁰¹²³⁴⁵⁶⁷⁸⁹⁻")

@@ -14,14 +14,15 @@ from typing import Literal
 
 from spook_tracker.tracker.document.run_document import Point, Run, Runs, SeriesDefinition
 from spook_tracker.tracker.document.wording import number, times
-from spook_tracker.tracker.judge.events import name_of
-from spook_tracker.tracker.judge.judged import Judged, blame
-from spook_tracker.tracker.judge.repeats import Nights
-from spook_tracker.tracker.judge.series_history import Told
-from spook_tracker.tracker.judge.standing import expected
-from spook_tracker.tracker.judge.tonight import Finding, least_of_none
-from spook_tracker.tracker.judge.verdict import limit_ratio, worse_times
-from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class
+
+from .events import name_of
+from .judged import Judged, blame
+from .repeats import Nights
+from .series_history import Told
+from .standing import expected
+from .tonight import Finding, least_of_none
+from .verdict import limit_ratio, worse_times
+from .vocabulary import CLASS_RANK, Class
 
 Standing = Literal["detected", "accepted", "recovered"]
 STANDINGS: tuple[Standing, ...] = ("detected", "accepted", "recovered")  # the worst first

@@ -18,12 +18,13 @@ from spook_tracker.tracker.document.json_form import encode
 from spook_tracker.tracker.document.kept import Kept
 from spook_tracker.tracker.document.points import Points
 from spook_tracker.tracker.document.run_document import Point, Run, Runs, Said
-from spook_tracker.tracker.judge import lane
-from spook_tracker.tracker.judge.exact_values import KnownValue, Series, judge_on
-from spook_tracker.tracker.judge.judged import Judged
-from spook_tracker.tracker.judge.lane import asked_whole, settled_nights
-from spook_tracker.tracker.judge.repeats import Earlier, Nights
-from spook_tracker.tracker.judge.vocabulary import Class
+
+from . import lane
+from .exact_values import KnownValue, Series, judge_on
+from .judged import Judged
+from .lane import asked_whole, settled_nights
+from .repeats import Earlier, Nights
+from .vocabulary import Class
 
 LATE = 144  # nights that are always judged again: more than any page shows one by one
 STEP = 64  # nights by which the checkpoint moves at once

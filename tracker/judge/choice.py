@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from spook_tracker.tracker.document.errors import UnknownName
-from spook_tracker.tracker.judge.vocabulary import CLASS_RANK
+
+from .vocabulary import CLASS_RANK
 
 if TYPE_CHECKING:
-    from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument
-    from spook_tracker.tracker.judge.maps import ToldMap
-    from spook_tracker.tracker.judge.series_history import Told
-    from spook_tracker.tracker.judge.tonight import Finding
+    from .comparison_document import Change, CompareDocument
+    from .maps import ToldMap
+    from .series_history import Told
+    from .tonight import Finding
 
 OF_MAP = ("map", "companion")  # kind and role of a stability map
 
@@ -73,7 +74,7 @@ class Choice:
         """The comparison of those alone, with a verdict of its own."""
         if self == Choice():
             return document
-        from spook_tracker.tracker.judge.compare import exit_code, overall
+        from .compare import exit_code, overall
 
         changes = tuple(c for c in document.changes if self.takes(c.test, c.kind, c.role))
         self._some(changes, document.changes)

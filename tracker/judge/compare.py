@@ -15,13 +15,14 @@ from typing import Literal
 import msgspec
 
 from spook_tracker.tracker.document.run_document import MapData, Run, Sample, SeriesDefinition
-from spook_tracker.tracker.judge.accepted import Accepted, acceptance
-from spook_tracker.tracker.judge.compare_ladders import frontiers, run_times
-from spook_tracker.tracker.judge.comparison_document import Change, CompareDocument, Side
-from spook_tracker.tracker.judge.explaining import TIMES, beside_run_times, calm
-from spook_tracker.tracker.judge.judged import BY_TIME, Judged, of_one_lineage, red_class
-from spook_tracker.tracker.judge.known import Known, known, newest_in
-from spook_tracker.tracker.judge.lane import (
+
+from .accepted import Accepted, acceptance
+from .compare_ladders import frontiers, run_times
+from .comparison_document import Change, CompareDocument, Side
+from .explaining import TIMES, beside_run_times, calm
+from .judged import BY_TIME, Judged, of_one_lineage, red_class
+from .known import Known, known, newest_in
+from .lane import (
     Records,
     asked_for,
     asked_in,
@@ -30,14 +31,14 @@ from spook_tracker.tracker.judge.lane import (
     line_of,
     run_time_histories,
 )
-from spook_tracker.tracker.judge.maps import NO_MAP, map_key, stands_of
-from spook_tracker.tracker.judge.series_history import Told, judge_all
-from spook_tracker.tracker.judge.slower import CONFIRM, Usual, judge_time, only_followed, to_be_confirmed
-from spook_tracker.tracker.judge.standing import FOLLOWED, NO_VALUE, honest, standing
-from spook_tracker.tracker.judge.tonight import not_compared
-from spook_tracker.tracker.judge.verdict import Verdict, judge, judge_map
-from spook_tracker.tracker.judge.vocabulary import OVERALL, RED, WORD_RANK, Class, Overall, Word
-from spook_tracker.tracker.judge.work import families_of, is_read_off
+from .maps import NO_MAP, map_key, stands_of
+from .series_history import Told, judge_all
+from .slower import CONFIRM, Usual, judge_time, only_followed, to_be_confirmed
+from .standing import FOLLOWED, NO_VALUE, honest, standing
+from .tonight import not_compared
+from .verdict import Verdict, judge, judge_map
+from .vocabulary import OVERALL, RED, WORD_RANK, Class, Overall, Word
+from .work import families_of, is_read_off
 
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 MOST_NAMES = 5  # of series, in a note

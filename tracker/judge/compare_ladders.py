@@ -12,10 +12,11 @@ from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.middle import median
 from spook_tracker.tracker.document.order import least_cost
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition, Timing
-from spook_tracker.tracker.judge.calibration import geometric_mean, that_counts, unquiet_kernel
-from spook_tracker.tracker.judge.comparison_document import Change, Frontier
-from spook_tracker.tracker.judge.timing_statistics import compare_times
-from spook_tracker.tracker.judge.vocabulary import Word
+
+from .calibration import geometric_mean, that_counts, unquiet_kernel
+from .comparison_document import Change, Frontier
+from .timing_statistics import compare_times
+from .vocabulary import Word
 
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]
 Rung = tuple[SeriesDefinition, Sample, Sample]

@@ -9,7 +9,8 @@ from typing import Literal
 
 from spook_tracker.tracker.document.json_form import Number, schema_hook
 from spook_tracker.tracker.document.run_document import Name, OutcomeClass, Struct, Text
-from spook_tracker.tracker.judge.vocabulary import Class, Overall, Word
+
+from .vocabulary import Class, Overall, Word
 
 COMPARE_SCHEMA_VERSION = 1
 

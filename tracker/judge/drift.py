@@ -6,10 +6,11 @@ import math
 from dataclasses import dataclass, field
 
 from spook_tracker.tracker.document.middle import median
-from spook_tracker.tracker.judge.level import CREEP, PresentLevel
-from spook_tracker.tracker.judge.noisy import Noisy
-from spook_tracker.tracker.judge.slower import change_in_words
-from spook_tracker.tracker.judge.verdict import Verdict
+
+from .level import CREEP, PresentLevel
+from .noisy import Noisy
+from .slower import change_in_words
+from .verdict import Verdict
 
 LONG = 3  # times the nights whose middle tells a drift, before it is gone
 

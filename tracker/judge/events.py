@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from spook_tracker.tracker.document.run_document import Run, SeriesDefinition
-from spook_tracker.tracker.judge.judged import Judged
-from spook_tracker.tracker.judge.series_history import Told
-from spook_tracker.tracker.judge.vocabulary import Class, Word
+
+from .judged import Judged
+from .series_history import Told
+from .vocabulary import Class, Word
 
 Standing = Literal["detected", "accepted", "recovered"]
 

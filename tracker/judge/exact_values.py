@@ -31,12 +31,13 @@ from spook_tracker.tracker.document.run_document import (
     Sample,
     SeriesDefinition,
 )
-from spook_tracker.tracker.judge.accepted import Accepted, acceptance
-from spook_tracker.tracker.judge.judged import Judged, commit_of, is_release, night_of, red_class, same_commit
-from spook_tracker.tracker.judge.repeats import Nights
-from spook_tracker.tracker.judge.standing import NOT_SUPPORTED, standing
-from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict, judge, same_bits
-from spook_tracker.tracker.judge.vocabulary import WORSE_THAN_EXPECTED, Class
+
+from .accepted import Accepted, acceptance
+from .judged import Judged, commit_of, is_release, night_of, red_class, same_commit
+from .repeats import Nights
+from .standing import NOT_SUPPORTED, standing
+from .verdict import NEW_DEFINITION, Verdict, judge, same_bits
+from .vocabulary import WORSE_THAN_EXPECTED, Class
 
 LONG_DRIFT = 5.0  # tolerances a series may lose over many releases before that is called drift, too
 UNASKED = Verdict(word="not_comparable", sentence="not supported by this engine")

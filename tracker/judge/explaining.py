@@ -14,13 +14,14 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
-from spook_tracker.tracker.judge.calibration import geometric_mean
-from spook_tracker.tracker.judge.comparison_document import Change
-from spook_tracker.tracker.judge.repeats import Nights
+
+from .calibration import geometric_mean
+from .comparison_document import Change
+from .repeats import Nights
 
 if TYPE_CHECKING:
-    from spook_tracker.tracker.judge.judged import Judged
-    from spook_tracker.tracker.judge.tonight import Finding
+    from .judged import Judged
+    from .tonight import Finding
 
 EXPLAINING = "explaining"
 TIMES = ("time", "run_time")

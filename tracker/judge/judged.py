@@ -12,11 +12,12 @@ import msgspec
 
 from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import Point, Run, Sample
-from spook_tracker.tracker.judge.segments import Segment
-from spook_tracker.tracker.judge.slower import FLAKY, Usual
-from spook_tracker.tracker.judge.standing import NO_NUMBER
-from spook_tracker.tracker.judge.verdict import Verdict
-from spook_tracker.tracker.judge.vocabulary import Class, State
+
+from .segments import Segment
+from .slower import FLAKY, Usual
+from .standing import NO_NUMBER
+from .verdict import Verdict
+from .vocabulary import Class, State
 
 RELEASE = re.compile(r"v?\d+(\.\d+)*")
 BY_TIME = "ordered by time, as neither parents nor git here tell how these commits descend from each other"

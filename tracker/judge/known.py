@@ -7,11 +7,12 @@ from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from spook_tracker.tracker.document.run_document import Point, Runs
-from spook_tracker.tracker.judge.judged import Judged, blame_of, commit_of
-from spook_tracker.tracker.judge.level import FEW_NIGHTS_FLOOR
-from spook_tracker.tracker.judge.repeats import Nights
-from spook_tracker.tracker.judge.series_history import Told, on_one_clock
-from spook_tracker.tracker.judge.slower import Usual
+
+from .judged import Judged, blame_of, commit_of
+from .level import FEW_NIGHTS_FLOOR
+from .repeats import Nights
+from .series_history import Told, on_one_clock
+from .slower import Usual
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -25,8 +25,9 @@ from spook_tracker.tracker.document.run_document import (
     SeriesDefinition,
     SeriesHistory,
 )
-from spook_tracker.tracker.judge.calibration import ladder_timing, that_counts
-from spook_tracker.tracker.judge.work import FAMILIES, Samples, Sums, families_of, with_work
+
+from .calibration import ladder_timing, that_counts
+from .work import FAMILIES, Samples, Sums, families_of, with_work
 
 NIGHT = timedelta(days=1)  # runs of several machines within it are of one
 OneRun = TypeVar("OneRun", bound=Run)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from datetime import date
 
-from spook_tracker.tracker.judge.accepted import Accepted
-from spook_tracker.tracker.judge.noisy import Noisy
-from spook_tracker.tracker.judge.segments import Segment
+from .accepted import Accepted
+from .noisy import Noisy
+from .segments import Segment
 
 Walk = Callable[..., tuple[list[Noisy], list[Segment]]]
 

@@ -14,8 +14,9 @@ from functools import partial
 from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.document.middle import median, median_of_sorted
-from spook_tracker.tracker.judge.normal_nights import exceeded
-from spook_tracker.tracker.judge.segments import (
+
+from .normal_nights import exceeded
+from .segments import (
     NORMAL,
     Boundary,
     Standing,
@@ -24,7 +25,7 @@ from spook_tracker.tracker.judge.segments import (
     inner_split,
     middle_and_noise,
 )
-from spook_tracker.tracker.judge.shifts import (
+from .shifts import (
     BASE,
     CLIP,
     FEWEST_BASE,
@@ -35,10 +36,10 @@ from spook_tracker.tracker.judge.shifts import (
     remembered,
     standard_error,
 )
-from spook_tracker.tracker.judge.slower import FROM_NONE, LEAST, worse_by
+from .slower import FROM_NONE, LEAST, worse_by
 
 if TYPE_CHECKING:
-    from spook_tracker.tracker.judge.shifts import Shift, Values
+    from .shifts import Shift, Values
 
 FEWEST_SPAN = min(SPANS)
 WINDOW = 30  # nights that say what is usual, and that are remembered of the segments before

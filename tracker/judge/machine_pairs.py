@@ -14,12 +14,13 @@ from typing import Generic, TypeVar
 from msgspec.structs import replace
 
 from spook_tracker.tracker.document.run_document import MapData, Run, Sample, SeriesDefinition
-from spook_tracker.tracker.judge.compare import exit_code, overall
-from spook_tracker.tracker.judge.comparison_document import CompareDocument
-from spook_tracker.tracker.judge.lane import asked_for, asked_whole, machine_of
-from spook_tracker.tracker.judge.maps import map_key
-from spook_tracker.tracker.judge.vocabulary import WORD_RANK
-from spook_tracker.tracker.judge.work import families_of
+
+from .compare import exit_code, overall
+from .comparison_document import CompareDocument
+from .lane import asked_for, asked_whole, machine_of
+from .maps import map_key
+from .vocabulary import WORD_RANK
+from .work import families_of
 
 OneRun = TypeVar("OneRun", bound=Run)
 Samples = Mapping[str, tuple[SeriesDefinition, Sample]]

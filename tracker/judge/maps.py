@@ -13,12 +13,13 @@ from dataclasses import dataclass
 from functools import cache
 
 from spook_tracker.tracker.document.run_document import MapData, Run
-from spook_tracker.tracker.judge.accepted import Accepted, acceptance
-from spook_tracker.tracker.judge.judged import night_of
-from spook_tracker.tracker.judge.lane import Records, asked_for, is_placed
-from spook_tracker.tracker.judge.verdict import Verdict, judge_map
-from spook_tracker.tracker.judge.vocabulary import Class, State
-from spook_tracker.tracker.judge.work import FAMILIES
+
+from .accepted import Accepted, acceptance
+from .judged import night_of
+from .lane import Records, asked_for, is_placed
+from .verdict import Verdict, judge_map
+from .vocabulary import Class, State
+from .work import FAMILIES
 
 NO_MAP = Verdict(word="missing", sentence="a stability map asked for and not answered", name="missing")
 GIVEN_UP = Verdict(word="accepted", sentence=NO_MAP.sentence)

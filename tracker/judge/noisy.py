@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import NamedTuple
 
-from spook_tracker.tracker.judge.slower import Usual
-from spook_tracker.tracker.judge.verdict import Verdict
-from spook_tracker.tracker.judge.vocabulary import State
+from .slower import Usual
+from .verdict import Verdict
+from .vocabulary import State
 
 
 class Noisy(NamedTuple):

@@ -23,7 +23,8 @@ from functools import lru_cache
 from typing import Literal
 
 from spook_tracker.tracker.document.middle import median
-from spook_tracker.tracker.judge.timing_statistics import ways_of_u
+
+from .timing_statistics import ways_of_u
 
 ERROR = 1e-3  # share of unchanged changes that may be blocked, over all their run times together
 SMALLEST = (

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 
 from spook_tracker.tracker.document.order import time_at_error
 from spook_tracker.tracker.document.run_document import Sample, SeriesDefinition
-from spook_tracker.tracker.judge.standing import against_limit
-from spook_tracker.tracker.judge.vocabulary import Class
+
+from .standing import against_limit
+from .vocabulary import Class
 
 ERRORS = (1e-2, 1e-4, 1e-6)
 STEP = 1.0 / 60.0  # s

@@ -15,9 +15,10 @@ from typing import Any
 
 from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.document.toml_file import read_toml
-from spook_tracker.tracker.judge.comparison_document import Change
-from spook_tracker.tracker.judge.model_words import Moved, severity, words
-from spook_tracker.tracker.judge.release_order import Scene
+
+from .comparison_document import Change
+from .model_words import Moved, severity, words
+from .release_order import Scene
 
 SEEN = 1e-6  # relative: below it a value that changed is rounding to a reader of releases
 NOTHING = 1e-12  # of any unit: below it a value is zero to a reader of releases

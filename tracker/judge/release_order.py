@@ -12,7 +12,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from spook_tracker.tracker.document.run_document import DrawnSolid, TestCard
-from spook_tracker.tracker.judge.comparison_document import Change
+
+from .comparison_document import Change
 
 SHOWN = 3  # changes of one test in a list, and of every other quantity the worst; the database has them all
 

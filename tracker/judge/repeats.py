@@ -10,9 +10,10 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import NamedTuple, overload
 
 from spook_tracker.tracker.document.points import Points
-from spook_tracker.tracker.judge.judged import Judged
-from spook_tracker.tracker.judge.verdict import Verdict
-from spook_tracker.tracker.judge.vocabulary import Class, State
+
+from .judged import Judged
+from .verdict import Verdict
+from .vocabulary import Class, State
 
 IDENTICAL = Verdict(word="identical", sentence="the same bits", ulps=0)
 

@@ -16,8 +16,9 @@ from typing import TypedDict, Unpack
 from msgspec.structs import replace
 
 from spook_tracker.tracker.document.middle import median
-from spook_tracker.tracker.judge.drift import DriftingLevel
-from spook_tracker.tracker.judge.level import (
+
+from .drift import DriftingLevel
+from .level import (
     FLOOR,
     SIGMAS,
     WINDOW,
@@ -26,9 +27,9 @@ from spook_tracker.tracker.judge.level import (
     as_usual,
     way_back,
 )
-from spook_tracker.tracker.judge.noisy import Noisy
-from spook_tracker.tracker.judge.segments import Boundary, Segment, boundary, spread_of, until_the_next
-from spook_tracker.tracker.judge.shifts import (
+from .noisy import Noisy
+from .segments import Boundary, Segment, boundary, spread_of, until_the_next
+from .shifts import (
     BASE,
     FEWEST_BASE,
     MANY,
@@ -40,9 +41,9 @@ from spook_tracker.tracker.judge.shifts import (
     more_of_the_slower,
     shift,
 )
-from spook_tracker.tracker.judge.slower import CONFIRM, LEAST, Usual, change_in_words, flaky, slower
-from spook_tracker.tracker.judge.verdict import Verdict
-from spook_tracker.tracker.judge.vocabulary import with_recoveries
+from .slower import CONFIRM, LEAST, Usual, change_in_words, flaky, slower
+from .verdict import Verdict
+from .vocabulary import with_recoveries
 
 MENDED = 0.25  # of its size: a red level that is left of it is none
 SETTLED = 30  # nights of a segment after which its boundary is known

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Literal
 from spook_tracker.tracker.document.middle import median, median_of_sorted
 
 if TYPE_CHECKING:
-    from spook_tracker.tracker.judge.normal_nights import Values
+    from .normal_nights import Values
 
 Standing = Literal["usual", "red", "accepted", "recovered", "flaky"]
 

@@ -26,9 +26,10 @@ from spook_tracker.tracker.document.run_document import (
     SeriesDefinition,
     SeriesHistory,
 )
-from spook_tracker.tracker.judge.accepted import Accepted, acceptance
-from spook_tracker.tracker.judge.calibration import engines_own, taken_again, unquiet
-from spook_tracker.tracker.judge.exact_values import (
+
+from .accepted import Accepted, acceptance
+from .calibration import engines_own, taken_again, unquiet
+from .exact_values import (
     KnownValue,
     Series,
     begun,
@@ -36,21 +37,21 @@ from spook_tracker.tracker.judge.exact_values import (
     judge_values,
     why_not,
 )
-from spook_tracker.tracker.judge.explaining import calm_nights
-from spook_tracker.tracker.judge.judged import Judged, is_release, night_of, red_class
-from spook_tracker.tracker.judge.lane import looked_at_again
-from spook_tracker.tracker.judge.lent import walk_with
-from spook_tracker.tracker.judge.noisy import Noisy
-from spook_tracker.tracker.judge.repeats import Nights, states_of
-from spook_tracker.tracker.judge.run_times import judged_and_segments
-from spook_tracker.tracker.judge.slower import by_outcome, only_followed
-from spook_tracker.tracker.judge.standing import NOT_SUPPORTED, standing
-from spook_tracker.tracker.judge.verdict import Verdict
-from spook_tracker.tracker.judge.vocabulary import Class, with_recoveries
-from spook_tracker.tracker.judge.work import is_read_off
+from .explaining import calm_nights
+from .judged import Judged, is_release, night_of, red_class
+from .lane import looked_at_again
+from .lent import walk_with
+from .noisy import Noisy
+from .repeats import Nights, states_of
+from .run_times import judged_and_segments
+from .slower import by_outcome, only_followed
+from .standing import NOT_SUPPORTED, standing
+from .verdict import Verdict
+from .vocabulary import Class, with_recoveries
+from .work import is_read_off
 
 if TYPE_CHECKING:
-    from spook_tracker.tracker.judge.checkpoints import Checkpoints
+    from .checkpoints import Checkpoints
 
 NOISY_NIGHTS = 400  # how far back run times are judged again night by night
 

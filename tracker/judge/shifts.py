@@ -17,9 +17,10 @@ from functools import lru_cache
 from typing import TYPE_CHECKING, TypeAlias
 
 from spook_tracker.tracker.document.middle import median_of_sorted
-from spook_tracker.tracker.judge.normal_nights import MEMORY, chance, student
-from spook_tracker.tracker.judge.segments import middle_and_noise
-from spook_tracker.tracker.judge.slower import LEAST
+
+from .normal_nights import MEMORY, chance, student
+from .segments import middle_and_noise
+from .slower import LEAST
 
 if TYPE_CHECKING:  # NumPy takes a fifth of a second to import, and most histories ask for nothing here
     import numpy as np

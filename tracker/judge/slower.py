@@ -7,7 +7,8 @@ import math
 from msgspec.structs import replace
 
 from spook_tracker.tracker.document.run_document import Sample
-from spook_tracker.tracker.judge.verdict import Verdict, called_worse
+
+from .verdict import Verdict, called_worse
 
 FROM_NONE = 1e9  # times as much stands for something in place of a value of 0
 LEAST = 0.01  # relative: no change of a time below is told, whatever the evidence

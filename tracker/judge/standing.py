@@ -14,7 +14,8 @@ from dataclasses import dataclass
 import msgspec
 
 from spook_tracker.tracker.document.run_document import Point, Sample, SeriesDefinition
-from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, Class
+
+from .vocabulary import CLASS_RANK, Class
 
 NOT_SUPPORTED = "not_supported"  # outside the order: an engine cannot be asked this
 FOLLOWED = ("reported", "explaining")  # roles of which nothing is expected

@@ -16,7 +16,8 @@ from functools import lru_cache
 
 from spook_tracker.tracker.document.middle import median
 from spook_tracker.tracker.document.run_document import Timing
-from spook_tracker.tracker.judge.slower import LEAST
+
+from .slower import LEAST
 
 FLOOR = 0.10  # least relative change of run time worth a word, between two sessions by the clock
 CLEAR = 8.0  # spreads: as histories ask of few nights

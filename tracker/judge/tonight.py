@@ -9,19 +9,20 @@ from dataclasses import dataclass, replace
 
 from spook_tracker.tracker.document.about import started
 from spook_tracker.tracker.document.run_document import Run, SeriesDefinition
-from spook_tracker.tracker.judge.accepted import Accepted
-from spook_tracker.tracker.judge.events import name_of
-from spook_tracker.tracker.judge.explaining import beside_findings
-from spook_tracker.tracker.judge.judged import Judged, blame, blame_of, commit_of
-from spook_tracker.tracker.judge.known import judged_in
-from spook_tracker.tracker.judge.lane import NIGHT, Records, histories, line_of, machine_of, of_version
-from spook_tracker.tracker.judge.maps import ToldMap, stands_of, told_maps
-from spook_tracker.tracker.judge.repeats import looked_at
-from spook_tracker.tracker.judge.series_history import Told, is_noisy, judge_all
-from spook_tracker.tracker.judge.slower import FLAKY
-from spook_tracker.tracker.judge.standing import expected
-from spook_tracker.tracker.judge.verdict import NEW_DEFINITION, Verdict, worse_times
-from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, WORSE_THAN_EXPECTED, Class, State
+
+from .accepted import Accepted
+from .events import name_of
+from .explaining import beside_findings
+from .judged import Judged, blame, blame_of, commit_of
+from .known import judged_in
+from .lane import NIGHT, Records, histories, line_of, machine_of, of_version
+from .maps import ToldMap, stands_of, told_maps
+from .repeats import looked_at
+from .series_history import Told, is_noisy, judge_all
+from .slower import FLAKY
+from .standing import expected
+from .verdict import NEW_DEFINITION, Verdict, worse_times
+from .vocabulary import CLASS_RANK, WORSE_THAN_EXPECTED, Class, State
 
 MOST_NAMED = 8  # tests in one sentence
 HOW_TO_COMPARE = (

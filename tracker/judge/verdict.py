@@ -26,8 +26,9 @@ from spook_tracker.tracker.document.run_document import (
     Sensitivity,
     SeriesDefinition,
 )
-from spook_tracker.tracker.judge.standing import HAVE_VALUES, honest
-from spook_tracker.tracker.judge.vocabulary import CALLED_WORSE, RED, Word
+
+from .standing import HAVE_VALUES, honest
+from .vocabulary import CALLED_WORSE, RED, Word
 
 RANK: dict[OutcomeClass, int] = {
     "value": 0,

@@ -12,9 +12,10 @@ import msgspec
 
 from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.tracker.document.run_document import Again, RunDocument, Sample, SeriesDefinition
-from spook_tracker.tracker.measure.ladder import ErrorPoint, ErrorPoints
-from spook_tracker.tracker.measure.questions import Questions
-from spook_tracker.tracker.measure.run import Errors, Progress, Request, Watch, select, timings
+
+from .ladder import ErrorPoint, ErrorPoints
+from .questions import Questions
+from .run import Errors, Progress, Request, Watch, select, timings
 
 
 def timed_again(

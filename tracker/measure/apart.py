@@ -23,13 +23,14 @@ from typing import IO, TextIO
 
 import msgspec
 
-import spook_tracker.tracker.measure.left_behind as left_behind
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.json_form import decode, encode
 from spook_tracker.tracker.document.run_document import RunDocument, keeps_limit
-from spook_tracker.tracker.measure.bounds import PROCESS, START_LIMIT
-from spook_tracker.tracker.measure.questions import EngineUnavailable, Questions, RunError
-from spook_tracker.tracker.measure.request import Interrupted, Progress, Request, Watch
+
+from . import left_behind
+from .bounds import PROCESS, START_LIMIT
+from .questions import EngineUnavailable, Questions, RunError
+from .request import Interrupted, Progress, Request, Watch
 
 LONGEST = 1 << 26  # bytes of a line: twice the largest document that can be stored
 PATIENCE = 10.0  # s in which an interrupted process tells what was finished
@@ -71,7 +72,7 @@ Order = tuple[str, Questions, Request, tuple[bytes | list[str], ...]]
 def run(source: Questions, request: Request, watch: Watch = lambda progress: None) -> RunDocument:
     """As tracker.measure.run.run. RunError also if the process that measures ends before it has told its run."""
     if not request.apart:
-        from spook_tracker.tracker.measure import run as here
+        from . import run as here
 
         return answering(here.run(source, request, watch))
     return answering(_asked("run", source, request, (), watch))
@@ -82,7 +83,7 @@ def timed_again(
 ) -> RunDocument:
     """As tracker.measure.again.timed_again; RunError as for `run`."""
     if not request.apart:
-        from spook_tracker.tracker.measure import again
+        from . import again
 
         return again.timed_again(source, request, document, names, watch)
     found = _asked("timed_again", source, request, (encode(document), sorted(set(names))), watch)
@@ -245,10 +246,10 @@ def serve() -> None:
     os.dup2(2, 1)  # whatever an engine prints is no news
     signal.signal(signal.SIGINT, signal.default_int_handler)  # the parent may have been started deaf to it
     what, source, request, more = pickle.loads(base64.b64decode(order.readline()))
-    from spook_tracker.tracker.measure import again, workers
-    from spook_tracker.tracker.measure import run as here
-    from spook_tracker.tracker.measure.catalogues import import_ours
-    from spook_tracker.tracker.measure.fitting import written
+    from . import again, workers
+    from . import run as here
+    from .catalogues import import_ours
+    from .fitting import written
 
     if what == "run" and request.workers and request.executor == PROCESS:
         if not request.tests:

@@ -22,9 +22,10 @@ import msgspec
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import RunDocument
 from spook_tracker.tracker.document.toml_file import read_toml
-from spook_tracker.tracker.measure.build_settings import FILE, TABLE, Build, build_of
-from spook_tracker.tracker.measure.commit import MOST
-from spook_tracker.tracker.measure.commits import CommitError, check_out, last_words
+
+from .build_settings import FILE, TABLE, Build, build_of
+from .commit import MOST
+from .commits import CommitError, check_out, last_words
 
 LIMIT = 3600.0  # s for one command: what hangs is a commit that cannot be had, and not the end of a search
 
@@ -201,8 +202,9 @@ def _laid_over(questions: Sequence[str], today: Path, home: Path) -> Iterator[No
 def _document(content: bytes, file: Path) -> RunDocument:
     """A run document, or the one run in a file of another tool. CommitError."""
     from spook_tracker.tracker.document.json_form import decode
-    from spook_tracker.tracker.measure.other_tools import of_other_tools
-    from spook_tracker.tracker.measure.short_form import is_short, whole
+
+    from .other_tools import of_other_tools
+    from .short_form import is_short, whole
 
     try:
         if (runs := of_other_tools(content, file.name)) is not None:

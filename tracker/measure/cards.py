@@ -10,13 +10,14 @@ from spook_tracker.engine.errors import EngineError
 from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import EngineVersion, StageChoice, TestCard
-from spook_tracker.tracker.measure.commit import changed_since, subject_and_author
-from spook_tracker.tracker.measure.question import ask, sentence
-from spook_tracker.tracker.measure.scene_drawing import drawing
-from spook_tracker.tracker.measure.step_cost import LeavingOut
+
+from .commit import changed_since, subject_and_author
+from .question import ask, sentence
+from .scene_drawing import drawing
+from .step_cost import LeavingOut
 
 if TYPE_CHECKING:
-    from spook_tracker.tracker.measure.questions import Engine, Stage
+    from .questions import Engine, Stage
 
 
 def test_card(name: str, test: ScalarTest, engine: Engine, out: LeavingOut | None) -> TestCard:

@@ -19,9 +19,10 @@ from spook_tracker.engine.find import look_beside, thrown
 from spook_tracker.scalar_tests.case import ScalarTest
 from spook_tracker.scalar_tests.catalogue import CATALOGUE, Catalogue
 from spook_tracker.tracker.document.errors import TrackerError
-from spook_tracker.tracker.measure.bounds import STANDARD as STANDARD
-from spook_tracker.tracker.measure.model_files import catalogue as catalogue_of_models
-from spook_tracker.tracker.measure.model_files import is_model
+
+from .bounds import STANDARD as STANDARD
+from .model_files import catalogue as catalogue_of_models
+from .model_files import is_model
 
 GROUP = "spook_tracker.catalogues"
 

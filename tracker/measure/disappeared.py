@@ -18,7 +18,8 @@ from msgspec.structs import replace
 
 from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import RunDocument, Sample, SeriesDefinition
-from spook_tracker.tracker.measure.other_tools import asv_cases, asv_series
+
+from .other_tools import asv_cases, asv_series
 
 Lane = tuple[str, str]  # engine, machine
 LAST = 3  # runs before: where these are alike, their lane is always asked for the same

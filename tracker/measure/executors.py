@@ -21,14 +21,15 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 from spook_tracker.engine.find import look_beside
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import Machine
-from spook_tracker.tracker.measure.bounds import PROCESS as PROCESS
-from spook_tracker.tracker.measure.machine import machine
-from spook_tracker.tracker.measure.workers import Lost
+
+from .bounds import PROCESS as PROCESS
+from .machine import machine
+from .workers import Lost
 
 if TYPE_CHECKING:
     from concurrent.futures import Future
 
-    from spook_tracker.tracker.measure.questions import Engine
+    from .questions import Engine
 
 DASK = "dask://"
 Piece = TypeVar("Piece")

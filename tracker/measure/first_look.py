@@ -13,7 +13,8 @@ from spook_tracker.engine.result import Result
 from spook_tracker.engine.scene import Scene
 from spook_tracker.scalar_tests.case import OutOfTime
 from spook_tracker.tracker.document.run_document import LEFT_OUT, RunDocument, TestCard
-from spook_tracker.tracker.measure.remembered import Option
+
+from .remembered import Option
 
 
 @dataclass(frozen=True)

@@ -24,10 +24,11 @@ from spook_tracker.tracker.document.run_document import (
     SeriesDefinition,
     Timing,
 )
-from spook_tracker.tracker.measure.definition import definition_hash
-from spook_tracker.tracker.measure.question import Outcome, Witness, ask, sentence, series_key
-from spook_tracker.tracker.measure.timing import Prepare, Repeats, Timed, interleaved
-from spook_tracker.tracker.measure.workers import NOWHERE, Lost, at
+
+from .definition import definition_hash
+from .question import Outcome, Witness, ask, sentence, series_key
+from .timing import Prepare, Repeats, Timed, interleaved
+from .workers import NOWHERE, Lost, at
 
 LADDER_TIME_LIMIT = 60.0  # s per run: a point that takes longer is a point of its own class
 ORDER_BAND = 0.1

@@ -9,8 +9,9 @@ from fnmatch import fnmatchcase
 
 from spook_tracker.scalar_tests.case import Measurement, Metric, ScalarTest
 from spook_tracker.tracker.document.errors import TrackerError
-from spook_tracker.tracker.measure.catalogues import Changed
-from spook_tracker.tracker.measure.question import series_key
+
+from .catalogues import Changed
+from .question import series_key
 
 Limit = float | tuple[float, float]
 Limits = tuple[tuple[str, Limit], ...]  # pattern of series keys (* matches anything), limit

@@ -8,7 +8,8 @@ from spook_tracker.engine.model_file import SHOWN_AS
 from spook_tracker.engine.result import Result
 from spook_tracker.scalar_tests.case import Seen, Simulate
 from spook_tracker.tracker.document.run_document import Channel, DrawnSolid, Trajectory
-from spook_tracker.tracker.measure.trajectory import MOST_BYTES, Array, channel
+
+from .trajectory import MOST_BYTES, Array, channel
 
 
 def model_trajectory(name: str, seen: Seen, simulate: Simulate) -> Trajectory | None:

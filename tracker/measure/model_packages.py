@@ -12,22 +12,23 @@ from importlib.metadata import PackageNotFoundError, distribution, packages_dist
 from pathlib import Path
 from typing import Literal
 
-import spook_tracker.tracker.measure.workers as crew
 from spook_tracker.engine.errors import EngineError
 from spook_tracker.engine.find import find
 from spook_tracker.engine.model_bodies import ModelError
 from spook_tracker.engine.model_file import ModelFile, ModelRun
 from spook_tracker.engine.model_reading import Reading, read
 from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.tracker.measure.model_agreement import (
+
+from . import workers as crew
+from .model_agreement import (
     ALIKE,
     BUDGET,
     Agreement,
     OutOfTime,
     agreement,
 )
-from spook_tracker.tracker.measure.model_files import SUFFIXES, ModelFileError
-from spook_tracker.tracker.measure.model_standing import Standing, standing
+from .model_files import SUFFIXES, ModelFileError
+from .model_standing import Standing, standing
 
 LookedWord = Literal["model", "part", "refused", "runs", "fails"]
 PARTS = ("no model by itself", "part of other models", "nothing in", "begins with <")

@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from spook_tracker.tracker.document.errors import DocumentError
-from spook_tracker.tracker.measure.other_tools import Beside
+
+from .other_tools import Beside
 
 ABOUT = ("benchmarks.json", "machine.json", "asv.conf.json")
 SETTING = r'^\s*"{}"\s*:\s*"([^"]*)"'  # asv.conf.json has comments, so that json cannot read it

@@ -23,8 +23,9 @@ from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.middle import median
 from spook_tracker.tracker.document.run_document import RunDocument, SeriesDefinition
-from spook_tracker.tracker.measure.short_form import ShortResult, ShortRun, document_of
-from spook_tracker.tracker.measure.units import Unit, unit_of
+
+from .short_form import ShortResult, ShortRun, document_of
+from .units import Unit, unit_of
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.json_form import Json

@@ -19,7 +19,8 @@ from spook_tracker.engine.result import Result
 from spook_tracker.scalar_tests import case
 from spook_tracker.scalar_tests.case import Ladder, Measurement, Metric, ScalarTest
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
-from spook_tracker.tracker.measure.catalogues import Changed
+
+from .catalogues import Changed
 
 Answer = TypeVar("Answer")
 

@@ -40,7 +40,8 @@ from spook_tracker.tracker.document.run_document import (
     Sensitivity,
     SeriesDefinition,
 )
-from spook_tracker.tracker.measure.definition import definition_hash
+
+from .definition import definition_hash
 
 if TYPE_CHECKING:
     from spook_tracker.engine.scene import Scene

@@ -12,14 +12,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, Protocol
 
 from spook_tracker.tracker.document.errors import TrackerError
-from spook_tracker.tracker.measure.bounds import STANDARD
+
+from .bounds import STANDARD
 
 if TYPE_CHECKING:
-    import spook_tracker.tracker.measure.limits as limits
     from spook_tracker.engine.build_info import BuildInfo
     from spook_tracker.engine.result import Result
     from spook_tracker.engine.scene import Scene
     from spook_tracker.scalar_tests.case import ScalarTest, Simulate
+
+    from . import limits
 
 PEER_TIME_LIMIT = 10.0  # s per simulation of an engine that is only shown
 
@@ -72,10 +74,9 @@ class Questions:
 
     @cached_property
     def _tests(self) -> Mapping[str, ScalarTest]:
-        import spook_tracker.tracker.measure.catalogues as catalogues
-        import spook_tracker.tracker.measure.limits as limits
-        import spook_tracker.tracker.measure.others as others
         from spook_tracker.engine.find import look_beside
+
+        from . import catalogues, limits, others
 
         look_beside(self.folder)
         found = catalogues.find(self.catalogue)
@@ -127,7 +128,7 @@ class _Limited:
         self.simulate, self.limit, self.patience, self.spent = simulate, limit, patience, 0.0
 
     def __call__(self, scene: Scene, **options: Any) -> Result:
-        from spook_tracker.tracker.measure.question import NoAnswer
+        from .question import NoAnswer
 
         if self.patience is not None and self.spent >= self.patience:
             raise NoAnswer("timed_out", f"not tried: the {self.patience:g} s for this question are over")

@@ -27,9 +27,10 @@ from msgspec.structs import replace
 
 from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.document.run_document import RunDocument
-from spook_tracker.tracker.measure.other_tools import NOTHING, Beside, documents_of, repeated, sampled
-from spook_tracker.tracker.measure.short_form import ShortResult, ShortRun
-from spook_tracker.tracker.measure.units import Unit, unit_of
+
+from .other_tools import NOTHING, Beside, documents_of, repeated, sampled
+from .short_form import ShortResult, ShortRun
+from .units import Unit, unit_of
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.json_form import Json

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 from spook_tracker.tracker.document.run_document import RunDocument
-from spook_tracker.tracker.measure.bounds import MEMORY, PROCESS, TIME_LIMIT
+
+from .bounds import MEMORY, PROCESS, TIME_LIMIT
 
 if TYPE_CHECKING:
-    from spook_tracker.tracker.measure.timing import Repeats
+    from .timing import Repeats
 
 Trigger = Literal["manual", "nightly", "import", "test"]
 

@@ -22,10 +22,6 @@ from typing import Literal, NoReturn
 import msgspec
 
 import spook_tracker.engine as ours
-import spook_tracker.tracker.measure.executors as executors
-import spook_tracker.tracker.measure.first_look as first_look
-import spook_tracker.tracker.measure.trajectory as motion
-import spook_tracker.tracker.measure.workers as crew
 from spook_tracker.scalar_tests.case import OutOfTime, ScalarTest, Simulate
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import (
@@ -41,12 +37,16 @@ from spook_tracker.tracker.document.run_document import (
     Trajectory,
     Worker,
 )
-from spook_tracker.tracker.measure import ladder as ladders
-from spook_tracker.tracker.measure.cards import engine_version, test_card
-from spook_tracker.tracker.measure.fitting import fitted, fitted_figure, unfit
-from spook_tracker.tracker.measure.machine import machine
-from spook_tracker.tracker.measure.model_motion import model_trajectory
-from spook_tracker.tracker.measure.question import (
+
+from . import executors, first_look
+from . import ladder as ladders
+from . import trajectory as motion
+from . import workers as crew
+from .cards import engine_version, test_card
+from .fitting import fitted, fitted_figure, unfit
+from .machine import machine
+from .model_motion import model_trajectory
+from .question import (
     Measured,
     NoAnswer,
     Outcome,
@@ -59,17 +59,17 @@ from spook_tracker.tracker.measure.question import (
     sentence,
     study,
 )
-from spook_tracker.tracker.measure.questions import PEER_TIME_LIMIT as PEER_TIME_LIMIT
-from spook_tracker.tracker.measure.questions import Questions as Questions
-from spook_tracker.tracker.measure.questions import RunError as RunError
-from spook_tracker.tracker.measure.remembered import of_test
-from spook_tracker.tracker.measure.renames import with_aliases
-from spook_tracker.tracker.measure.request import Interrupted as Interrupted
-from spook_tracker.tracker.measure.request import Progress as Progress
-from spook_tracker.tracker.measure.request import Request as Request
-from spook_tracker.tracker.measure.request import Trigger as Trigger
-from spook_tracker.tracker.measure.request import Watch as Watch
-from spook_tracker.tracker.measure.run_times import Timed, run_times
+from .questions import PEER_TIME_LIMIT as PEER_TIME_LIMIT
+from .questions import Questions as Questions
+from .questions import RunError as RunError
+from .remembered import of_test
+from .renames import with_aliases
+from .request import Interrupted as Interrupted
+from .request import Progress as Progress
+from .request import Request as Request
+from .request import Trigger as Trigger
+from .request import Watch as Watch
+from .run_times import Timed, run_times
 
 Part = Measured | FigureData | MapData | Trajectory
 Parts = tuple[Part | ladders.ErrorPoints | first_look.LeftOut, ...]  # of a piece of work

@@ -11,12 +11,13 @@ from dataclasses import dataclass, replace
 from functools import partial
 from typing import Literal
 
-import spook_tracker.tracker.measure.workers as crew
 from spook_tracker.scalar_tests.case import ScalarTest
-from spook_tracker.tracker.measure import ladder as ladders
-from spook_tracker.tracker.measure.questions import Questions
-from spook_tracker.tracker.measure.step_cost import LeavingOut, step_costs
-from spook_tracker.tracker.measure.timing import Repeats
+
+from . import ladder as ladders
+from . import workers as crew
+from .questions import Questions
+from .step_cost import LeavingOut, step_costs
+from .timing import Repeats
 
 Timed = tuple[
     list[ladders.Pair], Mapping[str, LeavingOut]

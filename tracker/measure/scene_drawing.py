@@ -19,7 +19,8 @@ from spook_tracker.engine.scene import Scene
 from spook_tracker.engine.shapes import Compound, Shape
 from spook_tracker.tracker.document.quaternions import UPRIGHT, Quaternion, Vector, multiplied, turned
 from spook_tracker.tracker.document.run_document import DrawnLink, DrawnSolid, SceneDrawing
-from spook_tracker.tracker.measure.gear_drawing import acted_on, gears_of
+
+from .gear_drawing import acted_on, gears_of
 
 MOST_SOLIDS = 300
 CLOSE = 0.7  # of the way to the nearest body, a box without a surface is long at most

@@ -30,7 +30,8 @@ from spook_tracker.tracker.document.run_document import (
     Text,
     Timing,
 )
-from spook_tracker.tracker.measure.question import Outcome, Witness, judged_sample, series_key
+
+from .question import Outcome, Witness, judged_sample, series_key
 
 Better = Literal["smaller_magnitude", "larger", "smaller", "inside"]
 

@@ -24,8 +24,9 @@ from spook_tracker.scalar_tests.case import Better, Example, Measurement, Metric
 from spook_tracker.scalar_tests.step_limits import REAL_TIME, SAVES
 from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import Sample, Saving, SeriesDefinition
-from spook_tracker.tracker.measure.question import Outcome, Witness, ask, judged_sample, metric_series
-from spook_tracker.tracker.measure.timing import stage_seconds
+
+from .question import Outcome, Witness, ask, judged_sample, metric_series
+from .timing import stage_seconds
 
 LIMIT = 60.0  # s of a run
 ROUNDS = 5

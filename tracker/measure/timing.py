@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 from spook_tracker.engine.result import Result
 from spook_tracker.scalar_tests.case import Simulate
 from spook_tracker.tracker.document.run_document import Timing
-from spook_tracker.tracker.measure.calibration import calibrate
-from spook_tracker.tracker.measure.instructions import InstructionCounter, can_count
-from spook_tracker.tracker.measure.question import Outcome, ask, sentence
+
+from .calibration import calibrate
+from .instructions import InstructionCounter, can_count
+from .question import Outcome, ask, sentence
 
 if TYPE_CHECKING:
     from spook_tracker.engine.scene import Scene

@@ -39,9 +39,10 @@ from spook_tracker.engine.scene import Scene
 from spook_tracker.scalar_tests.case import Example, ScalarTest, Simulate
 from spook_tracker.tracker.document.quaternions import UPRIGHT, Vector, turned
 from spook_tracker.tracker.document.run_document import Channel, TrackedLink, Trajectory
-from spook_tracker.tracker.measure.gear_drawing import acted_on
-from spook_tracker.tracker.measure.question import ask
-from spook_tracker.tracker.measure.scene_drawing import MOST_SOLIDS, drawn_bodies
+
+from .gear_drawing import acted_on
+from .question import ask
+from .scene_drawing import MOST_SOLIDS, drawn_bodies
 
 SAMPLES = 241  # of a trajectory at most; between them the page interpolates
 MOST_STEPS = 60_000

@@ -24,8 +24,8 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Generic, Literal, Protocol, TypeVar
 
-import spook_tracker.tracker.measure.left_behind as left_behind
-from spook_tracker.tracker.measure.bounds import MEMORY, START_LIMIT, TIME_LIMIT
+from . import left_behind
+from .bounds import MEMORY, START_LIMIT, TIME_LIMIT
 
 WORTH = 1.0  # s of work after which further processes are worth what they take to start
 DIED = "the engine's process died while answering"

@@ -21,7 +21,8 @@ from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.document.json_form import boxed, builtins, convert, decode
 from spook_tracker.tracker.document.outside import clean_text
 from spook_tracker.tracker.document.run_document import RunDocument
-from spook_tracker.tracker.store.rows import moment
+
+from .rows import moment
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.json_form import Writable

@@ -14,7 +14,8 @@ import msgspec
 
 from spook_tracker.tracker.document.kept import Kept
 from spook_tracker.tracker.document.run_document import OutcomeClass
-from spook_tracker.tracker.store.reader import Row
+
+from .reader import Row
 
 SampleRow = tuple[
     int, float | None, str | None, OutcomeClass, bool | int, bool | int

@@ -21,7 +21,8 @@ from sqlalchemy.orm import Session
 from sqlalchemy.pool import NullPool
 
 from spook_tracker.tracker.document.errors import DatabaseError, DatabaseUnusable
-from spook_tracker.tracker.store.reader import LOCK_TIMEOUT, SAFE, address
+
+from .reader import LOCK_TIMEOUT, SAFE, address, sentence
 
 if TYPE_CHECKING:
     from sqlalchemy import Connection
@@ -207,24 +208,3 @@ def said_of(name: str, error: Exception) -> DatabaseError:
     """What the driver raised as an error of ours."""
     said = sentence(name, error)
     return (DatabaseUnusable if " is damaged" in said else DatabaseError)(said)
-
-
-def sentence(name: str, error: Exception) -> str:
-    """What the driver raised, in words, of the database called `name`."""
-    reason = str(getattr(error, "orig", None) or error).strip().partition("\n")[0]
-    lower = reason.lower()
-    for sign, words in (
-        ("locked", "is in use by another writer; try again"),
-        ("readonly", "cannot be written; it, or its folder, is read-only"),
-        ("read-only", "cannot be written; it, or its folder, is read-only"),
-        ("is full", "cannot be written: no space left; nothing of this run was stored"),
-        ("no space left", "cannot be written: no space left; nothing of this run was stored"),
-        ("disk i/o", "cannot be written or read: the disk reports an error, or is full"),
-        ("can't decode byte", "is damaged: it holds text that is none; restore it from a copy"),
-        ("malformed", "is damaged; restore it from a copy (tracker db check says more)"),
-        ("not a database", "is damaged or not a SQLite database; restore it from a copy"),
-        ("unable to open", "cannot be opened; check the path and its permissions"),
-    ):
-        if sign in lower:
-            return f"the database {name} {words}"
-    return f"the database {name} failed: {reason[:300]}"

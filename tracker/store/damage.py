@@ -2,24 +2,16 @@
 
 from __future__ import annotations
 
-import lzma
-import sqlite3
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-import msgspec
-
 from spook_tracker.tracker.document.errors import DatabaseUnusable, TrackerError
+
+from .reader import NONSENSE
 
 if TYPE_CHECKING:
     from sqlalchemy import URL
-
-NONSENSE = (
-    ValueError, LookupError, TypeError, AttributeError, ArithmeticError, sqlite3.Error, zlib.error, lzma.LZMAError,
-    msgspec.MsgspecError,
-)  # fmt: skip  # what comes of reading bytes that mean nothing
 
 
 @contextmanager
@@ -33,7 +25,7 @@ def told_of_damage(url: str | URL | None) -> Iterator[None]:
     except TrackerError:
         raise
     except NONSENSE as error:
-        from spook_tracker.tracker.store.connection import database_url, shown
+        from .connection import database_url, shown
 
         place = database_url(url) if url is None or isinstance(url, str) else url
         fault = _fault(place)
@@ -46,8 +38,8 @@ def told_of_damage(url: str | URL | None) -> Iterator[None]:
 
 def _fault(url: URL) -> str | None:
     """The first thing that is wrong there, if anything is."""
-    from spook_tracker.tracker.store.database import open_database
-    from spook_tracker.tracker.store.database_check import check
+    from .database_check import check
+    from .schema import open_database
 
     try:
         engine = open_database(url, readonly=True)

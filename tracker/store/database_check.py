@@ -8,12 +8,13 @@ from sqlalchemy import Connection, Engine, func, select, text
 from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.document.errors import TrackerError
-from spook_tracker.tracker.store import models, rows
-from spook_tracker.tracker.store.border import checked
-from spook_tracker.tracker.store.damage import NONSENSE
-from spook_tracker.tracker.store.database import in_words
-from spook_tracker.tracker.store.history import History
-from spook_tracker.tracker.store.identity import identity
+
+from . import models, rows
+from .border import checked
+from .connection import in_words
+from .identity import identity
+from .reader import NONSENSE
+from .stored_runs import StoredRuns
 
 SHOWN = 5  # of the faults of one kind
 
@@ -47,7 +48,7 @@ def _damage(connection: Connection) -> Iterator[str]:
 
 
 def _schema(connection: Connection) -> Iterator[str]:
-    from spook_tracker.tracker.store.revisions import differences
+    from .revisions import differences
 
     for difference in differences(connection)[:SHOWN]:
         yield f"the tables differ from the models: {difference!s:.200}"
@@ -92,7 +93,7 @@ def _identities(connection: Connection) -> Iterator[str]:
 
 
 def _documents(session: Session) -> Iterator[str]:
-    history = History(session)
+    history = StoredRuns(session)
     for run in history.runs():
         try:
             document = checked(history.document(run.id))

@@ -11,9 +11,10 @@ from typing import TYPE_CHECKING
 from sqlalchemy import Connection, Engine, Table, func, insert, select
 
 from spook_tracker.tracker.document.errors import DatabaseError
-from spook_tracker.tracker.store import models
-from spook_tracker.tracker.store.database import in_words, open_database, shown
-from spook_tracker.tracker.store.reader import SqlValue
+
+from . import models
+from .database import in_words, open_database, shown
+from .reader import SqlValue
 
 if TYPE_CHECKING:
     from sqlalchemy import Row

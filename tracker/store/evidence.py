@@ -9,9 +9,10 @@ import msgspec
 
 from spook_tracker.tracker.document.kept import Kept
 from spook_tracker.tracker.document.run_document import OutcomeClass, Sample, SeriesDefinition
-from spook_tracker.tracker.store.lanes import Definitions
-from spook_tracker.tracker.store.reader import Row
-from spook_tracker.tracker.store.sample_rows import sample_of
+
+from .lanes import Definitions
+from .reader import Row
+from .sample_rows import sample_of
 
 EvidenceRow = tuple[
     int, int, float | None, str | None, OutcomeClass, bool | int, bool | int, str | None, str | None, str | None

@@ -9,11 +9,12 @@ from operator import sub
 from spook_tracker.tracker.document.kept import Kept
 from spook_tracker.tracker.document.points import Points, Stretches
 from spook_tracker.tracker.document.run_document import Run, Runs, Said, SeriesDefinition, SeriesHistory
-from spook_tracker.tracker.store.columns import Lane, together
-from spook_tracker.tracker.store.identity import identity
-from spook_tracker.tracker.store.reader import Reader, Row, listed
-from spook_tracker.tracker.store.sample_rows import OF_ITS_RUN, SAMPLE, bare_sample_of
-from spook_tracker.tracker.store.versions import RunInfo
+
+from .columns import Lane, together
+from .identity import identity
+from .reader import Reader, Row, listed
+from .sample_rows import OF_ITS_RUN, SAMPLE, bare_sample_of
+from .versions import RunInfo
 
 AT_ONCE = 64  # runs read together
 Definitions = Callable[

@@ -27,7 +27,7 @@ from sqlalchemy import (
 )
 from sqlalchemy.orm import DeclarativeBase, Mapped, mapped_column
 
-from spook_tracker.tracker.store.rows import SPECIALS
+from .rows import SPECIALS
 
 if TYPE_CHECKING:
     from sqlalchemy.orm import MappedColumn

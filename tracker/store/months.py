@@ -20,10 +20,11 @@ from sqlalchemy.orm import Session
 from spook_tracker.tracker.document.errors import DatabaseUnusable, DocumentError
 from spook_tracker.tracker.document.json_form import encode
 from spook_tracker.tracker.document.run_document import RunDocument
-from spook_tracker.tracker.store import models
-from spook_tracker.tracker.store.border import MAX_BYTES, checked, decoded
-from spook_tracker.tracker.store.history import History
-from spook_tracker.tracker.store.record import record_checked
+
+from . import models
+from .border import MAX_BYTES, checked, decoded
+from .history import History
+from .record import record_checked
 
 NAME = re.compile(r"\d{4,}-\d\d\.jsonl\.xz")
 WINDOW = 1 << 26  # bytes: a month of nights, each with the one before it in sight

@@ -5,7 +5,8 @@ from __future__ import annotations
 import sqlite3
 
 from spook_tracker.tracker.document.errors import DatabaseError
-from spook_tracker.tracker.store.connection import database_url, is_file, shown
+
+from .connection import database_url, is_file, shown
 
 
 def database_file(given: str) -> bytes:

@@ -19,9 +19,9 @@ from sqlalchemy.schema import (
     SetTableComment,
 )
 
-from spook_tracker.tracker.store import views
-from spook_tracker.tracker.store.connection import ONE_WRITER
-from spook_tracker.tracker.store.models import NAMING, Base
+from . import views
+from .connection import ONE_WRITER
+from .models import NAMING, Base
 
 Kind = Literal["postgresql", "timescaledb", "citus"]
 CHUNK = "1 month"  # of time in one piece of a table: thirty nights, some hundred thousand samples of ours

@@ -7,16 +7,21 @@ Statements are such as SQLite and PostgreSQL both understand, with parameters as
 
 from __future__ import annotations
 
+import lzma
 import os
 import sqlite3
+import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 from urllib.parse import quote
 
+import msgspec
+
 from spook_tracker.tracker.document.errors import DatabaseError
-from spook_tracker.tracker.store.head import head
+
+from .head import head
 
 if TYPE_CHECKING:
     from sqlalchemy.orm import Session
@@ -25,6 +30,10 @@ LOCK_TIMEOUT = 30.0  # s to wait for another writer
 SAFE = ("trusted_schema = OFF", "cell_size_check = ON")  # for files from elsewhere
 CHUNK = 500  # values in one IN (...)
 STREAMED = 10_000  # rows that a server sends at once
+NONSENSE = (
+    ValueError, LookupError, TypeError, AttributeError, ArithmeticError, sqlite3.Error, zlib.error, lzma.LZMAError,
+    msgspec.MsgspecError,
+)  # fmt: skip  # what comes of reading bytes that mean nothing
 Row = Sequence[Any]  # of the columns that a statement names
 SqlValue = str | int | float | bytes | datetime | None  # what a column can hold
 
@@ -65,16 +74,12 @@ class FileReader:
         try:
             return self.connection.execute(statement, parameters).fetchall()
         except (sqlite3.Error, UnicodeDecodeError) as error:
-            from spook_tracker.tracker.store.connection import sentence
-
             raise DatabaseError(sentence(str(self.path), error)) from error
 
     def each_row(self, statement: str) -> Iterator[Row]:
         try:
             yield from self.connection.execute(statement)
         except (sqlite3.Error, UnicodeDecodeError) as error:
-            from spook_tracker.tracker.store.connection import sentence
-
             raise DatabaseError(sentence(str(self.path), error)) from error
 
     def close(self) -> None:
@@ -127,3 +132,24 @@ def address(path: Path, readonly: bool) -> str:
     if mode == "ro" and not os.access(path.parent, os.W_OK) and not (log.exists() and log.stat().st_size):
         mode += "&immutable=1"  # SQLite would want to write an index of the (empty) log beside the file
     return f"file:{quote(str(path))}?mode={mode}"
+
+
+def sentence(name: str, error: Exception) -> str:
+    """What the driver raised, in words, of the database called `name`."""
+    reason = str(getattr(error, "orig", None) or error).strip().partition("\n")[0]
+    lower = reason.lower()
+    for sign, words in (
+        ("locked", "is in use by another writer; try again"),
+        ("readonly", "cannot be written; it, or its folder, is read-only"),
+        ("read-only", "cannot be written; it, or its folder, is read-only"),
+        ("is full", "cannot be written: no space left; nothing of this run was stored"),
+        ("no space left", "cannot be written: no space left; nothing of this run was stored"),
+        ("disk i/o", "cannot be written or read: the disk reports an error, or is full"),
+        ("can't decode byte", "is damaged: it holds text that is none; restore it from a copy"),
+        ("malformed", "is damaged; restore it from a copy (tracker db check says more)"),
+        ("not a database", "is damaged or not a SQLite database; restore it from a copy"),
+        ("unable to open", "cannot be opened; check the path and its permissions"),
+    ):
+        if sign in lower:
+            return f"the database {name} {words}"
+    return f"the database {name} failed: {reason[:300]}"

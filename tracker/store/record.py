@@ -12,11 +12,12 @@ from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.document.errors import DatabaseError
 from spook_tracker.tracker.document.run_document import RunDocument
-from spook_tracker.tracker.store import models, rows
-from spook_tracker.tracker.store.border import checked
-from spook_tracker.tracker.store.database import in_words, one_writer
-from spook_tracker.tracker.store.identity import identity
-from spook_tracker.tracker.store.reader import SqlValue
+
+from . import models, rows
+from .border import checked
+from .database import in_words, one_writer
+from .identity import identity
+from .reader import SqlValue
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.run_document import FigureData, MapData, Trajectory

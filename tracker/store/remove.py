@@ -5,9 +5,9 @@ from __future__ import annotations
 from sqlalchemy import delete
 from sqlalchemy.orm import Session
 
-from spook_tracker.tracker.store import models
-from spook_tracker.tracker.store.database import in_words, one_writer
-from spook_tracker.tracker.store.versions import RunInfo
+from . import models
+from .database import in_words, one_writer
+from .versions import RunInfo
 
 LARGE = (
     models.Sample, models.Evidence, models.Timing, models.Figure, models.StabilityMap, models.Trajectory,

@@ -16,10 +16,10 @@ from collections.abc import Collection
 from sqlalchemy import delete, select
 from sqlalchemy.orm import Session
 
-from spook_tracker.tracker.store import git, models
-from spook_tracker.tracker.store.database import in_words
-from spook_tracker.tracker.store.history import History
-from spook_tracker.tracker.store.versions import RunInfo
+from . import git, models
+from .database import in_words
+from .history import History
+from .versions import RunInfo
 
 MOTIONS = 8
 RELEASE = re.compile(r"v?\d+(\.\d+)*((a|b|rc|\.post)\d+)?")

@@ -10,8 +10,9 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import Connection
 
 from spook_tracker.tracker.resources import resource
-from spook_tracker.tracker.store.models import Base
-from spook_tracker.tracker.store.views import create_views, drop_views
+
+from .models import Base
+from .views import create_views, drop_views
 
 
 def configuration(connection: Connection | None = None) -> Config:

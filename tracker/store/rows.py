@@ -15,7 +15,8 @@ import msgspec
 from spook_tracker.tracker.document import run_document as document
 from spook_tracker.tracker.document.errors import DatabaseError, DocumentError
 from spook_tracker.tracker.document.json_form import Number, boxed, decode, encode
-from spook_tracker.tracker.store.identity import identity
+
+from .identity import identity
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.json_form import Writable

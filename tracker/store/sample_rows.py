@@ -7,8 +7,9 @@ from typing import Any
 
 from spook_tracker.tracker.document import run_document as document
 from spook_tracker.tracker.document.run_document import Sample
-from spook_tracker.tracker.store import rows
-from spook_tracker.tracker.store.reader import Reader, Row, SqlValue
+
+from . import rows
+from .reader import Reader, Row, SqlValue
 
 SAMPLE = "s.run_key, s.series_id, s.definition_id, s.value, s.special, s.outcome, s.passed, s.set_point_held"
 EVIDENCE = """, e.failure, e.state_hash, e.counters, t.seconds, t.runs_per_repeat, t.instructions, t.stage_seconds,

@@ -7,8 +7,8 @@ from datetime import datetime
 
 from sqlalchemy import Engine, func, select, text
 
-from spook_tracker.tracker.store import models
-from spook_tracker.tracker.store.database import head, in_words, shown
+from . import models
+from .database import head, in_words, shown
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

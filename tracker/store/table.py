@@ -14,8 +14,9 @@ from types import ModuleType
 from typing import TYPE_CHECKING
 
 from spook_tracker.tracker.document.errors import TrackerError
-from spook_tracker.tracker.store.reader import CHUNK, Reader, SqlValue, listed
-from spook_tracker.tracker.store.rows import SPECIALS, stored_moment
+
+from .reader import CHUNK, Reader, SqlValue, listed
+from .rows import SPECIALS, stored_moment
 
 if TYPE_CHECKING:
     import pandas

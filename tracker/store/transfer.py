@@ -17,11 +17,13 @@ from sqlalchemy.orm import Session
 from spook_tracker.tracker.document.errors import DocumentError
 from spook_tracker.tracker.document.json_form import encode, readable
 from spook_tracker.tracker.document.run_document import RunDocument
-from spook_tracker.tracker.store.border import MAX_BYTES, checked, decoded
-from spook_tracker.tracker.store.history import A_DAY, History
-from spook_tracker.tracker.store.record import record_together
-from spook_tracker.tracker.store.rows import moment
-from spook_tracker.tracker.store.versions import RunInfo
+
+from .border import MAX_BYTES, checked, decoded
+from .history import History
+from .record import record_together
+from .rows import moment
+from .stored_runs import A_DAY
+from .versions import RunInfo
 
 TOGETHER = 5_000  # samples, and a little more, in one transaction
 

@@ -16,7 +16,7 @@ from collections.abc import Iterator, Mapping
 
 from sqlalchemy import Connection, MetaData, inspect, text
 
-from spook_tracker.tracker.store.models import Base
+from .models import Base
 
 _RUN = """
 SELECT run.started_at AS night, run.id AS run, engine_version.name AS engine,

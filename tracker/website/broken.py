@@ -10,8 +10,9 @@ from dataclasses import dataclass
 from spook_tracker.tracker.document.wording import clean, conditions, day, number, pair, quantity, short_hash
 from spook_tracker.tracker.judge.causes import Hit, hits_of
 from spook_tracker.tracker.judge.standing import expected
-from spook_tracker.tracker.website.motions import Motion, Parting, parting
-from spook_tracker.tracker.website.nights import Book, TestHistory, Trend, as_night
+
+from .motions import Motion, Parting, parting
+from .nights import Book, TestHistory, Trend, as_night
 
 MOST_CARDS = 6
 MOST_CHARTS = 3

@@ -25,9 +25,10 @@ from spook_tracker.tracker.judge.judged import blame
 from spook_tracker.tracker.judge.lane import machine_of
 from spook_tracker.tracker.judge.maps import map_key
 from spook_tracker.tracker.judge.vocabulary import Class
-from spook_tracker.tracker.website.motions import SEEN, apart
-from spook_tracker.tracker.website.nights import Book, Night, TestHistory, as_night
-from spook_tracker.tracker.website.page_rows import address
+
+from .motions import SEEN, apart
+from .nights import Book, Night, TestHistory, as_night
+from .page_rows import address
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.run_document import Run

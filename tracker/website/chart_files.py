@@ -6,9 +6,9 @@ import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
 
-from spook_tracker.tracker.website.diagrams import View
-from spook_tracker.tracker.website.folder import digest
-from spook_tracker.tracker.website.scripts import as_json, call
+from .diagrams import View
+from .folder import digest
+from .scripts import as_json, call
 
 NIGHTLY = 16  # files of run times, which are others every night
 

@@ -33,10 +33,11 @@ from spook_tracker.tracker.judge.lane import asked_for, asked_whole
 from spook_tracker.tracker.judge.maps import may_be_dropped
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, QUIET, WORD_RANK, Overall, spaced
 from spook_tracker.tracker.judge.work import with_work
-from spook_tracker.tracker.website.folder import digest
-from spook_tracker.tracker.website.judged_nights import accepted_fields, described, gates_of_engines
-from spook_tracker.tracker.website.nights import Book, Night, Records
-from spook_tracker.tracker.website.scripts import as_json, call
+
+from .folder import digest
+from .judged_nights import accepted_fields, described, gates_of_engines
+from .nights import Book, Night, Records
+from .scripts import as_json, call
 
 NEWEST = 10  # versions to choose from
 RELEASES = 6  # and the newest releases before them

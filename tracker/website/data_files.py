@@ -21,8 +21,9 @@ from msgspec import structs
 from spook_tracker.tracker.document.json_form import boxed, encode
 from spook_tracker.tracker.document.outside import escaped
 from spook_tracker.tracker.document.run_document import SeriesDefinition
-from spook_tracker.tracker.website.events import Event
-from spook_tracker.tracker.website.nights import Book, Night, TestHistory, Trend
+
+from .events import Event
+from .nights import Book, Night, TestHistory, Trend
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.json_form import Writable

@@ -21,12 +21,13 @@ from spook_tracker.tracker.document.wording import (
     version,
 )
 from spook_tracker.tracker.judge.events import in_full
-from spook_tracker.tracker.website.charts import Band, Chart, Grid, Line, Scale, drawable, thinned, turning
-from spook_tracker.tracker.website.earlier_nights import Earlier
-from spook_tracker.tracker.website.events import Event
-from spook_tracker.tracker.website.figures import FigureParts, figure, grid_figure
-from spook_tracker.tracker.website.nights import Night, TestHistory, Trend, as_night
-from spook_tracker.tracker.website.svg import describe
+
+from .charts import Band, Chart, Grid, Line, Scale, drawable, thinned, turning
+from .earlier_nights import Earlier
+from .events import Event
+from .figures import FigureParts, figure, grid_figure
+from .nights import Night, TestHistory, Trend, as_night
+from .svg import describe
 
 MOST_NIGHTS = 1500  # points of one trend; a value that stands still costs two, so this is many years
 MOVES = 500  # nights by which the beginning of a chart of more than four times as many moves

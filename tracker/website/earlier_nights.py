@@ -14,7 +14,7 @@ from spook_tracker.tracker.document.wording import day, instant, version
 from spook_tracker.tracker.judge.judged import is_release
 
 if TYPE_CHECKING:
-    from spook_tracker.tracker.website.nights import Night
+    from .nights import Night
 
 MOST_RELEASES = 4  # the newest
 BEFORE = "before"

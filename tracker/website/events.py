@@ -8,7 +8,8 @@ from spook_tracker.tracker.judge import events
 from spook_tracker.tracker.judge.events import Event, events_of
 from spook_tracker.tracker.judge.verdict import Verdict
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK
-from spook_tracker.tracker.website.nights import Book, TestHistory, as_night
+
+from .nights import Book, TestHistory, as_night
 
 __all__ = ["Event", "all_events", "events_of", "map_verdicts", "of_test"]
 

@@ -12,8 +12,9 @@ from spook_tracker.tracker.document.wording import clean, instant, limit, openin
 from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.standing import Count
 from spook_tracker.tracker.judge.vocabulary import Class
-from spook_tracker.tracker.website.causes import anchor, line
-from spook_tracker.tracker.website.nights import Book, Night, as_night
+
+from .causes import anchor, line
+from .nights import Book, Night, as_night
 
 ATOM = "http://www.w3.org/2005/Atom"
 MOST_ENTRIES = 100

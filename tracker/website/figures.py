@@ -14,7 +14,8 @@ from itertools import chain
 from typing import TYPE_CHECKING, NotRequired, TypedDict
 
 from spook_tracker.tracker.document.wording import clean, number
-from spook_tracker.tracker.website.charts import (
+
+from .charts import (
     Chart,
     Grid,
     Line,
@@ -25,7 +26,7 @@ from spook_tracker.tracker.website.charts import (
     thinned,
     ticks,
 )
-from spook_tracker.tracker.website.svg import CELL_WORDS
+from .svg import CELL_WORDS
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.json_form import Writable

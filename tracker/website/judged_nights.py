@@ -24,9 +24,10 @@ from spook_tracker.tracker.judge.rank import Question, question
 from spook_tracker.tracker.judge.repeats import looked_at, states_of
 from spook_tracker.tracker.judge.series_history import Told
 from spook_tracker.tracker.judge.work import Samples, is_read_off, with_work
-from spook_tracker.tracker.website.folder import digest
-from spook_tracker.tracker.website.nights import Book, Chapter, Night, Records
-from spook_tracker.tracker.website.scripts import as_json, call
+
+from .folder import digest
+from .nights import Book, Chapter, Night, Records
+from .scripts import as_json, call
 
 BLOCK = 32  # nights in a file
 OUTCOMES = (

@@ -9,9 +9,10 @@ import msgspec
 
 from spook_tracker.tracker.document.json_form import encode
 from spook_tracker.tracker.document.kept import Kept
-from spook_tracker.tracker.website.diagrams import View, first_drawn, trend_chart, view
-from spook_tracker.tracker.website.events import Event
-from spook_tracker.tracker.website.nights import Night, Trend
+
+from .diagrams import View, first_drawn, trend_chart, view
+from .events import Event
+from .nights import Night, Trend
 
 NAME = "charts"
 

@@ -11,7 +11,7 @@ import zlib
 from functools import lru_cache
 from pathlib import Path
 
-from spook_tracker.tracker.website.page_rows import Page
+from .page_rows import Page
 
 MODULE = "live.wasm"  # under site/static
 

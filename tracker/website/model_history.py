@@ -9,7 +9,8 @@ from dataclasses import dataclass, field
 from spook_tracker.tracker.document.run_document import Point
 from spook_tracker.tracker.judge.model_words import Moved, severity, words
 from spook_tracker.tracker.judge.verdict import judge
-from spook_tracker.tracker.website.nights import Trend
+
+from .nights import Trend
 
 MOST = 50  # versions on a page, newest first
 

@@ -17,13 +17,14 @@ from typing import TYPE_CHECKING
 from spook_tracker.tracker.document.json_form import encode
 from spook_tracker.tracker.document.run_document import Trajectory
 from spook_tracker.tracker.document.wording import slug
-from spook_tracker.tracker.website.folder import digest
+
+from .folder import digest
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.json_form import Writable
 
 if TYPE_CHECKING:  # they ask for what is kept
-    from spook_tracker.tracker.website.nights import Night, TestHistory
+    from .nights import Night, TestHistory
 
 MOST_NIGHTS = 8  # of one test
 SITE_BYTES = 12_000_000  # of all motions: older nights are left out beyond, newest first, tonight never

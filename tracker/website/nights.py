@@ -39,9 +39,10 @@ from spook_tracker.tracker.judge.repeats import Nights
 from spook_tracker.tracker.judge.series_history import Told, judge_all
 from spook_tracker.tracker.judge.standing import worst
 from spook_tracker.tracker.judge.vocabulary import Class
-from spook_tracker.tracker.website.earlier_nights import Earlier, earlier_nights
-from spook_tracker.tracker.website.motions import Motion, kept_motions
-from spook_tracker.tracker.website.topics import order_of
+
+from .earlier_nights import Earlier, earlier_nights
+from .motions import Motion, kept_motions
+from .topics import order_of
 
 NIGHTS_FOR_FIGURES = 12  # how far back figures, maps and cards are looked for
 

@@ -9,9 +9,10 @@ from functools import cache
 from spook_tracker.tracker.document.run_document import SceneDrawing, Trajectory
 from spook_tracker.tracker.document.wording import number
 from spook_tracker.tracker.resources import resource
-from spook_tracker.tracker.website.motions import motion_script
-from spook_tracker.tracker.website.scenery import scenery
-from spook_tracker.tracker.website.templates import Markup, environment, inside_script
+
+from .motions import motion_script
+from .scenery import scenery
+from .templates import Markup, environment, inside_script
 
 SCRIPTS = ("packed.js", "scene-poses.js", "scene-marks.js", "scene-view.js", "player.js", "replay.js")
 LIBRARY = "three-scene.min.js"

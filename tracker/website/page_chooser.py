@@ -15,9 +15,10 @@ from spook_tracker.tracker.document.addresses import page_of
 from spook_tracker.tracker.document.run_document import OutcomeClass, TestCard
 from spook_tracker.tracker.document.wording import seconds
 from spook_tracker.tracker.judge.rank import Rungs, Samples, ladders, soonest
-from spook_tracker.tracker.website.charts import Chart, Line
-from spook_tracker.tracker.website.diagrams import View, view
-from spook_tracker.tracker.website.topics import grouped
+
+from .charts import Chart, Line
+from .diagrams import View, view
+from .topics import grouped
 
 ERRORS = (1e-2, 1e-3, 1e-4)  # in the unit of a scene
 DRAWN = tuple(10.0 ** (-place / 2.0) for place in range(1, 15))

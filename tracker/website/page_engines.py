@@ -41,8 +41,9 @@ from spook_tracker.tracker.judge.rank import (
 )
 from spook_tracker.tracker.judge.release_notes import moved
 from spook_tracker.tracker.judge.standing import against_limit
-from spook_tracker.tracker.website.diagrams import ladder_charts, trend_chart, view
-from spook_tracker.tracker.website.engine_rows import (
+
+from .diagrams import ladder_charts, trend_chart, view
+from .engine_rows import (
     BehindRow,
     Cell,
     EngineCard,
@@ -51,11 +52,11 @@ from spook_tracker.tracker.website.engine_rows import (
     RankRow,
     VersionRow,
 )
-from spook_tracker.tracker.website.nights import Book, Chapter, TestHistory, Trend
-from spook_tracker.tracker.website.page_chooser import topics
-from spook_tracker.tracker.website.page_rows import Page
-from spook_tracker.tracker.website.recorded import Recorded
-from spook_tracker.tracker.website.topics import Group, grouped
+from .nights import Book, Chapter, TestHistory, Trend
+from .page_chooser import topics
+from .page_rows import Page
+from .recorded import Recorded
+from .topics import Group, grouped
 
 ENGINES, RECORDED = "engines.html", "recorded.html"
 MOST_RELEASES = 200  # in the table of an engine's versions

@@ -17,10 +17,11 @@ from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.maps import ToldMap
 from spook_tracker.tracker.judge.standing import Count, count, count_points, expected, worst
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, CLASSES, WORSE_THAN_EXPECTED, Class
-from spook_tracker.tracker.website.causes import ToldCause, damage_of, lasting, told
-from spook_tracker.tracker.website.nights import Book, Night, TestHistory, Trend
-from spook_tracker.tracker.website.page_rows import Page, Row, address, row
-from spook_tracker.tracker.website.topics import Group, grouped
+
+from .causes import ToldCause, damage_of, lasting, told
+from .nights import Book, Night, TestHistory, Trend
+from .page_rows import Page, Row, address, row
+from .topics import Group, grouped
 
 HEAT_NIGHTS = 60
 MOST_RED = 30  # tests beyond the thesis with a row of their own there

@@ -11,8 +11,9 @@ from spook_tracker.tracker.document.addresses import page_of
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.json_form import decode
 from spook_tracker.tracker.document.wording import clean
-from spook_tracker.tracker.website.nights import Book
-from spook_tracker.tracker.website.page_rows import Page
+
+from .nights import Book
+from .page_rows import Page
 
 PATH = "mutants.html"
 

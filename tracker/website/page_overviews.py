@@ -11,36 +11,38 @@ from spook_tracker.tracker.document.wording import clean, slug, web_address
 from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.judge.maps import map_key
 from spook_tracker.tracker.judge.vocabulary import CLASS_RANK, OVERALL, spaced
-from spook_tracker.tracker.website.causes import hit_row, told
-from spook_tracker.tracker.website.charts import drawable
-from spook_tracker.tracker.website.comparisons import Comparisons, choice, pair_name
-from spook_tracker.tracker.website.diagrams import (
+
+from .causes import hit_row, told
+from .charts import drawable
+from .comparisons import Comparisons, choice, pair_name
+from .diagrams import (
     figure_chart,
     grid_view,
     ladder_charts,
     map_grid,
     moving,
 )
-from spook_tracker.tracker.website.events import Event, map_verdicts
-from spook_tracker.tracker.website.feed import badge_words
-from spook_tracker.tracker.website.judged_nights import BLOCK, file_stem
-from spook_tracker.tracker.website.known_charts import KnownCharts
-from spook_tracker.tracker.website.nights import Book, TestHistory, as_night
-from spook_tracker.tracker.website.page_index import RED, counts_by_night, health, lead
-from spook_tracker.tracker.website.page_rows import Page, address, row
-from spook_tracker.tracker.website.page_test import concluded, ladder_views
-from spook_tracker.tracker.website.scenery import scenery
-from spook_tracker.tracker.website.svg import grid_picture, picture
+from .events import Event, map_verdicts
+from .feed import badge_words
+from .judged_nights import BLOCK, file_stem
+from .known_charts import KnownCharts
+from .nights import Book, TestHistory, as_night
+from .page_index import RED, counts_by_night, health, lead
+from .page_rows import Page, address, row
+from .page_test import concluded, ladder_views
+from .scenery import scenery
+from .svg import grid_picture, picture
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.run_document import TestCard
     from spook_tracker.tracker.judge.standing import Count
     from spook_tracker.tracker.judge.vocabulary import Class
-    from spook_tracker.tracker.website.causes import HitRow, ToldCause
-    from spook_tracker.tracker.website.nights import Trend
-    from spook_tracker.tracker.website.page_rows import Row
-    from spook_tracker.tracker.website.scenery import Scenery
-    from spook_tracker.tracker.website.svg import Picture
+
+    from .causes import HitRow, ToldCause
+    from .nights import Trend
+    from .page_rows import Row
+    from .scenery import Scenery
+    from .svg import Picture
 
 MOST_CAUSES = 200  # on the page of regressions; the file has all
 MOST_ROWS, FEW_ROWS = 500, 25  # series of all causes; of one that is over

@@ -25,15 +25,17 @@ from spook_tracker.tracker.document.wording import (
 from spook_tracker.tracker.judge.judged import blame
 from spook_tracker.tracker.judge.standing import expected
 from spook_tracker.tracker.judge.vocabulary import Class
-from spook_tracker.tracker.website.events import Event
-from spook_tracker.tracker.website.nights import Book, Night, TestHistory, Trend
-from spook_tracker.tracker.website.svg import Spark, sparkline
+
+from .events import Event
+from .nights import Book, Night, TestHistory, Trend
+from .svg import Spark, sparkline
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from spook_tracker.tracker.document.run_document import Run, StageChoice
-    from spook_tracker.tracker.website.stage_times import StageTimes
+
+    from .stage_times import StageTimes
 
 SPARK_NIGHTS = 40
 

@@ -9,9 +9,10 @@ from spook_tracker.tracker.document.coverage import saved
 from spook_tracker.tracker.document.run_document import SceneDrawing
 from spook_tracker.tracker.document.wording import clean, day, slug
 from spook_tracker.tracker.judge.vocabulary import Class
-from spook_tracker.tracker.website.broken import MOST_CARDS, MOST_CHARTS, broken, shown
-from spook_tracker.tracker.website.chart_files import nightly_file
-from spook_tracker.tracker.website.diagrams import (
+
+from .broken import MOST_CARDS, MOST_CHARTS, broken, shown
+from .chart_files import nightly_file
+from .diagrams import (
     View,
     figure_chart,
     grid_view,
@@ -21,15 +22,15 @@ from spook_tracker.tracker.website.diagrams import (
     trend_chart,
     view,
 )
-from spook_tracker.tracker.website.events import Event, of_test
-from spook_tracker.tracker.website.known_charts import KnownCharts
-from spook_tracker.tracker.website.model_history import model_history
-from spook_tracker.tracker.website.nights import Book, TestHistory
-from spook_tracker.tracker.website.page_rows import Page, Times, address, event_row, row
-from spook_tracker.tracker.website.replays import replay
-from spook_tracker.tracker.website.scenery import scenery
-from spook_tracker.tracker.website.stage_times import stage_times
-from spook_tracker.tracker.website.svg import Spark
+from .events import Event, of_test
+from .known_charts import KnownCharts
+from .model_history import model_history
+from .nights import Book, TestHistory
+from .page_rows import Page, Times, address, event_row, row
+from .replays import replay
+from .scenery import scenery
+from .stage_times import stage_times
+from .svg import Spark
 
 NO_SPARK: Spark = {"path": "", "last": None, "failed": [], "width": 0.0, "height": 0.0}
 LARGE = 3  # charts over nights that are not folded

@@ -8,17 +8,18 @@ from functools import partial
 
 from spook_tracker.tracker.document.wording import clean
 from spook_tracker.tracker.judge.causes import Cause
-from spook_tracker.tracker.website import page_engines, page_overviews
-from spook_tracker.tracker.website.comparisons import Comparisons
-from spook_tracker.tracker.website.events import Event
-from spook_tracker.tracker.website.known_charts import KnownCharts
-from spook_tracker.tracker.website.live_module import live_page
-from spook_tracker.tracker.website.nights import Book
-from spook_tracker.tracker.website.page_index import index
-from spook_tracker.tracker.website.page_mutants import PATH, Mutant, mutants_page
-from spook_tracker.tracker.website.page_rows import Page, address
-from spook_tracker.tracker.website.page_test import test_page
-from spook_tracker.tracker.website.recorded import Recorded
+
+from . import page_engines, page_overviews
+from .comparisons import Comparisons
+from .events import Event
+from .known_charts import KnownCharts
+from .live_module import live_page
+from .nights import Book
+from .page_index import index
+from .page_mutants import PATH, Mutant, mutants_page
+from .page_rows import Page, address
+from .page_test import test_page
+from .recorded import Recorded
 
 NAVIGATION = (  # in the order of need
     ("index.html", "Tonight"),

@@ -15,8 +15,9 @@ from typing import Any, Protocol
 
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.resources import resource
-from spook_tracker.tracker.website.charts import Chart
-from spook_tracker.tracker.website.figures import figure
+
+from .charts import Chart
+from .figures import figure
 
 CROWDED = 60  # points of a line, beyond which its marks are small
 ALARMING = ("limit", "failed", "broken")

@@ -17,9 +17,10 @@ from pathlib import Path
 
 from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.judge.accepted import Accepted
-from spook_tracker.tracker.website.nights import Records
-from spook_tracker.tracker.website.options import DEFAULTS, SiteOptions
-from spook_tracker.tracker.website.publish import publish
+
+from .nights import Records
+from .options import DEFAULTS, SiteOptions
+from .publish import publish
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "google-chrome-stable")
 NUMBERED = re.compile(r'<span class="page-of" data-of="([^"]*)">')

@@ -24,11 +24,12 @@ from spook_tracker.tracker.document.wording import clean, slug, web_address
 from spook_tracker.tracker.judge.accepted import Accepted
 from spook_tracker.tracker.judge.causes import Cause
 from spook_tracker.tracker.resources import resource
-from spook_tracker.tracker.website import data_files, feed, judged_nights
-from spook_tracker.tracker.website.causes import causes_of
-from spook_tracker.tracker.website.chart_files import ChartFiles
-from spook_tracker.tracker.website.colours import accent
-from spook_tracker.tracker.website.comparisons import (
+
+from . import data_files, feed, judged_nights
+from .causes import causes_of
+from .chart_files import ChartFiles
+from .colours import accent
+from .comparisons import (
     FILE,
     Comparisons,
     comparisons,
@@ -36,21 +37,21 @@ from spook_tracker.tracker.website.comparisons import (
     read_known,
     stored,
 )
-from spook_tracker.tracker.website.events import Event, all_events
-from spook_tracker.tracker.website.folder import FolderError, digest, replacing
-from spook_tracker.tracker.website.known_charts import KnownCharts
-from spook_tracker.tracker.website.live_module import built_module, module_script
-from spook_tracker.tracker.website.nights import Book, Records, book
-from spook_tracker.tracker.website.options import DEFAULTS, SiteOptions
-from spook_tracker.tracker.website.page_index import health
-from spook_tracker.tracker.website.page_mutants import read_mutants
-from spook_tracker.tracker.website.page_rows import Page
-from spook_tracker.tracker.website.pages import NAVIGATION, pages
-from spook_tracker.tracker.website.recorded import read_files
-from spook_tracker.tracker.website.recorded import told as told_beside
-from spook_tracker.tracker.website.replays import replay_files
-from spook_tracker.tracker.website.templates import environment
-from spook_tracker.tracker.website.tonight import tonight_scripts
+from .events import Event, all_events
+from .folder import FolderError, digest, replacing
+from .known_charts import KnownCharts
+from .live_module import built_module, module_script
+from .nights import Book, Records, book
+from .options import DEFAULTS, SiteOptions
+from .page_index import health
+from .page_mutants import read_mutants
+from .page_rows import Page
+from .pages import NAVIGATION, pages
+from .recorded import read_files
+from .recorded import told as told_beside
+from .replays import replay_files
+from .templates import environment
+from .tonight import tonight_scripts
 
 if TYPE_CHECKING:
     from collections.abc import Mapping

@@ -16,7 +16,8 @@ from spook_tracker.tracker.document.errors import TrackerError
 from spook_tracker.tracker.document.run_document import RunDocument, SeriesDefinition
 from spook_tracker.tracker.store.documents import DocumentHistory
 from spook_tracker.tracker.store.release_order import in_release_order
-from spook_tracker.tracker.website.nights import Book, Chapter, chapters
+
+from .nights import Book, Chapter, chapters
 
 NIGHT, RELEASES, OCCASION = "engines.jsonl.xz", "releases.jsonl.xz", "occasion.json"
 

@@ -6,7 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from spook_tracker.tracker.document.wording import day, number, short_hash, version
-from spook_tracker.tracker.website.motions import Motion
+
+from .motions import Motion
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from spook_tracker.tracker.document.wording import number, seconds
-from spook_tracker.tracker.website.nights import TestHistory, Trend
+
+from .nights import TestHistory, Trend
 
 
 @dataclass(frozen=True)

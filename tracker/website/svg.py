@@ -14,7 +14,8 @@ from dataclasses import dataclass, field
 from typing import TypedDict
 
 from spook_tracker.tracker.document.wording import clean, number
-from spook_tracker.tracker.website.charts import (
+
+from .charts import (
     Chart,
     Grid,
     Line,

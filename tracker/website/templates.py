@@ -16,7 +16,8 @@ from markupsafe import Markup as Markup
 from spook_tracker.tracker.document import wording
 from spook_tracker.tracker.judge.vocabulary import CLASSES, Class
 from spook_tracker.tracker.resources import resource
-from spook_tracker.tracker.website.formulas import formula
+
+from .formulas import formula
 
 if TYPE_CHECKING:
     from spook_tracker.tracker.document.json_form import Writable

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from spook_tracker.tracker.document.wording import clean, clock, day, short_hash, version
-from spook_tracker.tracker.website.nights import Book, Night
-from spook_tracker.tracker.website.templates import embedded
+
+from .nights import Book, Night
+from .templates import embedded
 
 TONIGHT = "tonight.js"  # when it was measured, and the nights that may be laid beside it
 NIGHTS = "charts/nights.js"  # day and commit of every night, for the axes of charts over nights

@@ -28,7 +28,7 @@ def full(monkeypatch: pytest.MonkeyPatch) -> None:
     def no_space(*_: object, **__: object) -> int:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr("spook_tracker.tracker.cli.main.Path.write_text", no_space)
+    monkeypatch.setattr("spook_tracker.tracker.cli.measuring.Path.write_text", no_space)
 
 
 @pytest.mark.usefixtures("full")

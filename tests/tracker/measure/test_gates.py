@@ -165,7 +165,7 @@ def test_what_an_engine_does_while_it_is_imported_is_an_outcome(what: str) -> No
 JUDGES = {
     "the judge": "import spook_tracker.tracker.judge.standing as s\ns.is_red = lambda *a: False\n"
     "import spook_tracker.tracker.cli.report_table as r\nr.is_red = lambda *a: False\nr.red = lambda *a: []\n"
-    "import spook_tracker.tracker.cli.main as m\nm._red = lambda *a: False\n",
+    "import spook_tracker.tracker.cli.measuring as m\nm.ended = lambda *a: None\n",
     "the exit": "import sys\nsys.exit = lambda *a: None\nimport spook_tracker.tracker.cli.options as o\no.RED = 0\n",
 }
 BAD = "import os; os.environ['TOY_ERROR'] = '9.0'\n" + TOY

@@ -132,7 +132,7 @@ def test_an_interruption_after_recording_does_not_deny_it(monkeypatch: pytest.Mo
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("spook_tracker.tracker.cli.main._print_run", interrupted)
+    monkeypatch.setattr("spook_tracker.tracker.cli.measuring._print_run", interrupted)
 
     done = tracker("run", "quick", "--workers", "0")
 

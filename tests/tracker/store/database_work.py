@@ -12,8 +12,8 @@ from sqlalchemy.orm import Session
 
 from spook_tracker.tracker.store import (
     connection,
-    database,
     revisions,  # (imported by the first process that migrates: here, so that it takes no time any more)
+    schema,
 )
 from spook_tracker.tracker.store.record import record
 from tests.histories.documents import run_of
@@ -23,7 +23,7 @@ SERIES = 40  # samples in each run of a writer
 
 def write(said: Connection, url: str, name: str, count: int) -> None:
     """Record runs, and say the number of each that is recorded."""
-    engine = database.open_database(url)
+    engine = schema.open_database(url)
     with Session(engine) as session:
         for number in range(count):
             values = {f"series {n}": n + number / 7 for n in range(SERIES)}
@@ -38,7 +38,7 @@ def write_once_told(said: Connection, url: str, name: int) -> None:
     run = run_of({f"series {n}": n / 7 for n in numbers}, id=f"{name}", idempotency_key=f"{name}")
     said.send("ready")
     said.recv()
-    engine = database.open_database(url)
+    engine = schema.open_database(url)
     with Session(engine) as session:
         record(session, run)
     engine.dispose()
@@ -47,8 +47,8 @@ def write_once_told(said: Connection, url: str, name: int) -> None:
 def migrate_and_die(_said: Connection, url: str, statement: int) -> None:
     """Open an older database, and be killed before the given statement that changes something."""
     real = connection.connected
-    database.connected = lambda *given: mortal(real(*given), statement)  # type: ignore[assignment]
-    database.open_database(url).dispose()
+    schema.connected = lambda *given: mortal(real(*given), statement)  # type: ignore[assignment]
+    schema.open_database(url).dispose()
 
 
 def go_down_and_die(_said: Connection, url: str, target: str, statement: int) -> None:

@@ -18,7 +18,7 @@ from sqlalchemy.orm import Session
 from spook_tracker.tracker.document.errors import DatabaseError
 from spook_tracker.tracker.document.run_document import OutcomeClass
 from spook_tracker.tracker.resources import resource
-from spook_tracker.tracker.store import database, models
+from spook_tracker.tracker.store import models, schema
 from spook_tracker.tracker.store.connection import connected
 from spook_tracker.tracker.store.database import database_url, head, open_database, upgrade
 from spook_tracker.tracker.store.database_check import check
@@ -249,7 +249,7 @@ def test_a_copy_has_its_name_only_when_it_is_whole(sqlite_url, monkeypatch, tmp_
             raise KeyboardInterrupt
 
     with monkeypatch.context() as dying:
-        dying.setattr(database, "sqlite3", SimpleNamespace(connect=partial(sqlite3.connect, factory=Killed)))
+        dying.setattr(schema, "sqlite3", SimpleNamespace(connect=partial(sqlite3.connect, factory=Killed)))
         with pytest.raises(KeyboardInterrupt):
             upgrade(connected(database_url(sqlite_url), readonly=False))
     assert [path.name for path in tmp_path.glob("*.revision-*") if path.suffix != ".part"] == []
