@@ -7,21 +7,18 @@ WORKERS ?= auto  # of the tests in Python: as many as there are cores
 BIN    := $(VENV)/bin
 export PIP_BUILD_CONSTRAINT ?= $(CURDIR)/.ci/build-constraints.txt
 
-.PHONY: help lint tools tidy tidy-deep engines engine-releases recorded wasm three-scene formulas-font nightly test check bench bench-publish bench-heaps bench-smooth bench-replay pictures looks heaps campaign campaign-wide mechanisms mutants mutants-tonight past mutation tolerances detectors pairs aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-python FORCE
+.PHONY: help lint tools tidy tidy-deep engines engine-releases recorded wasm three-scene formulas-font nightly test check bench pictures looks heaps campaign campaign-wide mechanisms mutants mutants-tonight past mutation tolerances detectors pairs aa package release site docs crashes hostile executors serve clean require install develop native-tests fuzz fuzz-keep sanitize sanitize-python FORCE
 help:
 	@echo "make nightly   set up, run every scalar test, record it in $(DB), publish the website in $(OUT)/"
 	@echo "make test      set up, pass all tests (C++ and Python)"
 	@echo "make check     formatting, lint, types, import contracts"
 	@echo "make tidy-deep the core read along every path by clang's analyser: weekly"
-	@echo "make bench     our kernels against hand-written loops, side by side in one run"
+	@echo "make bench     what things cost, as ratios measured side by side in one run: a night of its own, with pages in public-bench/"
+	@echo "make bench-growth_sqlite bench-heaps bench-replay   one of them alone: these take minutes"
 	@echo "make sanitize  the C++ tests with every access and every overflow watched"
 	@echo "make sanitize-python   the Python tests of the engine on a module whose every access is watched"
 	@echo "make fuzz MINUTES=10   each fuzz target, guided by what it reaches: shapes, scenes, documents, settings"
 	@echo "make fuzz-keep         the least of what they have reached goes into the tree"
-	@echo "make bench-publish what a website of 1000 nights costs, and what its pages weigh"
-	@echo "make bench-smooth  what smooth rigid scenes cost to a given error"
-	@echo "make bench-heaps   what heaps and stacks cost, and how it grows"
-	@echo "make bench-replay  what a frame of ten thousand bodies costs in a browser"
 	@echo "make pictures  the pictures in docs/ again, of the nights in $(DB) and of a red night"
 	@echo "make looks     every page of the website in every width and theme, to axe"
 	@echo "make engines   every engine that can be had on every scene: docs/engines.md"
@@ -160,8 +157,15 @@ detectors:
 aa: develop
 	$(BIN)/python bench/aa.py
 
+# Limits hold at once; history and verdicts are kept beside them. What takes minutes runs when named.
+BENCHES  ?= $(shell $(BIN)/python -c "from bench.catalogue import QUICK; print(*QUICK)")
+BENCH_DB ?= sqlite:///bench.db
+BENCH    := $(BIN)/tracker run --catalogue bench.catalogue --db $(BENCH_DB) --workers 1 --memory 0 --time-limit 36000 --all
 bench: develop
-	$(BIN)/python bench/run.py
+	$(BENCH) $(BENCHES); kept=$$?; $(BIN)/tracker publish --db $(BENCH_DB) --out public-bench --title "What it costs"; exit $$kept
+
+bench-%:
+	$(MAKE) bench BENCHES=$*
 
 # Every engine that can be had on every scene, and the page that says which is first where; TESTS="door pendulum": those alone.
 engines engine-releases: export TRACKER_NODE_MODULES ?= $(CURDIR)/build/engines/node_modules
@@ -178,19 +182,6 @@ recorded: develop
 	$(if $(TESTS),$(BIN)/python bench/recorded.py --restore)
 	$(MAKE) engines $(if $(TESTS),,engine-releases)
 	$(BIN)/python bench/recorded.py
-
-bench-publish: develop
-	$(BIN)/python bench/bench_publish.py
-
-bench-replay: develop
-	$(BIN)/python bench/bench_replay.py
-
-# What smooth rigid scenes cost to a given error.
-bench-smooth: develop
-	$(BIN)/python bench/run.py smooth
-
-bench-heaps: develop
-	$(BIN)/python bench/bench_heaps.py
 
 # Where clang-19 and its WebAssembly libraries are; .ci/install-system gets them on Debian.
 wasm: tools

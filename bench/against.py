@@ -21,14 +21,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parent))
+sys.path.insert(0, str(Path(__file__).parent.parent))
 
-sys.path.insert(1, str(Path(__file__).parent.parent))
-
-import bench_heaps as heaps
-import bench_particles as scenes
-import bench_smooth as smooth
-
+import bench.bench_heaps as heaps
+import bench.bench_particles as scenes
+import bench.bench_smooth as smooth
 from spook_tracker.engine import Box, Distance, Method, Particle, Scene, Spring, compile
 from spook_tracker.scalar_tests import double_pendulum, rotating_box
 

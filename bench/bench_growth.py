@@ -1,20 +1,15 @@
 """How does the history grow? Nights of 1000 series up to ten million samples, on SQLite and on PostgreSQL, and at each
 size what people wait for: one night in, one series, one comparison, the website, and how large it all is.
 
-    python bench/bench_growth.py [--samples 100000 1000000 10000000] [--only sqlite] [--without-website]
-
 The first hundred nights are recorded as any other; further ones are copied inside the database, 2 % of their values
 changed, which takes a tenth of the time and leaves the same rows. Each measure is a command of its own, as a user runs
 it, start included, the less of two goes; times are of the processor, on PostgreSQL the server's beside the client's.
 What is there beyond the smallest size grows with a power of the samples: its exponent is taken between the two largest
-sizes, and carried on to a hundred million, on paper. Ten million are 27 years of these nights. Exit code 1 where an exponent is above GROWS,
-one night in costs more than NIGHT times what it costs in the smallest history, or one more night of the website more than
-MORE seconds (on another machine as much more as Python takes there) or MOST_MEMORY.
+sizes. Ten million are 27 years of these nights.
 """
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import math
 import os
@@ -24,17 +19,17 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from sqlalchemy import BigInteger, Column, Connection, Engine, MetaData, Table, insert, select, text
 from sqlalchemy.orm import Session
 
-sys.path.insert(0, str(Path(__file__).parent.parent))
-
 from bench.bench_storage import CHANGED, SERIES, definitions, night
-from bench.floors import here
+from bench.costs import asked, bench, cost, in_units
+from spook_tracker.scalar_tests.case import Metric
 from spook_tracker.tracker.document.run_document import RunDocument, SeriesDefinition
 from spook_tracker.tracker.store import models, rows
 from spook_tracker.tracker.store.database import open_database
@@ -42,27 +37,14 @@ from spook_tracker.tracker.store.identity import identity
 from spook_tracker.tracker.store.record import record
 from spook_tracker.tracker.store.transfer import write_document
 
+SIZES = (100_000, 1_000_000, 10_000_000)  # samples
 RECORDED = 100  # nights that go the usual way before others are copied
 AT_ONCE = 500  # nights in one statement
 LOOKS = 0.02  # s between two looks at a command's memory
 NOISE = 0.1  # of a measure: a smaller difference between two sizes is none
-GROWS = 1.3  # exponent; 1.17 at most when it was set
-NIGHT = 1.5  # × one night in, of the smallest size; less than 1 when it was set
-MORE = 5.0  # s of the processor for one more night of a website, of whatever size
-MOST_MEMORY = 0.6  # GB, the same
-PLANNED = 100_000_000  # samples, on paper
-MEASURES = ("one night in", "one series", "one comparison", "the website", "one more night of it")
+COMMANDS = ("night", "series", "comparison", "website", "one_more")
+SIZED = ("website_memory", "one_more_memory", "database")  # GB
 CHANCE = {"sqlite": f"abs(random() % {round(1 / CHANGED)}) = 0", "postgresql": f"random() < {CHANGED}"}
-
-
-@dataclass
-class Measured:
-    """One size of one database."""
-
-    samples: int
-    size: int  # bytes
-    seconds: dict[str, float] = field(default_factory=dict)  # of the processor
-    memory: dict[str, float] = field(default_factory=dict)  # GB, of the command at its largest
 
 
 @dataclass
@@ -160,8 +142,8 @@ def largest_so_far(process: int) -> float:
     return int(found[0]) * 1024 / 1e9 if found else 0.0
 
 
-def measure(place: Place, engine: Engine, number: int, folder: Path, without_website: bool) -> Measured:
-    """What people wait for in a history of that many nights; it has three more afterwards."""
+def measured(place: Place, engine: Engine, number: int, folder: Path) -> dict[str, float]:
+    """What people wait for in a history of that many nights [s, GB]; it has three more afterwards."""
     series, chance = definitions(), random.Random(number)
     if engine.dialect.name == "postgresql":
         with engine.connect().execution_options(isolation_level="AUTOCOMMIT") as connection:
@@ -169,106 +151,37 @@ def measure(place: Place, engine: Engine, number: int, folder: Path, without_web
             size = connection.scalar(text("SELECT pg_database_size(current_database())"))
     else:
         size = Path(str(engine.url.database)).stat().st_size
-    found = Measured(number * SERIES, int(size or 0))
     for further in (number, number + 1, number + 2):
         write_document(night(further, series, chance), folder / f"{further}.json")
-    asked: dict[str, list[tuple[str, ...]]] = {
-        "one night in": [("import", str(folder / f"{n}.json")) for n in (number, number + 1)],
-        "one series": [("trend", "test7", "metric7")] * 2,
-        "one comparison": [("compare", "previous", "latest")] * 2,
-        "the website": [("publish", "--out", str(folder / "public"))],
-        "one more night of it": [("publish", "--out", str(folder / "public"))],
+    publish = ("publish", "--out", str(folder / "public"))
+    goes: dict[str, list[tuple[str, ...]]] = {
+        "night": [("import", str(folder / f"{n}.json")) for n in (number, number + 1)],
+        "series": [("trend", "test7", "metric7")] * 2,
+        "comparison": [("compare", "previous", "latest")] * 2,
+        "website": [publish],
+        "one_more": [("import", str(folder / f"{number + 2}.json")), publish],
     }
-    for name in MEASURES:
-        if without_website and name in MEASURES[3:]:
-            continue
-        if name == "one more night of it":
-            command(place, "import", str(folder / f"{number + 2}.json"))
-        taken = [command(place, *words) for words in asked[name]]
-        found.seconds[name], found.memory[name] = (
-            min(seconds for seconds, _ in taken),
-            max(gb for _, gb in taken),
+    found = {"database": float(size or 0) / 1e9}
+    for name, words in goes.items():
+        taken = [command(place, *one) for one in words]
+        counted = taken[-1:] if name == "one_more" else taken
+        found[name] = min(seconds for seconds, _ in counted)
+        found[f"{name}_memory"] = max(gb for _, gb in counted)
+        print(
+            f"  {number * SERIES:>11,} samples, {name}: {found[name]:.2f} s, {found[f'{name}_memory']:.2f} GB",
+            flush=True,
         )
-        print(f"  {found.samples:>11,} samples, {name}: {found.seconds[name]:.2f} s, "
-              f"{found.memory[name]:.2f} GB", flush=True)  # fmt: skip
     shutil.rmtree(folder / "public", ignore_errors=True)
     (folder / ".public.kept").unlink(missing_ok=True)
     return found
 
 
-def table(kind: str, found: list[Measured]) -> Iterator[str]:
-    """What was measured, the exponent between the two largest sizes, and what follows for the size on paper."""
-    yield f"| {kind} | {' | '.join(f'{at.samples:,}' for at in found)} | exponent | {PLANNED:,}, on paper |"
-    yield "|---" * (len(found) + 3) + "|"
-    for name in MEASURES:
-        yield line(
-            name, [(at.samples, at.seconds[name]) for at in found if name in at.seconds], "s", len(found)
-        )
-    for name in MEASURES[3:]:
-        memory = [(at.samples, at.memory[name]) for at in found if name in at.memory]
-        yield line(f"{name}, memory", memory, "GB", len(found))
-    yield line("the database", [(at.samples, at.size / 1e9) for at in found], "GB", len(found))
-
-
-def two_digits(value: float) -> str:
-    """Two significant digits, without an exponent."""
-    rounded = float(f"{value:.2g}")
-    return f"{rounded:.0f}" if rounded >= 10.0 else f"{rounded:g}"
-
-
-def exponent(values: list[tuple[int, float]]) -> float | None:
-    """Of what grows beyond the smallest size; none where there are too few sizes, or they differ by noise alone."""
-    if len(values) < 3:
-        return None
-    (_, least), (smaller, before), (larger, last) = values[0], *values[-2:]
+def exponent(sizes: Sequence[int], values: Sequence[float]) -> float:
+    """Of what grows beyond the smallest size; 0 where the two largest differ by noise alone."""
+    least, before, last = values[0], *values[-2:]
     if last - before < NOISE * last or before <= least:
-        return None
-    return math.log((last - least) / (before - least)) / math.log(larger / smaller)
-
-
-def line(name: str, values: list[tuple[int, float]], unit: str, columns: int) -> str:
-    """One measure over the sizes."""
-    told = [f"{two_digits(value)} {unit}" for _, value in values]
-    told += ["not measured"] * (columns - len(told))
-    if len(values) < 3:
-        return f"| {name} | {' | '.join(told)} | | |"
-    (_, least), (_, before), (larger, last) = values[0], *values[-2:]
-    if last - before < NOISE * last:
-        return f"| {name} | {' | '.join(told)} | none seen | {two_digits(last)} {unit} |"
-    power = exponent(values)
-    if power is None:  # no growth to carry on: the smallest two are noise
-        return f"| {name} | {' | '.join(told)} | | |"
-    planned = least + (last - least) * (PLANNED / larger) ** power
-    return f"| {name} | {' | '.join(told)} | {power:.2f} | {two_digits(planned)} {unit} |"
-
-
-def missed(kind: str, found: list[Measured]) -> list[str]:
-    """What grows too much, a sentence each."""
-    over = []
-    measures = {
-        name: [(at.samples, at.seconds[name]) for at in found if name in at.seconds]
-        for name in MEASURES[:4]  # the last has a limit of its own
-    }
-    measures["memory"] = [
-        (at.samples, at.memory["the website"]) for at in found if "the website" in at.memory
-    ]
-    measures["the database"] = [(at.samples, at.size / 1e9) for at in found]
-    for name, values in measures.items():
-        power = exponent(values)
-        if power is not None and power > GROWS:
-            over.append(f"{kind}: {name} grows with the power {power:.2f} (limit {GROWS:g})")
-    for at in found:
-        name = "one more night of it"
-        if kind == "SQLite" and at.seconds.get(name, 0.0) > here(MORE, "interpreter"):
-            over.append(
-                f"{kind}: {name} takes {at.seconds[name]:.1f} s (limit {here(MORE, 'interpreter'):.1f})"
-            )
-        if at.memory.get(name, 0.0) > MOST_MEMORY:
-            over.append(f"{kind}: {name} takes {at.memory[name]:.2f} GB (limit {MOST_MEMORY:g})")
-    nights = measures["one night in"]
-    if nights and nights[-1][1] > NIGHT * nights[0][1]:
-        over.append(f"{kind}: one night in takes {nights[-1][1] / nights[0][1]:.1f} × (limit {NIGHT:g})")
-    return over
+        return 0.0
+    return math.log((last - least) / (before - least)) / math.log(sizes[-1] / sizes[-2])
 
 
 @contextlib.contextmanager
@@ -288,35 +201,68 @@ def place_of(kind: str, folder: Path) -> Iterator[Place]:
         yield Place(url, number)
 
 
-def main() -> int:
-    options = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    options.add_argument("--samples", type=int, nargs="+", default=[100_000, 1_000_000, 10_000_000])
-    options.add_argument("--only", choices=("sqlite", "postgresql"), help="one kind of database")
-    options.add_argument(
-        "--without-website", action="store_true", help="it needs some 6 GB of memory at ten million"
-    )
-    given = options.parse_known_args()[0]
-    over: list[str] = []
-    for kind in [given.only] if given.only else ["sqlite", "postgresql"]:
-        with tempfile.TemporaryDirectory() as name, place_of(kind, Path(name)) as place:
-            engine, there, found = open_database(place.url), 0, []
-            for samples in sorted(given.samples):
-                nights = max(2, samples // SERIES)
-                start = time.process_time()
-                fill(engine, there, nights, definitions())
-                print(f"  filled to {nights * SERIES:,} in {time.process_time() - start:.0f} s of our processor time",
-                      flush=True)  # fmt: skip
-                engine.dispose()
-                found.append(measure(place, engine, nights, Path(name), given.without_website))
-                there = nights + 3
+def growing(kind: str) -> dict[str, float]:
+    """Every measure at its largest, and how it grows."""
+    found = []
+    with tempfile.TemporaryDirectory() as name, place_of(kind, Path(name)) as place:
+        engine, there = open_database(place.url), 0
+        for samples in SIZES:
+            nights = samples // SERIES
+            fill(engine, there, nights, definitions())
             engine.dispose()
-        name_of_kind = {"sqlite": "SQLite", "postgresql": "PostgreSQL"}[kind]
-        print("\n".join(table(name_of_kind, found)), flush=True)
-        over += missed(name_of_kind, found)
-    for sentence in over:
-        print(f"MISSED: {sentence}")
-    return 1 if over else 0
+            found.append(measured(place, engine, nights, Path(name)))
+            there = nights + 3
+        engine.dispose()
+    answer = {name: found[-1][name] for name in (*COMMANDS, *SIZED)}
+    answer |= {f"{name}_grows": exponent(SIZES, [at[name] for at in found]) for name in (*COMMANDS, *SIZED)}
+    return answer | {
+        "times_smallest": found[-1]["night"] / found[0]["night"],
+        "one_more_entries": in_units(found[-1]["one_more"], "entry"),
+    }
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+def grows(kind: str) -> tuple[Metric, ...]:
+    """Limits of what people wait for; one more night of the website is bounded whatever its exponent."""
+    lasts = [
+        cost(
+            name,
+            f"with {SIZES[-1]:,} samples",
+            0.6 if name == "one_more_memory" else None,
+            unit="GB" if name in SIZED else "s",
+        )
+        for name in (*COMMANDS, *SIZED)
+    ]
+    powers = [
+        cost(
+            f"{name}_grows",
+            "exponent in the samples",
+            None if name.startswith("one_more") else 1.3,
+            "a logarithm above 1",
+        )
+        for name in (*COMMANDS, *SIZED)
+    ]
+    night = cost(
+        "times_smallest",
+        "one night in, by that of the smallest history",
+        1.5,
+        "it reads the last nights alone",
+    )
+    more = cost(
+        "one_more_entries",
+        "one more night of the website",
+        3.7e7 if kind == "sqlite" else None,
+        "five seconds",
+        unit="entry",
+    )
+    return *lasts, *powers, night, more
+
+
+TESTS = {
+    f"growth_{kind}": bench(
+        f"Growth on {title}",
+        "How does what people wait for grow with the history?",
+        asked(f"{SIZES[-1]:,} samples", partial(growing, kind), *grows(kind)),
+        beside="smaller histories, and Python on this machine",
+    )
+    for kind, title in (("sqlite", "SQLite"), ("postgresql", "PostgreSQL"))
+}

@@ -1,16 +1,12 @@
 """What it costs to import a history: nights with their figures as files, read, checked and stored.
 
-    python bench/bench_import.py [--nights 1000]
-
-Synthetic runs (`tests/histories/synthetic.py`) stand for the nights, 0.3 MB of JSON each, most of it figures. Times are of
-the processor. Beside the import, between its goes, the same by hand: files read as plain JSON, each sample and each
-definition a row, each figure deflated, one transaction. Ends with 1 where the lesser of the goes is more than MOST times
-the lesser by hand.
+Synthetic runs (`tests/histories/synthetic.py`) stand for the nights, 0.3 MB of JSON each, most of it figures. Beside the
+import, between its goes, the same by hand: files read as plain JSON, each sample and each definition a row, each figure
+deflated, one transaction. The lesser of the goes counts.
 """
 
 from __future__ import annotations
 
-import argparse
 import resource
 import sqlite3
 import subprocess
@@ -23,12 +19,11 @@ from pathlib import Path
 
 import msgspec
 
-sys.path.insert(0, str(Path(__file__).parent.parent))
-
+from bench.costs import asked, bench, cost
 from spook_tracker.tracker.store.transfer import write_document
 from tests.histories.synthetic import decade
 
-MOST = 2.0  # ×; 1.6 when it was set
+NIGHTS = 1000
 GOES = 2
 EARLIER = timedelta(days=3650)
 
@@ -41,10 +36,9 @@ def long_ago(moment: str) -> str:
 def imported(folder: Path, database: Path) -> float:
     """Seconds of processor time for the files of the folder, by the command, start included."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
-    asked = ["import", str(folder), "--db", f"sqlite:///{database}"]
-    said = subprocess.run([sys.executable, "-m", "spook_tracker", *asked], check=True, capture_output=True)
+    words = ["import", str(folder), "--db", f"sqlite:///{database}"]
+    subprocess.run([sys.executable, "-m", "spook_tracker", *words], check=True, capture_output=True)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    print(said.stdout.decode().strip())
     return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
@@ -68,14 +62,12 @@ def by_hand(folder: Path, database: Path) -> float:
     return time.process_time() - start
 
 
-def main() -> int:
-    reader = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    reader.add_argument("--nights", type=int, default=1000)
-    nights = reader.parse_known_args()[0].nights
+def import_a_history() -> dict[str, float]:
+    """The command, start included, by the same by hand."""
     with tempfile.TemporaryDirectory() as place:
         folder = Path(place) / "runs"
         folder.mkdir()
-        for run in decade(nights).documents.values():
+        for run in decade(NIGHTS).documents.values():
             whole = msgspec.structs.replace(
                 run, idempotency_key=run.id, started=long_ago(run.started), finished=long_ago(run.finished)
             )
@@ -85,11 +77,23 @@ def main() -> int:
             for go in range(GOES)
         ]
     took, floor = map(min, zip(*goes, strict=True))
-    print(
-        f"{took:.1f} s of processor time, start included; {floor:.1f} s by hand: {took / floor:.2f} × (limit {MOST:g})"
+    return {"times_by_hand": took / floor}
+
+
+TESTS = {
+    "import": bench(
+        "Import of a history",
+        "What does it cost to import a history of files?",
+        asked(
+            f"{NIGHTS} nights",
+            import_a_history,
+            cost(
+                "times_by_hand",
+                "`tracker import`, by plain JSON into plain rows",
+                2.0,
+                "checks and identities",
+            ),
+        ),
+        beside="the same files stored by hand, unchecked",
     )
-    return 1 if took > MOST * floor else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())
+}

@@ -1,33 +1,24 @@
 """What a year of nights costs a CI service that keeps its history as one file a month.
 
-    python bench/bench_months.py [--nights 365]
-
 Synthetic runs (`tests/histories/synthetic.py`, 0.3 MB of JSON each, most of it figures) stand for the nights, one a day;
 every run time and one value in fifty is another one each night, as those of a real night are.
 Times are of the processor, as `tracker ci night` spends them beside measuring: bringing the files in, with the database
 remembered from the night before (the usual case) and without, and writing the month again with one night more.
-
-Limits, as ratios, with exit code 1: a night writes one file, of a twelfth of the year, and takes no more than AGAIN of the
-time that all files take; with the database remembered it costs no more than REMEMBERED of bringing everything in; and
-files are no larger than SMALL times the plain JSON.
 """
 
 from __future__ import annotations
 
-import argparse
 import random
-import sys
 import tempfile
 import time
 from collections.abc import Callable
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import msgspec
 
-sys.path.insert(0, str(Path(__file__).parent.parent))
-
+from bench.costs import asked, bench, cost, exact
 from spook_tracker.tracker.document.json_form import encode
 from spook_tracker.tracker.document.run_document import RunDocument, Sample
 from spook_tracker.tracker.store.database import session_on
@@ -36,9 +27,8 @@ from spook_tracker.tracker.store.months import export_months, import_months
 from spook_tracker.tracker.store.record import record
 from tests.histories.synthetic import decade
 
-AGAIN = 0.15  # ×; .07 when it was set, and 31 nights of 365 are .085
-REMEMBERED = 0.1  # ×; .04 when it was set
-SMALL = 0.02  # ×; .01 when it was set
+T = TypeVar("T")
+NIGHTS = 365
 FIRST = datetime(2025, 12, 1, 3, 17, tzinfo=UTC)
 
 
@@ -61,77 +51,62 @@ def other(run: RunDocument, chance: random.Random) -> RunDocument:
     return msgspec.structs.replace(run, samples=tuple(map(changed, run.samples)))
 
 
-def taken(what: str, work: Callable[[], Any], seconds: dict[str, float]) -> Any:
-    """Do it and print, and keep, what the processor did for it."""
+def taken(work: Callable[[], T]) -> tuple[float, T]:
+    """Seconds of the processor, and what came of it."""
     start = time.process_time()
     result = work()
-    seconds[what] = time.process_time() - start
-    print(f"{what:<64}{seconds[what]:8.2f} s", flush=True)
-    return result
+    return time.process_time() - start, result
 
 
-def missed(claims: dict[str, tuple[float, float]]) -> bool:
-    """Whether a value is above its limit; says each."""
-    for name, (value, limit) in claims.items():
-        print(f"{name}: {value:.3f} × (limit {limit:g}){'' if value <= limit else '  MISSED'}")
-    return any(not value <= limit for value, limit in claims.values())
-
-
-def size(folder: Path) -> int:
-    return sum(path.stat().st_size for path in folder.iterdir())
-
-
-def main() -> int:
-    reader = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    reader.add_argument("--nights", type=int, default=365)
-    nights = reader.parse_known_args()[0].nights
-    spent: dict[str, float] = {}
+def a_year() -> dict[str, float]:
+    """One night more on the last day of a month, where its file is largest."""
     with tempfile.TemporaryDirectory() as name:
-        place, url = Path(name), f"sqlite:///{name}/tracker.db"
-        months = place / "history"
+        url, months = f"sqlite:///{name}/tracker.db", Path(name) / "history"
         plain, chance = 0, random.Random(1)
         with session_on(url) as session:
-            for number, run in enumerate(decade(nights).documents.values()):
+            for number, run in enumerate(decade(NIGHTS).documents.values()):
                 day = (FIRST + timedelta(days=number)).isoformat()
                 dated = other(run, chance)
                 dated = msgspec.structs.replace(dated, idempotency_key=run.id, started=day, finished=day)
                 plain += len(encode(dated))
-                if number == nights - 1:  # the last day of a month, where its file is largest
-                    taken(
-                        "write all months but a night",
-                        lambda: export_months(History(session), months),
-                        spent,
-                    )
-                    before = size(months)
+                if number == NIGHTS - 1:
+                    every, _ = taken(lambda: export_months(History(session), months))
                 record(session, dated)
-            files = taken(
-                "write the month again with one night more",
-                lambda: export_months(History(session), months),
-                spent,
-            )
-        print(f"{nights} nights: {plain / 1e6:.0f} MB as plain JSON, {size(months) / 1e6:.1f} MB in "
-              f"{len(list(months.iterdir()))} files; one night more: {(size(months) - before) / 1e3:.0f} kB, "
-              f"{len(files)} file of {files[0].stat().st_size / 1e6:.2f} MB written")  # fmt: skip
-        every = sorted(months.iterdir())
+            again, written = taken(lambda: export_months(History(session), months))
+        files = sorted(months.iterdir())
+        size = sum(path.stat().st_size for path in files)
         with session_on(url) as session:
-            there = taken(
-                "bring all months in, database remembered", lambda: import_months(session, every), spent
-            )
-            assert there == (0, nights)
+            remembered, there = taken(lambda: import_months(session, files))
         with session_on(f"sqlite:///{name}/new.db") as session:
-            new = taken("bring all months in, database lost", lambda: import_months(session, every), spent)
-            assert new == (nights, 0)
-        again, remembered, lost = list(spent.values())[1:]
-        over = missed(
-            {
-                "one night more, beside all": (again / spent["write all months but a night"], AGAIN),
-                "remembered, beside lost": (remembered / lost, REMEMBERED),
-                "files, beside plain JSON": (size(months) / plain, SMALL),
-                "files written for one night": (float(len(files)), 1.0),
-            }
-        )
-    return 1 if over else 0
+            lost, new = taken(lambda: import_months(session, files))
+        assert (there, new) == ((0, NIGHTS), (NIGHTS, 0))
+    return {
+        "one_night_more": again / every,
+        "remembered": remembered / lost,
+        "size": size / plain,
+        "files_written": float(len(written)),
+    }
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+TESTS = {
+    "months": bench(
+        "History as a file a month",
+        "What does a night cost where the history is a file a month?",
+        asked(
+            f"{NIGHTS} nights",
+            a_year,
+            cost("one_night_more", "its month written, by all written", 0.15, "31 nights of 365 are .085"),
+            cost(
+                "remembered",
+                "all months brought in with the database kept, by lost",
+                0.1,
+                "nothing is decoded",
+            ),
+            exact(
+                "size", "of the files, by plain JSON", 0.02, "most values never change", unit="1", change=0.01
+            ),
+            exact("files_written", "for one night", 1.0, "its month's", unit="1"),
+        ),
+        beside="all months written and brought in, and plain JSON",
+    )
+}

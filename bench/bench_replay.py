@@ -1,11 +1,9 @@
 """What a frame of a replay costs: script for ten thousand bodies that move and turn, drawn without a graphics card.
 
-    make bench-replay
-
 A trajectory that no engine made (boxes and balls, positions and orientations between two samples, so that both are
 interpolated) is played in headless Chromium. `player.cost` is the script of one frame: every body placed, the
-picture asked for, the curves moved. An absolute limit, unlike the ratios of `make bench`: a frame of a screen is
-16.7 ms long, and half of that is left to the browser. Exit code 1 if the median is above it.
+picture asked for, the curves moved. An absolute limit: a frame of a screen is 16.7 ms long on any machine, and half of
+that is left to the browser.
 
 What a night records is less: a scene's first 300 bodies (`MOST_SOLIDS`), because a trajectory has 120 kB
 (`MOST_BYTES`) and ten thousand bodies need 140 kB for a single sample.
@@ -13,20 +11,18 @@ What a night records is less: a scene's first 300 bodies (`MOST_SOLIDS`), becaus
 
 from __future__ import annotations
 
-import argparse
 import statistics
-import sys
 import tempfile
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).parent.parent))
-
+from bench.costs import asked, bench, cost
+from spook_tracker.engine.protocol import NotSupported
 from tests.website.browser import MISSING, browser, programs
 
 STATIC = Path(__file__).parent.parent / "site" / "static"
 BODIES = 10_000
-MOST = 8.0  # ms of script a frame
 PATIENCE = 300.0  # s
 FRAMES, WARM = 30, 5  # without a graphics card a picture of this many takes a good part of a second to draw
 SCRIPTS = ("site.js", "three-scene.min.js", "scene-poses.js", "scene-marks.js", "scene-view.js", "player.js")
@@ -67,29 +63,38 @@ def frames(driver: Any, page: Path, *, bodies: int, ghost: bool) -> tuple[list[f
     return costs, calls
 
 
-def main() -> None:
-    reader = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
-    reader.add_argument("--bodies", type=int, default=BODIES)
-    reader.add_argument("--ghost", action="store_true", help="and as many of another night, seen through")
-    asked = reader.parse_args([] if sys.argv[0].endswith("run.py") else None)
+def played(ghost: bool) -> dict[str, float]:
+    """Script a frame [ms], the median and what one in ten is above. NotSupported without a browser."""
     found = programs()
     if found is None:
-        print(MISSING)
-        return
+        raise NotSupported(MISSING)
     with tempfile.TemporaryDirectory() as folder, browser(*found) as driver:
         driver.set_script_timeout(PATIENCE)
         page = Path(folder) / "frames.html"
         scripts = "".join(f'<script src="{(STATIC / name).as_uri()}"></script>' for name in SCRIPTS)
         page.write_text(PAGE + scripts, encoding="utf-8")
-        costs, calls = frames(driver, page, bodies=asked.bodies, ghost=asked.ghost)
-    middle, late = statistics.median(costs), statistics.quantiles(costs, n=10)[-1]
-    print(
-        f"{asked.bodies} bodies: {middle:.1f} ms of script a frame, one frame in ten above {late:.1f} ms; "
-        f"{calls} draw calls"
+        costs, calls = frames(driver, page, bodies=BODIES, ghost=ghost)
+    return {
+        "frame": statistics.median(costs),
+        "slow_frame": statistics.quantiles(costs, n=10)[-1],
+        "draw_calls": calls,
+    }
+
+
+TESTS = {
+    "replay": bench(
+        "Replay",
+        f"What does a frame of {BODIES} bodies cost in a browser?",
+        *(
+            asked(
+                title,
+                partial(played, ghost),
+                cost("frame", "script of the median frame", limit, "half a frame of a screen", unit="ms"),
+                cost("slow_frame", "one in ten is above", unit="ms"),
+                cost("draw_calls", "of a frame"),
+            )
+            for title, ghost, limit in (("alone", False, 8.0), ("beside another night", True, None))
+        ),
+        beside="a frame of a screen, 16.7 ms",
     )
-    if middle > MOST:
-        sys.exit(f"above {MOST} ms a frame")
-
-
-if __name__ == "__main__":
-    main()
+}

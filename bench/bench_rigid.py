@@ -1,51 +1,33 @@
 """What a locked chain, a door on many hinges and a stack cost per step: proportional to their size, or not.
 
-    python bench/bench_rigid.py [--largest 10000]
-
 Each time is the shortest of many short runs, because other work on the machine only ever adds. The chain is the
 peers' scene: n boxes locked in a row to the wall, full inertia, rows, one factorisation and one refinement. The ring is
 held at both ends: no tree, so that its blocks are factored, with everything else the same. Mechanisms in a plane stand
 beside the same ones by the rows of space, interleaved, and rods on hinges beside a loop written by hand for them alone
 (`rigid_loops.cpp`), which must end in the same state.
-
-Limits, with exit code 1: at its longest a chain costs no more per body than GROWTH times its cheapest length, and
-MOST ns, on another machine as much more as arithmetic takes there (`bench/floors.py`). The first holds steps and what a run keeps of them to
-take them back: 0.8 kB a link are read once they have left the caches, and copied once in sixteen steps. A ring, whose
-factor leaves the caches as well, grows by RING at most, what a hinge of a door and a box of a stack costs by GROWTH.
-Numbers of a plane are FASTER times as fast as rows of space, and no slower than HAND times the loop by hand: what it
-costs to be told at run time how many bodies and joints there are, and of which kind, to keep impulses and to weigh each
-step.
 """
 
 from __future__ import annotations
 
-import argparse
 import ctypes
 import itertools
 import math
-import sys
 import tempfile
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
-from bench_particles import build_loops
-
-sys.path.insert(0, str(Path(__file__).parent.parent))
-
-from bench.floors import here
+from bench.bench_particles import build_loops
+from bench.costs import asked, bench, cost, exact, in_units
 from spook_tracker.engine import WORLD, Box, Hinge, Lock, Method, Plane, Program, RigidBody, Scene, compile
+from spook_tracker.scalar_tests.case import Metric
 from spook_tracker.scalar_tests.multibody import four_bars
 
 TIME_STEP = 1.0 / 60.0  # s
 EDGE = (0.125, 0.1, 0.1)  # m
-GROWTH, MOST = 1.2, 350.0  # ×; ns per locked body and step
-RING = 2.0  # ×; 1.6 when it was set
-FASTER = 2.0  # ×
-HAND = 7.0  # × a loop by hand; 4.0 for one rod to 6.0 for forty when it was set
-ROUNDING = 1e-9  # m, between two orders of the same sums, in SAME steps: rods on hinges are chaotic later
-SAME = 60
+SAME = 60  # steps: rods on hinges are chaotic later
 
 
 def chain(count: int) -> Scene:
@@ -141,100 +123,104 @@ PLANES = {
 }
 
 
-def planes() -> bool:
-    """A line per mechanism: ns a step in a plane and by the rows of space. Whether one is not fast enough."""
-    print(f"mechanisms in a plane: ns per step, by rows of space, × (at least {FASTER:g})")
-    missed = False
-    for name, scene in PLANES.items():
-        methods = (Method(), Method(force_stages=("solve_block",)))
-        programs = [compile(scene, time_step=TIME_STEP / 4.0, method=method) for method in methods]
-        steps = 20_000 // len(scene.bodies)
-        rounds = [[p.run(steps).cpu_seconds / steps for p in programs] for _ in range(9)]
-        plane, space = (1e9 * min(times) for times in zip(*rounds, strict=True))
-        late = space < FASTER * plane
-        missed = missed or late
-        print(
-            f"  {name:28s} {plane:8.0f}  {space:8.0f}  {space / plane:6.2f}{'  MISSED' if late else ''}",
-            flush=True,
-        )
-    return missed
+def in_a_plane(scene: Scene) -> dict[str, float]:
+    """A step by the rows of space, by one in the numbers of the plane, interleaved."""
+    methods = (Method(), Method(force_stages=("solve_block",)))
+    programs = [compile(scene, time_step=TIME_STEP / 4.0, method=method) for method in methods]
+    steps = 20_000 // len(scene.bodies)
+    rounds = [[p.run(steps).cpu_seconds / steps for p in programs] for _ in range(9)]
+    plane, space = map(min, zip(*rounds, strict=True))
+    return {"times_faster": space / plane}
 
 
-def by_hand() -> bool:
-    """A line per row of rods: ns a step in a plane and of the loop by hand, interleaved. Whether one is not fast enough,
-    or ends elsewhere."""
-    print(f"rods on hinges: ns per step, by a loop written for them, × (at most {HAND:g}), same state")
-    missed = False
+def by_hand(count: int) -> dict[str, float]:
+    """Rods in a plane by a loop written for them, interleaved, and how far apart both are after SAME steps [m]."""
     with tempfile.TemporaryDirectory() as folder:
         loop = build_loops(Path(folder), "rigid_loops.cpp").rods
         loop.restype = ctypes.c_double
-        for count in (1, 2, 5, 40):
-            program, steps = compile(rods(count), time_step=TIME_STEP / 4.0), 20_000 // count
-            ours, hand = math.inf, math.inf
-            for _ in range(25):
-                begin = time.process_time()
-                loop(ctypes.c_long(count), ctypes.c_long(steps))
-                hand = min(hand, (time.process_time() - begin) / steps)
-                ours = min(ours, program.run(steps).cpu_seconds / steps)
-            end = next(reversed(program.run(SAME).final_state.values()))[0]
-            same = abs(end - loop(ctypes.c_long(count), ctypes.c_long(SAME))) <= ROUNDING
-            late = not same or ours > HAND * hand
-            missed = missed or late
-            print(
-                f"  {count:2d} rods {1e9 * ours:8.0f}  {1e9 * hand:8.0f}  {ours / hand:6.2f}  {'yes' if same else 'NO'}"
-                f"{'  MISSED' if late else ''}",
-                flush=True,
-            )
-    return missed
+        program, steps = compile(rods(count), time_step=TIME_STEP / 4.0), 20_000 // count
+        ours, hand = math.inf, math.inf
+        for _ in range(25):
+            begin = time.process_time()
+            loop(ctypes.c_long(count), ctypes.c_long(steps))
+            hand = min(hand, (time.process_time() - begin) / steps)
+            ours = min(ours, program.run(steps).cpu_seconds / steps)
+        end = next(reversed(program.run(SAME).final_state.values()))[0]
+        apart = abs(end - loop(ctypes.c_long(count), ctypes.c_long(SAME)))
+    return {"times_by_hand": ours / hand, "apart": apart}
 
 
-def report(title: str, unit: str, make: Callable[[int], Scene], sizes: tuple[int, ...]) -> list[float]:
-    """One line per size: time and block operations per step and element, and growth against the smallest. The times
-    [ns]."""
-    print(f"{title}: ns per {unit} and step, × the smallest, block operations per {unit}")
-    smallest, times = None, []
+def grown(make: Callable[[int], Scene], sizes: tuple[int, ...]) -> dict[str, float]:
+    """A step per element: the largest by the cheapest size, in operations; what it costs more, in bytes of memory."""
+    each = []
     for size in sizes:
         program = compile(make(size), time_step=TIME_STEP)
-        each = seconds_per_step(program, size) / size * 1e9
-        smallest = smallest or each
-        times.append(each)
-        work = program.run(10).counters["block_operations"] / 10 / size
-        print(f"  n = {size:6d}  {each:8.0f}  {each / smallest:6.2f}  {work:8.2f}", flush=True)
-    return times
+        each.append(seconds_per_step(program, size) / size)
+    return {
+        "times_cheapest": each[-1] / min(each),
+        "element": in_units(each[-1], "operation"),
+        "more": in_units(each[-1] - min(each), "byte"),
+        "work": program.run(10).counters["block_operations"] / 10 / size,
+    }
 
 
-def grown(times: list[float], limit: float) -> bool:
-    """Whether the largest of one kind costs too much, per element, beside the cheapest; says it."""
-    growth = times[-1] / min(times)
-    missed = growth > limit
-    print(
-        f"  the largest: {growth:.2f} × the cheapest (limit {limit:g}){'  MISSED' if missed else ''}",
-        flush=True,
+def growth(limit: float) -> Metric:
+    return cost(
+        "times_cheapest", "an element and step of the largest, by the cheapest size", limit, "proportional"
     )
-    return missed
 
 
-def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--largest", type=int, default=100_000, help="longest chain (default 100000)")
-    largest = parser.parse_known_args()[0].largest
-    times = report(
-        "chain of locked boxes", "body", chain, tuple(10**k for k in range(1, 6) if 10**k <= largest)
+ELEMENT = cost("element", "an element and step of the largest", unit="operation")
+WORK = cost("work", "block operations an element and step of the largest")
+TESTS = {
+    "rigid": bench(
+        "Rigid bodies on joints",
+        "What does a step of joints cost, and how does it grow with their number?",
+        asked(
+            "chain of 100000 locks",
+            partial(grown, chain, (10, 100, 1000, 10_000, 100_000)),
+            # Steps, and what a run keeps of them to take them back: 0.8 kB a link that are read once they have left the
+            # caches, and copied once in sixteen steps.
+            growth(1.2),
+            cost("element", "a link and step of the longest", 748.0, "what the peers take", unit="operation"),
+            cost("more", "by which a link costs more than in the cheapest chain", unit="byte"),
+            WORK,
+            time_step=TIME_STEP,
+        ),
+        *(
+            asked(title, partial(grown, make, sizes), growth(limit), ELEMENT, WORK, time_step=TIME_STEP)
+            for title, make, sizes, limit in (
+                (
+                    "ring of 10000 locks",
+                    ring,
+                    (10, 100, 1000, 10_000),
+                    2.0,
+                ),  # its factor leaves the caches as well
+                ("door on 200 hinges", door, (1, 2, 10, 50, 200), 1.2),
+                ("stack of 20", stack, (1, 5, 20), 1.2),
+            )
+        ),
+        *(
+            asked(
+                title,
+                partial(in_a_plane, scene),
+                cost("times_faster", "a step by rows of space, by one in the plane", 2.0, better="larger"),
+                time_step=TIME_STEP / 4.0,
+            )
+            for title, scene in PLANES.items()
+        ),
+        *(
+            asked(
+                f"rods, {count}",
+                partial(by_hand, count),
+                # To be told at run time how many bodies and joints there are, and of which kind, to keep impulses and
+                # to weigh each step.
+                cost("times_by_hand", "a step, by a loop written for rods", 7.0, "what being general costs"),
+                exact("apart", "how far from the loop's end we end", 1e-9, "rounding", unit="m"),
+                time_step=TIME_STEP / 4.0,
+            )
+            for count in (1, 2, 5, 40)
+        ),
+        beside="smaller sizes, the rows of space, a loop by hand, arithmetic and memory of this machine",
     )
-    missed = grown(times, GROWTH)
-    most = here(MOST, "arithmetic")
-    late = times[-1] > most
-    missed = missed or late
-    print(f"  the longest: {times[-1]:.0f} ns (limit {most:.0f}){'  MISSED' if late else ''}", flush=True)
-    rings = tuple(10**k for k in range(1, 5) if 10**k <= largest)
-    missed = grown(report("ring of locked boxes", "body", ring, rings), RING) or missed
-    missed = grown(report("door", "hinge", door, (1, 2, 10, 50, 200)), GROWTH) or missed
-    missed = grown(report("stack of boxes", "box", stack, (1, 5, 20)), GROWTH) or missed
-    missed = planes() or missed
-    missed = by_hand() or missed
-    if missed:
-        raise SystemExit(1)
-
-
-if __name__ == "__main__":
-    main()
+}

@@ -1,36 +1,28 @@
 """What smooth rigid scenes cost to a given error, in plain SPOOK steps of the same scene timed side by side.
 
-    python bench/bench_smooth.py
-
-Each line is a method and a time step whose error is looked at first, against the scene's closed form. A limit is a
-time on the machine of the other engines' tables over the time of a plain step there: door 0.98 µs, top 0.59 µs, forty
-four-bars 74 µs, by rows of space, as a plain step was solved then; the time itself has a limit as well, that of the same
-tables, carried to this machine by `bench/floors.py`. Where MuJoCo is installed, the same scene by its Runge-Kutta stands below: its error, its processor time, and that
-over ours, which has to be above 1. It takes the longest step with which it reaches the error. On the forty four-bars it
-reaches it with none up to a thousand steps a second, nor held by equalities: it takes 250, slower already, with an error a
-hundred times ours.
+Each row is a method and a time step whose error is looked at first, against the scene's closed form. A limit in plain
+steps is the time on the machine of the other engines' tables over the time of a plain step there (door 0.98 µs, top
+0.59 µs, forty four-bars 74 µs, by rows of space, as a plain step was solved then); one in operations is the time itself.
+Where MuJoCo is installed, the same scene by its Runge-Kutta stands beside it, with the longest step with which it reaches
+the error. On the forty four-bars it reaches it with none up to a thousand steps a second, nor held by equalities: it
+takes 250, slower already, with an error a hundred times ours.
 """
 
 from __future__ import annotations
 
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).parent.parent))
-
-from bench.floors import here
+from bench.costs import asked, bench, cost, exact, in_units
 from spook_tracker.engine import (
     PLAIN,
-    EngineError,
     Method,
     Position,
-    Program,
     Result,
     Scene,
     Trace,
@@ -61,9 +53,13 @@ class Row:
     per_second: float
     seconds: float  # simulated
     limit: float  # plain steps
-    milliseconds: float
+    operations: float
     plain_step: float  # s
     peer_per_second: float = 62.0  # steps of MuJoCo's Runge-Kutta
+
+    @property
+    def unit(self) -> str:
+        return "m" if self.name.endswith(" m") else "rad"
 
 
 def bars_error(time_step: float, method: Method, simulate: Simulate = simulate) -> float:
@@ -92,8 +88,8 @@ def many(time_step: float) -> Scene:
 
 
 ROWS = (
-    Row("door to 4e-7 rad", swinging_door.scene, door_error, 4e-7, ORDER8, 9, 10.0, 1500.0, 1.5, 1 / 4000),
-    Row("top to 1e-5 m", spinning_top.scene, top_error, 1e-5, ORDER6, 26, 20.0, 5100.0, 3.0, 1 / 4000),
+    Row("door to 4e-7 rad", swinging_door.scene, door_error, 4e-7, ORDER8, 9, 10.0, 1500.0, 3.2e6, 1 / 4000),
+    Row("top to 1e-5 m", spinning_top.scene, top_error, 1e-5, ORDER6, 26, 20.0, 5100.0, 6.4e6, 1 / 4000),
     Row(
         "top to 1e-10 m",
         spinning_top.scene,
@@ -103,7 +99,7 @@ ROWS = (
         48,
         20.0,
         34000.0,
-        20.0,
+        4.3e7,
         1 / 4000,
         1100.0,
     ),
@@ -116,72 +112,81 @@ ROWS = (
         9.6,
         10.0,
         1340.0,
-        100.0,
+        2.1e8,
         1 / 1000,
         250.0,
     ),
 )
 
 
-def least(program: Program, steps: int) -> float:
-    """Processor time of a run [s]."""
-    return program.run(steps).cpu_seconds
+def smooth(row: Row) -> dict[str, float]:
+    """Its error, and what a run costs in plain steps and in operations."""
+    h, steps, some = 1.0 / row.per_second, round(row.seconds * row.per_second), round(0.2 * row.limit)
+    program = compile(row.scene(h), time_step=h, method=row.method)
+    plain = compile(row.scene(row.plain_step), time_step=row.plain_step, method=IN_SPACE)
+    times = [(program.run(steps).cpu_seconds, plain.run(some).cpu_seconds / some) for _ in range(ROUNDS)]
+    whole, one = map(min, zip(*times, strict=True))
+    return {
+        "error": row.error(h, row.method),
+        "plain_steps": whole / one,
+        "run": in_units(whole, "operation"),
+    }
 
 
-def beside(row: Row, ours: float) -> tuple[str, bool]:
-    """The other engine's line, or why there is none; and whether it is first. `ours` [s]."""
-    try:
-        engine = find("mujoco")
-        h, steps = 1.0 / row.peer_per_second, round(row.seconds * row.peer_per_second)
+def beside(row: Row) -> dict[str, float]:
+    """MuJoCo's processor time by ours, and its error. NotSupported where it is not installed."""
+    engine = find("mujoco")
+    h, steps = 1.0 / row.peer_per_second, round(row.seconds * row.peer_per_second)
 
-        def asked(scene: Scene, **options: Any) -> Result:
-            result: Result = engine.simulate(scene, configuration=PEER, **options)
-            return result
+    def simulated(scene: Scene, **options: Any) -> Result:
+        result: Result = engine.simulate(scene, configuration=PEER, **options)
+        return result
 
-        def cost(count: int) -> float:
-            begun = time.process_time()
-            asked(row.scene(h), time_step=h, steps=count)
-            return time.process_time() - begun
+    def taken(count: int) -> float:
+        begun = time.process_time()
+        simulated(row.scene(h), time_step=h, steps=count)
+        return time.process_time() - begun
 
-        error = row.error(h, PLAIN, asked)
-        times = [(cost(steps), cost(1)) for _ in range(2)]
-    except EngineError as why:
-        return f"MuJoCo: {why}", False
-    whole, setup = (min(column) for column in zip(*times, strict=True))
-    taken = whole - setup
-    line = f" {error:9.1e} {1e3 * taken:8.2f} {taken / ours:8.1f} × ours"
-    return f"MuJoCo {PEER}, 1/{row.peer_per_second:g} s".ljust(28) + line, taken <= ours
-
-
-def main() -> None:
-    missed = False
-    print("smooth rigid scenes: error, ms (limit), in plain steps (limit), ms per step and beside the steps")
-    for row in ROWS:
-        h = 1.0 / row.per_second
-        error = row.error(h, row.method)
-        steps = round(row.seconds * row.per_second)
-        program = compile(row.scene(h), time_step=h, method=row.method)
-        plain = compile(row.scene(row.plain_step), time_step=row.plain_step, method=IN_SPACE)
-        some = round(0.2 * row.limit)
-        times = [
-            (least(program, steps), least(program, 2 * steps), least(plain, some) / some)
-            for _ in range(ROUNDS)
-        ]
-        whole, twice, one = (min(column) for column in zip(*times, strict=True))
-        most = here(row.milliseconds, "arithmetic")
-        within = error <= row.target and whole / one <= row.limit and 1e3 * whole <= most
-        line, behind = beside(row, whole)
-        missed = missed or not within or behind
-        each = (twice - whole) / steps
-        print(
-            f"  {row.name:28s} {error:9.1e} {1e3 * whole:8.2f} ({most:.2f}) {whole / one:8.0f} ({row.limit:6.0f})"
-            f"  {1e3 * each:8.4f} {1e3 * (whole - steps * each):7.3f}  {'' if within else 'MISSED'}",
-            flush=True,
-        )
-        print(f"    {line}{'  MISSED' if behind else ''}", flush=True)
-    if missed:
-        raise SystemExit(1)
+    own = 1.0 / row.per_second
+    program = compile(row.scene(own), time_step=own, method=row.method)
+    times = [
+        (taken(steps), taken(1), program.run(round(row.seconds * row.per_second)).cpu_seconds)
+        for _ in range(3)
+    ]
+    whole, setup, ours = map(min, zip(*times, strict=True))
+    return {"times_ours": (whole - setup) / ours, "its_error": row.error(h, PLAIN, simulated)}
 
 
-if __name__ == "__main__":
-    main()
+TESTS = {
+    "smooth": bench(
+        "Smooth rigid scenes",
+        "What does a smooth rigid scene cost to a given error?",
+        *(
+            asked(
+                row.name,
+                partial(smooth, row),
+                exact("error", "against the closed form", row.target, "what is asked", unit=row.unit),
+                cost(
+                    "plain_steps",
+                    "a run, by a plain step of the scene",
+                    row.limit,
+                    "the best of other engines",
+                ),
+                cost("run", "a run", row.operations, "the best of other engines", unit="operation"),
+                time_step=1.0 / row.per_second,
+            )
+            for row in ROWS
+        ),
+        *(
+            asked(
+                f"{row.name}, MuJoCo",
+                partial(beside, row),
+                cost("times_ours", "MuJoCo's run, by ours", 1.0, "ours is first", better="larger"),
+                cost("its_error", "of MuJoCo", unit=row.unit),
+                time_step=1.0 / row.peer_per_second,
+            )
+            for row in ROWS
+        ),
+        beside="plain steps of the same scene, and MuJoCo, timed side by side",
+    )
+}

@@ -1,32 +1,20 @@
-"""How fast is the history? Records a million samples as nights of 1000 series, then reads them in the three ways
-that people wait for: two versions side by side, one series over all nights, all series over all nights.
-
-    python bench/bench_storage.py [--samples 1000000] [--db URL]
-
-The default is a SQLite file in a temporary folder. Ends with 1 where `tracker compare` among these samples, or `tracker
-trend` of a thousand noisy nights with a change point, takes more than 0.3 s of the processor, start-up included; on another machine as much more as Python takes there.
+"""How fast is the history? Records a million samples as nights of 1000 series, then asks the commands that people wait
+for, start-up included: two versions side by side, one series over all nights, a thousand noisy nights of a run time
+with a change point.
 """
 
 from __future__ import annotations
 
-import argparse
 import random
 import resource
 import subprocess
 import sys
 import tempfile
-import time
-from collections.abc import Iterator
-from contextlib import contextmanager
-from pathlib import Path
 
 import msgspec
-from sqlalchemy import text
 from sqlalchemy.orm import Session
 
-sys.path.insert(0, str(Path(__file__).parent.parent))
-
-from bench.floors import here
+from bench.costs import asked, bench, cost, in_units
 from spook_tracker.tracker.document.run_document import (
     EngineVersion,
     Machine,
@@ -35,13 +23,17 @@ from spook_tracker.tracker.document.run_document import (
     SeriesDefinition,
 )
 from spook_tracker.tracker.store.database import open_database
-from spook_tracker.tracker.store.history import History
 from spook_tracker.tracker.store.record import record
 
 SERIES = 1000  # in one night
-MOST = 0.3  # s of the processor for a command, the quicker of two times
+NIGHTS = 1000
 NOISE, STEP = 0.01, 1.1  # of a run time over the noisy nights, and by how much it rises after 600 of them
 CHANGED = 0.02  # of them have other bits than the night before; most values never change
+COMMANDS = {
+    "compare": ("compare", "--engine", "spook", "previous", "latest"),
+    "trend": ("trend", "test7", "metric7"),
+    "noisy_trend": ("trend", "noisy"),
+}
 
 
 def definitions() -> tuple[SeriesDefinition, ...]:
@@ -120,85 +112,47 @@ def noisy(number: int, definition: SeriesDefinition, chance: random.Random) -> R
     )  # fmt: skip
 
 
-def command(what: str, *words: str) -> float:
-    """Run a command of the tracker as a user does, its start-up included, and print what the processor did for it."""
-    before, wall = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+def command(*words: str) -> float:
+    """Seconds of the processor of a command of the tracker, as a user runs it."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     subprocess.run([sys.executable, "-m", "spook_tracker", *words], stdout=subprocess.DEVNULL, check=False)
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    processor = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
-    print(f"{what:<58} {time.perf_counter() - wall:8.3f} s wall {processor:8.3f} s processor", flush=True)
-    return processor
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
-@contextmanager
-def timed(what: str) -> Iterator[None]:
-    wall, processor = time.perf_counter(), time.process_time()
-    yield
-    wall, processor = time.perf_counter() - wall, time.process_time() - processor
-    print(f"{what:<58} {wall:8.3f} s wall {processor:8.3f} s processor", flush=True)
-
-
-def main() -> int:
-    options = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
-    options.add_argument("--samples", type=int, default=1_000_000)
-    options.add_argument("--db", default=None, help="an empty database; default: a temporary SQLite file")
-    given = options.parse_args()
-    nights = max(2, given.samples // SERIES)
+def commands() -> dict[str, float]:
+    """Each command among a million samples, the quicker of two times."""
+    series, chance = definitions(), random.Random(1)
+    time_of = msgspec.structs.replace(
+        series[0], key="noisy/plain/time", test="noisy", metric="time", kind="time", better="smaller", unit="s",
+        role="reported", limit=None, time_step=None,
+    )  # fmt: skip
     with tempfile.TemporaryDirectory() as folder:
-        url = given.db or f"sqlite:///{folder}/bench.db"
-        engine = open_database(url)
-        series, chance = definitions(), random.Random(1)
-        with timed(f"record {nights} nights of {SERIES} samples"), Session(engine) as session:
-            for number in range(nights):
+        url = f"sqlite:///{folder}/bench.db"
+        with Session(engine := open_database(url)) as session:
+            for number in range(NIGHTS + 1):
                 record(session, night(number, series, chance))
-        with timed("record one more night"), Session(engine) as session:
-            record(session, night(nights, series, chance))
-        if engine.dialect.name == "postgresql":
-            with engine.begin() as connection:
-                connection.execute(text("ANALYZE"))
-        engine.dispose()
-        for attempt in ("first", "second"):
-            with timed(f"open, resolve and read two runs ({attempt} time)"):
-                engine = open_database(url, readonly=True)
-                with Session(engine) as session:
-                    history = History(session)
-                    for name in ("previous", "latest"):
-                        assert len(history.samples(history.resolve(name).id)) == SERIES
-        with Session(engine) as session:
-            with timed("read one series over all nights"):
-                (found,) = History(session).series([series[7].key]).values()
-                assert len(found.points) == nights + 1
-            with timed("read all series over all nights, values only"):
-                assert len(History(session).series(evidence=False)) == SERIES
-        engine.dispose()
-        with (
-            Session(engine := open_database(url)) as session,
-            timed("record 1000 noisy nights of a run time"),
-        ):
-            (one,) = definitions()[:1]
-            time_of = msgspec.structs.replace(
-                one, key="noisy/plain/time", test="noisy", metric="time", kind="time", better="smaller", unit="s",
-                role="reported", limit=None, time_step=None,
-            )  # fmt: skip
             for number in range(1000):
                 record(session, noisy(number, time_of, chance))
         engine.dispose()
-        over, most = [], here(MOST, "interpreter")
-        for words in (
-            ("compare", "--engine", "spook", "previous", "latest"),
-            ("trend", "test7", "metric7"),
-            ("trend", "noisy"),
-        ):
-            said = " ".join(words)
-            taken = [command(f"tracker {said}, with its start", *words, "--db", url) for _ in range(2)]
-            over += [f"tracker {said}: {min(taken):.2f} s" for _ in (1,) if min(taken) > most]
-    if over:
-        print(
-            f"more than {here(MOST, 'interpreter'):.2f} s of the processor: {'; '.join(over)}",
-            file=sys.stderr,
-        )
-    return 1 if over else 0
+        return {
+            name: in_units(min(command(*words, "--db", url) for _ in range(2)), "entry")
+            for name, words in COMMANDS.items()
+        }
 
 
-if __name__ == "__main__":
-    sys.exit(main())
+TESTS = {
+    "storage": bench(
+        "History",
+        "What do commands cost in a history of a million samples?",
+        asked(
+            "a million samples",
+            commands,
+            *(
+                cost(name, f"`tracker {' '.join(words)}`", 2.2e6, "three tenths of a second", unit="entry")
+                for name, words in COMMANDS.items()
+            ),
+        ),
+        beside="Python on this machine",
+    )
+}

@@ -181,7 +181,7 @@ class Measurement:
     """
 
     configuration: str  # "plain", "curved", "half-step", ...: named in every table
-    time_step: float  # s
+    time_step: float | None  # s; none of what does not step
     metrics: tuple[Metric, ...]
     measure: Callable[[Simulate], Mapping[str, float]]
     parameters: Mapping[str, float] = field(
@@ -197,7 +197,7 @@ class Asked:
     `measure(simulate)` passes this engine's options on as `method`; another engine's `simulate` has its own instead.
     """
 
-    time_step: float  # s
+    time_step: float | None  # s
     parameters: Mapping[str, float]
     quantities: tuple[Quantity, ...]
     measure: Callable[[Simulate], Mapping[str, float]]
