@@ -14,7 +14,7 @@ help:
 	@echo "make check     formatting, lint, types, import contracts"
 	@echo "make tidy-deep the core read along every path by clang's analyser: weekly"
 	@echo "make bench     what things cost, as ratios measured side by side in one run: a night of its own, with pages in public-bench/"
-	@echo "make bench-growth_sqlite bench-heaps bench-replay   one of them alone: these take minutes"
+	@echo "make bench-growth_sqlite bench-heaps bench-replay bench-scenes   one of them alone: these take minutes"
 	@echo "make sanitize  the C++ tests with every access and every overflow watched"
 	@echo "make sanitize-python   the Python tests of the engine on a module whose every access is watched"
 	@echo "make fuzz MINUTES=10   each fuzz target, guided by what it reaches: shapes, scenes, documents, settings"

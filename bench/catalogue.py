@@ -9,6 +9,7 @@ from bench import (
     bench_publish,
     bench_replay,
     bench_rigid,
+    bench_scenes,
     bench_smooth,
     bench_storage,
 )
@@ -22,4 +23,4 @@ QUICK = {
     **bench_import.TESTS,
     **bench_storage.TESTS,
 }
-CATALOGUE = {**QUICK, **bench_growth.TESTS, **bench_heaps.TESTS, **bench_replay.TESTS}
+CATALOGUE = {**QUICK, **bench_growth.TESTS, **bench_heaps.TESTS, **bench_replay.TESTS, **bench_scenes.TESTS}

@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 import yaml
 
-from bench import bench_growth, costs, floors
+from bench import bench_growth, bench_scenes, costs, floors
 from bench.catalogue import CATALOGUE, QUICK
 from spook_tracker.engine import simulate
 from spook_tracker.tracker.measure.question import measure
+from spook_tracker.tracker.measure.questions import Questions
 from tests.places import ROOT
 
 TRACKER = """#!/bin/sh
@@ -76,3 +77,12 @@ def test_what_grows_is_told_by_its_exponent(power: float) -> None:
         power, abs=0.05
     )
     assert bench_growth.exponent(sizes, exactly) == 0.0, "it is noise"
+
+
+def test_what_a_scene_costs_is_told_by_part() -> None:
+    source = Questions()
+    told = bench_scenes.spent(source, "falling_object")
+
+    assert set(told) == set(bench_scenes.parts_of(source.tests()["falling_object"]))
+    assert min(told.values()) > 0.0
+    assert told["run times"] > told["replay"]
