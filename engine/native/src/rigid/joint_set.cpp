@@ -113,9 +113,10 @@ void JointSet::follow_turns(const Joint& joint, std::span<const BodyState> bodie
     const double turn = turn_in_step(time_step_, first, second);
     if (!(share_of_bend(turn) > 0.0)) return;
     const int linear = joint.constants.holds.linear();
-    const double of_point = linear < 3 ? turn
-                                       : turn_of_arms(time_step_, first, carried(first, joint.constants.first_arm),
-                                                      second, carried(second, joint.constants.second_arm));
+    const double of_point = linear < 3
+                                ? turn
+                                : turn_of_arms(time_step_, first, carried(first, joint.constants.first_arm),
+                                               second, carried(second, joint.constants.second_arm));
     BodyState behind[2] = {first, second}, next[2] = {first, second}, ahead[2];
     for (int i = 0; i < 2; ++i) {
         const int body = i == 0 ? joint.first : joint.second;
