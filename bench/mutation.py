@@ -68,7 +68,7 @@ MUTANTS = (
     mutant("no-permutations", "shifts", "if probability < enough else None", "if probability < 1.0 else None"),
     mutant("no-t-test", "shifts", "rise <= standard_error(base, len(last), memory)", "False"),
     mutant(
-        "small-shifts-count", "shifts", "from spook_tracker.tracker.judge.slower import LEAST", "LEAST = 0.0"
+        "small-shifts-count", "shifts", "from .slower import LEAST", "LEAST = 0.0"
     ),
     mutant("accidents-count-in-full", "normal_nights", "WEIGHT = 3.5", "WEIGHT = 6.0"),
     mutant("any-noise-is-normal", "normal_nights", "NORMAL_SCORE = 2.3263", "NORMAL_SCORE = 99.0"),

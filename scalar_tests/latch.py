@@ -206,7 +206,7 @@ TEST = case.ScalarTest(
         "The strike pushes with N = M/(b sin β); along the bolt are N cos β, and what the spring has more the stop bears.",
         "It opens where N cos β is the spring's force: M = k s b tan β; with friction "
         "M = k s (b (sin β + µ cos β) + µ r)/(cos β − µ sin β).",
-        "Then the nose slides: ρ = b cos β/cos(θ − β), one coordinate, and Lagrange's equation has its motion.",
+        "Then the nose slides: ρ = b cos(β)/cos(θ − β), one coordinate, and Lagrange's equation has its motion.",
     ),
     reference="Statics and Coulomb's law (closed form); the motion by Runge and Kutta.",
     conclusion="Green: stop, spring, slide, hinge and contact are solved together. Red: one of them gives way before it must.",

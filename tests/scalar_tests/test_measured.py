@@ -146,11 +146,13 @@ def test_the_first_page_sets_what_was_measured_apart() -> None:
     other = next(test for test in told.tests if test.gates())
     other.card = structs.replace(other.card, seven=False)
     before = index(told, ()).context
-    assert before["measured"] == [] and any(row.test == other.name for row in before["others"])
+    assert before["measured"] == [] and any(
+        row.test == other.name for group in before["others"] for row in group.lines
+    )
 
     other.card = structs.replace(other.card, measured=True)
     gate = other.gates()[0]
     gate.told = replace(gate.told, definition=structs.replace(gate.definition, limit_kind="physical"))
     after = index(told, ()).context
     assert [row.test for row in after["measured"]] == [other.name]
-    assert all(row.test != other.name for row in after["others"])
+    assert all(row.test != other.name for group in after["others"] for row in group.lines)

@@ -105,13 +105,6 @@ void MixedRows::judge_contacts() {
     live_.note_stopped(stopped);
 }
 
-/// A stop whose rebound, of that impulse, ends at the other end.
-void MixedRows::note_cut(std::size_t k, double impulse) {
-    StoppedImpacts cut;
-    cut.note(system.rows[k].stop.cut * std::abs(impulse), model_.mover(joints_.blocks()[k]));
-    live_.note_stopped(cut);
-}
-
 /// Rows are those of the velocities before, and after it of those it leaves.
 void MixedRows::impact() {
     fill_momenta(false);
@@ -141,7 +134,8 @@ void MixedRows::impact() {
             const bool once = model_.method.impacts == ImpactOrder::simultaneous || stop.limit_reached;
             state.rebounds = once ? unbounded : again * std::abs(stop.rebound);
             if (!stop.answered) continue;
-            note_cut(k, scratch_.impulses[k][stop.row]);
+            live_.note_stopped(stop.cut * std::abs(scratch_.impulses[k][stop.row]),
+                               model_.mover(joints_.blocks()[k]));
             if (stop.rebound == 0.0) state.met = system.rows[k].lower[stop.row] == 0.0 ? 1 : -1;
         }
     fill_rows();

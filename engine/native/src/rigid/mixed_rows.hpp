@@ -90,7 +90,6 @@ private:
     bool leave_open();
     void take_velocities(bool angular_too, const std::function<bool(int)>& untouched);
     void take_multipliers();
-    void note_cut(std::size_t block, double impulse);
     bool solve_joints();
     bool iterate_joints();
     bool settle_joints();

@@ -84,6 +84,12 @@ struct RigidState {
     void note_stopped(const StoppedImpacts& these) noexcept {
         if (stopped.add(these)) stopped.step = step;
     }
+    /// Of one, J: a stop whose rebound ends at the other end.
+    void note_stopped(double lost, int body) noexcept {
+        StoppedImpacts one;
+        one.note(lost, body);
+        note_stopped(one);
+    }
     void note_unsettled(int body, double residual, bool sunk = false) {
         if (unsettled.body < 0) unsettled.body = body, unsettled.step = step, unsettled.sunk = sunk;
         unsettled.residual = std::max(unsettled.residual, residual);

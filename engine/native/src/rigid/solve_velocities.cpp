@@ -170,7 +170,9 @@ void MixedRows::take_multipliers() {
         double* multiplier = state.multipliers(blocks[k].axial);
         for (int i = 0; i < blocks[k].size; ++i)
             multiplier[i] = system.rows[k].multiplier[i] + scratch_.impulses[k][i];
-        note_cut(k, system.rows[k].multiplier[std::max(0, system.rows[k].stop.row)]);
+        const StopRow& stop = system.rows[k].stop;
+        live_.note_stopped(stop.cut * std::abs(system.rows[k].multiplier[std::max(0, stop.row)]),
+                           model_.mover(blocks[k]));
         if (breaks_ && !blocks[k].axial) joints_.break_overloaded(blocks[k].joint, live_.step);
     }
     std::size_t row = blocks.size();
