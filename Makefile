@@ -164,7 +164,7 @@ BENCH    := $(BIN)/tracker run --catalogue bench.catalogue --db $(BENCH_DB) --wo
 bench: develop
 	$(BENCH) $(BENCHES); kept=$$?; $(BIN)/tracker publish --db $(BENCH_DB) --out public-bench --title "What it costs"; exit $$kept
 
-bench-%:
+bench-growth_sqlite bench-growth_postgresql bench-heaps bench-huge_heap bench-replay bench-scenes: bench-%:
 	$(MAKE) bench BENCHES=$*
 
 # Every engine that can be had on every scene, and the page that says which is first where; TESTS="door pendulum": those alone.
