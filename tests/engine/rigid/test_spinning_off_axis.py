@@ -255,8 +255,8 @@ def test_so_is_that_of_joints_alone_in_space(h: float, status: str) -> None:
     assert ("came out of nothing" in run.failure) == (status == "unsettled")
 
 
-@pytest.mark.parametrize(("axis", "h"), [((0.0, 1.0, 0.0), 1 / 960), ((0.3, 1.0, 0.0), 1 / 960)])
-def test_so_is_that_of_half_steps(axis: tuple[float, float, float], h: float) -> None:
+@pytest.mark.parametrize("axis", [(0.0, 1.0, 0.0), (0.3, 1.0, 0.0)])
+def test_so_is_that_of_half_steps(axis: tuple[float, float, float]) -> None:
     """5 t thrown on four rods of 1 kg, in a plane and in space: a fifth of the throw and more from nowhere, as `Energy` shows."""
     bodies = [
         RigidBody(name=f"rod {k}", mass=1.0, inertia=(1 / 12, 1 / 12, 0.01), position=(0.0, 0.0, -k - 0.5))
@@ -280,7 +280,7 @@ def test_so_is_that_of_half_steps(axis: tuple[float, float, float], h: float) ->
     scene = Scene(bodies=tuple(bodies), constraints=joints, gravity=(0.0, 0.0, -G))
     method = dataclasses.replace(HALF, string_stiffness=True)
 
-    run = simulate(scene, time_step=h, duration=4.0, method=method, observe=traces(energy=Energy()))
+    run = simulate(scene, time_step=1 / 960, duration=4.0, method=method, observe=traces(energy=Energy()))
 
     gained = run["energy"].max() - run["energy"][0]
     assert gained > 0.1 * 22500.0
