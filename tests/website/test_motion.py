@@ -11,7 +11,7 @@ from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.website.publish import publish
 from tests.histories.synthetic import DocumentHistory, document
 from tests.places import ROOT
-from tests.website.browser import look, wait_for
+from tests.website.browser import PATIENCE, look, wait_for
 
 NOISE = ("GL Driver Message", "software WebGL")  # what the browser says of drawing without a graphics card
 
@@ -412,9 +412,9 @@ BUILT = pytest.mark.skipif(
 @BUILT
 def test_pictures_go_on_while_the_engine_computes_and_the_newest_question_is_answered(driver, site):
     """A pile that takes far longer than a picture: its computing is in a worker."""
-    visit(driver, site, "live.html#scene=pile&p.count=24")
+    visit(driver, site, "live.html#scene=pile")
     wait_for(driver, "!!document.querySelector('.live').page")
-    driver.set_script_timeout(60)
+    driver.set_script_timeout(PATIENCE)
     gap, milliseconds, first, last = driver.execute_async_script("""
       const done = arguments[arguments.length - 1], page = document.querySelector('.live').page;
       const fact = (name) => document.querySelector(`[data-fact="${name}"]`).textContent, first = fact('steps');
