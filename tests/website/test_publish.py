@@ -448,3 +448,18 @@ def test_the_first_page_does_not_say_that_all_is_well_when_a_companion_is_red(tm
     publish(DocumentHistory(quiet), tmp_path / "public")
 
     assert "Every limit is kept; one other series is red" in (tmp_path / "public" / "index.html").read_text()
+
+
+def test_the_table_of_scalars_says_of_each_limit_and_set_point_whose_it_is(tmp_path: Path) -> None:
+    """A physical limit binds every engine; a set point of one method's own does not."""
+    run = of_test(document(0), "pendulum")
+    asked = {"limit_kind": "physical", "set_point": (0.1, 0.2), "set_point_kind": "method"}
+    first, *_ = [d for d in run.series if d.kind == "scalar" and d.limit is not None]
+    changed = {first.key: msgspec.structs.replace(first, **asked)}
+    run = msgspec.structs.replace(run, series=tuple(changed.get(d.key, d) for d in run.series))
+    publish(DocumentHistory([run]), tmp_path / "public")
+
+    page = (tmp_path / "public" / "tests" / "pendulum.html").read_text()
+    table = page[page.index("Every scalar of this test") :]
+    limit, band = re.findall(r'<td class="num">[^<]+<span class="sub">([^<]*)</span>', table)[:2]
+    assert (limit, band) == ("physical", "method-specific")

@@ -12,6 +12,7 @@ import click
 from spook_tracker.scalar_tests.case import LimitKind, Measurement, Metric, ScalarTest
 from spook_tracker.tracker.document.coverage import HEADINGS, Coverage, Rungs, coverage, rungs, summary
 from spook_tracker.tracker.document.coverage import saved as told_saving
+from spook_tracker.tracker.document.wording import whose
 from spook_tracker.tracker.measure.cards import explained
 from spook_tracker.tracker.measure.step_cost import LeavingOut, StepCost
 
@@ -125,8 +126,7 @@ def _metric(measurement: Measurement, metric: Metric, room: int) -> Iterator[str
 
 def _because(kind: LimitKind, source: str) -> str:
     """Whose a limit or a set point is, and where it comes from."""
-    whose = "physical" if kind == "physical" else "method-specific"
-    return f" ({whose}: {source})" if source else f" ({whose})"
+    return f" ({whose(kind)}: {source})" if source else f" ({whose(kind)})"
 
 
 def _per_step(cost: float | None, verb: str) -> str:

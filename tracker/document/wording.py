@@ -77,6 +77,11 @@ def seconds(value: float) -> str:
     return quantity(value / 1e-9, "ns", 3)
 
 
+def whose(kind: str) -> str:
+    """Of a limit's or a set point's kind: whether any engine owes it, or one method alone."""
+    return "physical" if kind == "physical" else "method-specific"
+
+
 def limit(definition: SeriesDefinition) -> str:
     """The limit as a condition: ≤ 4.904 m, ≥ 10, 0.4999 … 0.5001."""
     unit = definition.unit

@@ -81,6 +81,7 @@ class Row:
     limit_source: str
     limit_kind: str
     set_point: str
+    set_point_kind: str
     margin: str
     share: str | None  # of the gauge, per cent
     state: Class
@@ -120,6 +121,7 @@ def row(trend: Trend, title: str, address: str, nights: Sequence[Night] = ()) ->
         limit_source=d.limit_source,
         limit_kind=d.limit_kind,
         set_point=band(d.set_point, d.unit) if d.set_point else "",
+        set_point_kind=d.set_point_kind,
         margin=inside.text if math.isfinite(trend.value) else "no value",
         share=None if share is None else f"{100.0 * min(1.0, max(share, 0.012)):.1f}",
         state=state,

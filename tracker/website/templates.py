@@ -81,5 +81,6 @@ def environment(folder: Path | None = None) -> jinja2.Environment:
         "seconds": wording.seconds,
         "number": wording.number,
         "formula": formula,
+        "whose": wording.whose,
     }
     return made
