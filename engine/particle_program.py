@@ -31,19 +31,22 @@ def compile_particles(
         raise MethodError("method: string_stiffness needs the direct solver")
     if method.composition != "none":
         check_smooth(scene, method)
-    bodies = {body.name: index for index, body in enumerate(scene.bodies)}
     quantities, shapes = requests(scene, observe)
     native = _core.ParticleProgram(
-        **_pack(scene, time_step, method, bodies),
-        loads_change=held and any(isinstance(force, Load) for force in scene.forces),
-        quantities=quantities,
-        observations=observations(observe),
-        time_left=time_left(),
+        pack(scene, time_step, method, held), quantities, observations(observe), time_left()
     )
-    return Program(native, time_step=time_step, bodies=tuple(bodies), observe=observe, shapes=shapes)
+    return Program(
+        native,
+        time_step=time_step,
+        bodies=[body.name for body in scene.bodies],
+        observe=observe,
+        shapes=shapes,
+    )
 
 
-def _pack(scene: Scene, time_step: float, method: Method, bodies: Mapping[str, int]) -> dict[str, Any]:
+def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> dict[str, Any]:
+    """The scene as the native program takes it: tables with indices for names, no defaults left."""
+    bodies = {body.name: index for index, body in enumerate(scene.bodies)}
     loads = np.zeros((len(bodies), 3))
     fields, springs = [], []
     for force in scene.forces:
@@ -87,6 +90,7 @@ def _pack(scene: Scene, time_step: float, method: Method, bodies: Mapping[str, i
         "springs": table(springs),
         "fields": table(fields),
         "gravity": scene.gravity,
+        "loads_change": held and any(isinstance(force, Load) for force in scene.forces),
         "method": {
             "time_step": time_step,
             "substeps": method.substeps,

@@ -61,9 +61,7 @@ def compile_rigid(
     quantities, shapes = requests(scene, observe)
     packed = pack(scene, time_step, method, held)
     try:
-        native = _core.RigidProgram(
-            **packed, quantities=quantities, observations=observations(observe), time_left=time_left()
-        )
+        native = _core.RigidProgram(packed, quantities, observations(observe), time_left())
     except ValueError as error:
         if method.runge_kutta == "none":
             raise
@@ -96,7 +94,7 @@ def normals(axis: Vector) -> tuple[Vector, Vector]:
 
 
 def pack(scene: Scene, time_step: float, method: Method, held: bool = False) -> dict[str, Any]:
-    """The arguments of the native program, except what is observed: indices for names, no defaults left."""
+    """The scene as the native program takes it: tables with indices for names, no defaults left."""
     bodies = {body.name: index for index, body in enumerate(scene.bodies)}
     step = time_step / method.substeps
     pushes = np.zeros((len(bodies), 6))

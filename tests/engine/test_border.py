@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import Method, PairFriction, Scene, _core
-from spook_tracker.engine.particle_program import _pack as pack_particle_tables
+from spook_tracker.engine.particle_program import pack as pack_particles
 from spook_tracker.engine.rigid_program import pack
 from tests.scenes import particle as particle_scenes
 from tests.scenes import rigid as rigid_scenes
@@ -20,13 +20,8 @@ SCENE = replace(
 )  # type: ignore[arg-type]
 
 
-def pack_particles(scene: Scene, time_step: float, method: Method) -> dict[str, Any]:
-    bodies = {body.name: index for index, body in enumerate(scene.bodies)}
-    return pack_particle_tables(scene, time_step, method, bodies) | {"loads_change": False}
-
-
 def tables(scene: Scene = SCENE) -> dict[str, Any]:
-    return pack(scene, 0.01, Method()) | {"quantities": [], "observations": []}
+    return pack(scene, 0.01, Method())
 
 
 def planted(table: str, column: str, value: float) -> dict[str, Any]:
@@ -43,7 +38,7 @@ def planted(table: str, column: str, value: float) -> dict[str, Any]:
 )
 def test_an_index_is_a_whole_number(table: str, column: str, value: float) -> None:
     with pytest.raises(ValueError, match=f"{table}: the column '{column}' needs whole numbers, not "):
-        _core.RigidProgram(**planted(table, column, value))
+        _core.RigidProgram(planted(table, column, value), [], [])
 
 
 @pytest.mark.parametrize(
@@ -64,45 +59,66 @@ def test_an_index_is_of_something_that_is_there(table: str, column: str, value: 
     with pytest.raises(
         ValueError, match=f"{table}: the column '{column}' has {value}, and there are [0-9]+ {what}"
     ):
-        _core.RigidProgram(**planted(table, column, value))
+        _core.RigidProgram(planted(table, column, value), [], [])
 
 
 @pytest.mark.parametrize("value", [2.0, -1.0, 0.5, float("nan")])
 def test_a_flag_is_nought_or_one(value: float) -> None:
     with pytest.raises(ValueError, match="joints: the column 'one_sided' needs 0 or 1, not "):
-        _core.RigidProgram(**planted("joints", "one_sided", value))
+        _core.RigidProgram(planted("joints", "one_sided", value), [], [])
 
 
 def test_a_table_without_rows_still_has_all_its_columns() -> None:
     whole = tables()
     empty = {name: values[:0] for name, values in whole["motors"].items()}
 
-    _core.RigidProgram(**whole | {"motors": empty})
+    _core.RigidProgram(whole | {"motors": empty}, [], [])
     with pytest.raises(ValueError, match="motors: the column 'speed' is missing"):
-        _core.RigidProgram(**whole | {"motors": {"joint": empty["joint"]}})
+        _core.RigidProgram(whole | {"motors": {"joint": empty["joint"]}}, [], [])
     with pytest.raises(ValueError, match="motors: the column 'colour' means nothing here"):
-        _core.RigidProgram(**whole | {"motors": empty | {"colour": np.zeros(0)}})
+        _core.RigidProgram(whole | {"motors": empty | {"colour": np.zeros(0)}}, [], [])
+
+
+@pytest.mark.parametrize(("kind", "table"), [("Rigid", "motors"), ("Particle", "rows")])
+def test_a_table_or_an_option_too_many_or_too_few_is_named(kind: str, table: str) -> None:
+    program = getattr(_core, f"{kind}Program")
+    whole = (
+        tables()
+        if kind == "Rigid"
+        else pack_particles(particle_scenes.chain(np.random.default_rng(7)), 0.01, Method())
+    )
+    method = whole["method"]
+    for changed, message in (
+        (
+            {name: columns for name, columns in whole.items() if name != table},
+            f"scene: the table '{table}' is missing",
+        ),
+        (whole | {"wheels": {}}, "scene: the table 'wheels' means nothing here"),
+        (whole | {"method": method | {"colour": 1}}, "method: the option 'colour' means nothing here"),
+        (whole | {"method": {"time_step": 0.01}}, "method: the option 'substeps' is missing"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            program(changed, [], [])
 
 
 def test_a_particle_on_a_row_is_one_that_there_is() -> None:
     scene = particle_scenes.chain(np.random.default_rng(7))
-    whole = pack_particles(scene, 0.01, Method()) | {"quantities": [], "observations": []}
+    whole = pack_particles(scene, 0.01, Method())
     first = np.array(whole["rows"]["first"])
     first[0] = 99
 
     with pytest.raises(ValueError, match=r"rows: the column 'first' has 99, and there are [0-9]+ bodies"):
-        _core.ParticleProgram(**whole | {"rows": whole["rows"] | {"first": first}})
+        _core.ParticleProgram(whole | {"rows": whole["rows"] | {"first": first}}, [], [])
 
 
 @pytest.mark.parametrize("kind", ["rigid", "particles"])
 def test_a_composition_goes_by_its_name(kind: str) -> None:
     scene = SCENE if kind == "rigid" else particle_scenes.chain(np.random.default_rng(7))
     whole = (pack if kind == "rigid" else pack_particles)(scene, 0.01, Method())
-    whole |= {"quantities": [], "observations": []}
     program = _core.RigidProgram if kind == "rigid" else _core.ParticleProgram
 
     assert whole["method"]["composition"] == "none"
     with pytest.raises(
         ValueError, match="there is no composition 'order5'; there are none, order4, order6, order8"
     ):
-        program(**whole | {"method": whole["method"] | {"composition": "order5"}})
+        program(whole | {"method": whole["method"] | {"composition": "order5"}}, [], [])

@@ -96,7 +96,7 @@ def test_only_stages_of_the_list_take_time() -> None:
 
 
 def tables(scene: Scene) -> dict[str, Any]:
-    return pack(scene, 0.01, Method()) | {"quantities": [], "observations": []}
+    return pack(scene, 0.01, Method())
 
 
 @pytest.mark.parametrize(
@@ -118,11 +118,11 @@ def test_an_unknown_kind_is_named_at_the_start(table: str, column: str, what: st
             "normal": np.zeros((1, 3)),
             "outline": np.zeros(1),
         }
-    _core.RigidProgram(**planted)
+    _core.RigidProgram(planted, [], [])
     planted[table] = planted[table] | {column: ["unheard of", *planted[table][column][1:]]}
 
     with pytest.raises(ValueError, match=f"there is no {what} 'unheard of'; there are "):
-        _core.RigidProgram(**planted)
+        _core.RigidProgram(planted, [], [])
 
 
 def test_an_unknown_quantity_reduction_or_method_is_named_at_the_start() -> None:
@@ -133,7 +133,7 @@ def test_an_unknown_quantity_reduction_or_method_is_named_at_the_start() -> None
     planted = tables(rigid_scenes.tree(np.random.default_rng(SEED)))
     planted["method"] |= {"friction": "pyramid"}
     with pytest.raises(ValueError, match="there is no friction 'pyramid'"):
-        _core.RigidProgram(**planted)
+        _core.RigidProgram(planted, [], [])
 
 
 def test_a_column_too_many_too_few_or_of_another_shape_is_named() -> None:
@@ -152,4 +152,4 @@ def test_a_column_too_many_too_few_or_of_another_shape_is_named() -> None:
         ({"mass": np.zeros(count + 1)}, "differs in length"),
     ):
         with pytest.raises(ValueError, match=message):
-            _core.RigidProgram(**bodies(**changes))
+            _core.RigidProgram(bodies(**changes), [], [])

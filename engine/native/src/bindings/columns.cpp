@@ -41,36 +41,42 @@ bool Numbers::flag(std::size_t row) const {
     return value == 1.0;
 }
 
-Columns::Columns(const nb::dict& columns, const char* table) : columns_(columns), table_(table) {
-    for (const auto& [name, values] : columns) {
-        unread_.insert(nb::cast<std::string>(name));
-        rows_ = nb::len(values);
-    }
+Entries::Entries(const nb::dict& entries, std::string called)
+    : entries_(entries), called_(std::move(called)) {
+    for (const auto& [name, value] : entries) unread_.insert(nb::cast<std::string>(name));
+}
+
+nb::handle Entries::operator[](const char* name) {
+    if (!entries_.contains(name)) refuse(name, "is missing");
+    unread_.erase(name);
+    return entries_[name];
+}
+
+void Entries::expect_all_read() const {
+    if (!unread_.empty()) refuse(*unread_.begin(), "means nothing here");
+}
+
+void Entries::refuse(const std::string& name, const std::string& why) const {
+    throw std::invalid_argument(called_ + " '" + name + "' " + why);
+}
+
+Columns::Columns(Entries& scene, const char* table)
+    : Columns(nb::cast<nb::dict>(scene[table]), std::string(table) + ": the column") {}
+
+Columns::Columns(const nb::dict& columns, std::string called)
+    : called_(std::move(called)), columns_(columns, called_), empty_(nb::len(columns) == 0) {
+    for (const auto& [name, values] : columns) rows_ = nb::len(values);
     for (const auto& [name, values] : columns)
         if (nb::len(values) != rows_)
-            refuse(nb::cast<std::string>(name).c_str(), "differs in length from the others");
-}
-
-void Columns::expect_all_read() const {
-    if (!unread_.empty()) refuse(unread_.begin()->c_str(), "means nothing here");
-}
-
-void Columns::refuse(const char* name, const std::string& why) const {
-    throw std::invalid_argument(table_ + ": the column '" + name + "' " + why);
-}
-
-nb::handle Columns::column(const char* name) {
-    if (!columns_.contains(name)) refuse(name, "is missing");
-    unread_.erase(name);
-    return columns_[name];
+            columns_.refuse(nb::cast<std::string>(name), "differs in length from the others");
 }
 
 Numbers Columns::numbers(const char* name, std::size_t width) {
-    if (nb::len(columns_) == 0) return {"", {}, width};
+    if (empty_) return {"", {}, width};
     using Any = nb::ndarray<nb::ro, nb::c_contig, nb::device::cpu>;
-    const Any array = nb::cast<Any>(column(name));
+    const Any array = nb::cast<Any>(columns_[name]);
     if (rows_ > 0 && (array.ndim() != (width == 1 ? 1u : 2u) || array.size() != rows_ * width))
-        refuse(name, "needs " + std::to_string(width) + " numbers a row");
+        columns_.refuse(name, "needs " + std::to_string(width) + " numbers a row");
     std::vector<double> values(rows_ * width);
     const auto copy = [&](const auto* from) {
         for (std::size_t i = 0; i < values.size(); ++i) values[i] = static_cast<double>(from[i]);
@@ -78,13 +84,13 @@ Numbers Columns::numbers(const char* name, std::size_t width) {
     if (array.dtype() == nb::dtype<double>()) copy(static_cast<const double*>(array.data()));
     else if (array.dtype() == nb::dtype<std::int64_t>()) copy(static_cast<const std::int64_t*>(array.data()));
     else if (array.dtype() == nb::dtype<bool>()) copy(static_cast<const bool*>(array.data()));
-    else refuse(name, "needs float64, int64 or bool");
-    return {table_ + ": the column '" + name + "'", std::move(values), width};
+    else columns_.refuse(name, "needs float64, int64 or bool");
+    return {called_ + " '" + name + "'", std::move(values), width};
 }
 
 std::vector<std::string> Columns::texts(const char* name) {
-    if (nb::len(columns_) == 0) return {};
-    return nb::cast<std::vector<std::string>>(column(name));
+    if (empty_) return {};
+    return nb::cast<std::vector<std::string>>(columns_[name]);
 }
 
 }  // namespace spook

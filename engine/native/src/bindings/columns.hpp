@@ -43,14 +43,33 @@ private:
     std::size_t width_;
 };
 
-/// Reads the columns of one table; a column that is missing, of another shape or, at the end, unread is an error
-/// that names it. A table without columns has no rows.
+/// A dict every entry of which is read: one that is missing or, at the end, unread is an error that names it.
+class Entries {
+public:
+    /// `called` is what an entry is called, as "method: the option".
+    Entries(const nb::dict& entries, std::string called);
+
+    nb::handle operator[](const char* name);
+    template <class T> void read(const char* name, T& value) { value = nb::cast<T>((*this)[name]); }
+    template <class Enum> void read_kind(const char* name, Enum& value) {
+        value = from_text<Enum>(nb::cast<std::string>((*this)[name]), name);
+    }
+    void expect_all_read() const;
+    [[noreturn]] void refuse(const std::string& name, const std::string& why) const;
+
+private:
+    nb::dict entries_;
+    std::string called_;
+    std::set<std::string> unread_;
+};
+
+/// Reads the columns of one table of a scene, which are of one length. A table without columns has no rows.
 class Columns {
 public:
-    Columns(const nb::dict& columns, const char* table);
+    Columns(Entries& scene, const char* table);
 
     std::size_t rows() const noexcept { return rows_; }
-    void expect_all_read() const;
+    void expect_all_read() const { columns_.expect_all_read(); }
     /// Numbers, whole or flags, of shape (rows,) or, for a width above 1, (rows, width).
     Numbers numbers(const char* name, std::size_t width = 1);
     std::vector<std::string> texts(const char* name);
@@ -62,12 +81,11 @@ public:
     }
 
 private:
-    nb::handle column(const char* name);
-    [[noreturn]] void refuse(const char* name, const std::string& why) const;
+    Columns(const nb::dict& columns, std::string called);
 
-    nb::dict columns_;
-    std::string table_;
-    std::set<std::string> unread_;
+    std::string called_;  // "joints: the column"
+    Entries columns_;
+    bool empty_;
     std::size_t rows_ = 0;
 };
 

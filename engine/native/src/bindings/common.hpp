@@ -33,28 +33,6 @@ nb::dict to_dict(const RunReport& report);
 nb::list to_list(const StageChoices& choices);
 nb::list to_list(const std::vector<Stage>& stages);
 
-/// Reads every entry of a dict of options, and refuses those that are not read.
-class Options {
-public:
-    explicit Options(const nb::dict& options) : options_(options) {}
-    template <class T> void read(const char* name, T& value) {
-        value = nb::cast<T>(options_[name]);
-        ++read_;
-    }
-    template <class Enum> void read_kind(const char* name, Enum& value) {
-        std::string text;
-        read(name, text);
-        value = from_text<Enum>(text, name);
-    }
-    void expect_all_read() const {
-        if (read_ != nb::len(options_)) throw std::invalid_argument("method: an option means nothing here");
-    }
-
-private:
-    nb::dict options_;
-    std::size_t read_ = 0;
-};
-
 /// A run one holds, for bind_program().
 template <class System>
 void bind_held(nb::module_& m, nb::class_<Program<System>>& program, const char* snapshot) {

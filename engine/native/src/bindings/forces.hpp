@@ -1,4 +1,4 @@
-// Tables that both pipelines have: ends, springs, centres of gravity.
+// What both pipelines have: settings, ends, springs, centres of gravity.
 #pragma once
 
 #include "bindings/columns.hpp"
@@ -22,9 +22,17 @@ struct Ends {
     Numbers first, second, first_point, second_point;
 };
 
-inline std::vector<SpringForce> read_springs(const nb::dict& springs, std::size_t bodies) {
+/// What is no table.
+template <class Scene> void read_settings(Entries& in, Scene& scene) {
+    Point gravity;
+    in.read("gravity", gravity);
+    scene.gravity = to_vec(gravity);
+    in.read("loads_change", scene.loads_change);
+}
+
+inline std::vector<SpringForce> read_springs(Entries& in, std::size_t bodies) {
     std::vector<SpringForce> read;
-    Columns table(springs, "springs");
+    Columns table(in, "springs");
     const Ends end(table, bodies);
     const Numbers stiffness = table.numbers("stiffness"), length = table.numbers("rest_length"),
                   viscosity = table.numbers("viscosity");
@@ -34,9 +42,9 @@ inline std::vector<SpringForce> read_springs(const nb::dict& springs, std::size_
     return read;
 }
 
-inline std::vector<CentralField> read_fields(const nb::dict& fields) {
+inline std::vector<CentralField> read_fields(Entries& in) {
     std::vector<CentralField> read;
-    Columns table(fields, "fields");
+    Columns table(in, "fields");
     const Numbers strength = table.numbers("strength"), centre = table.numbers("centre", 3);
     for (std::size_t i = 0; i < table.rows(); ++i) read.push_back({strength[i], centre.vec(i)});
     table.expect_all_read();

@@ -7,9 +7,9 @@ namespace spook {
 
 namespace {
 
-ParticleMethod to_method(const nb::dict& method) {
+ParticleMethod to_method(Entries& in) {
     ParticleMethod out;
-    Options options(method);
+    Entries options(nb::cast<nb::dict>(in["method"]), "method: the option");
     options.read("time_step", out.time_step);
     options.read("substeps", out.substeps);
     options.read("corrections", out.corrections);
@@ -29,8 +29,8 @@ ParticleMethod to_method(const nb::dict& method) {
     return out;
 }
 
-void read_bodies(const nb::dict& bodies, ParticleScene& scene) {
-    Columns table(bodies, "bodies");
+void read_bodies(Entries& in, ParticleScene& scene) {
+    Columns table(in, "bodies");
     const Numbers mass = table.numbers("mass"), position = table.numbers("position", 3),
                   velocity = table.numbers("velocity", 3), load = table.numbers("load", 3);
     for (std::size_t i = 0; i < table.rows(); ++i)
@@ -38,8 +38,8 @@ void read_bodies(const nb::dict& bodies, ParticleScene& scene) {
     table.expect_all_read();
 }
 
-void read_rows(const nb::dict& rows, ParticleScene& scene) {
-    Columns table(rows, "rows");
+void read_rows(Entries& in, ParticleScene& scene) {
+    Columns table(in, "rows");
     const Ends end(table, scene.bodies.size());
     const Numbers length = table.numbers("rest_length"), compliance = table.numbers("compliance"),
                   damping = table.numbers("damping");
@@ -48,18 +48,17 @@ void read_rows(const nb::dict& rows, ParticleScene& scene) {
     table.expect_all_read();
 }
 
-void make(ParticleProgram* self, const nb::dict& bodies, const nb::dict& rows, const nb::dict& springs,
-          const nb::dict& fields, const Point& gravity, const nb::dict& method, bool loads_change,
-          const std::vector<QuantityRequest>& quantities, const std::vector<Observation>& observations,
-          double time_left) {
+void make(ParticleProgram* self, const nb::dict& tables, const std::vector<QuantityRequest>& quantities,
+          const std::vector<Observation>& observations, double time_left) {
     ParticleScene scene;
-    scene.gravity = to_vec(gravity);
-    scene.loads_change = loads_change;
-    scene.method = to_method(method);
-    read_bodies(bodies, scene);
-    read_rows(rows, scene);
-    scene.springs = read_springs(springs, scene.bodies.size());
-    scene.fields = read_fields(fields);
+    Entries in(tables, "scene: the table");
+    read_settings(in, scene);
+    scene.method = to_method(in);
+    read_bodies(in, scene);
+    read_rows(in, scene);
+    scene.springs = read_springs(in, scene.bodies.size());
+    scene.fields = read_fields(in);
+    in.expect_all_read();
     make_in_time(self, scene, quantities, observations, time_left);
 }
 
@@ -67,13 +66,12 @@ void make(ParticleProgram* self, const nb::dict& bodies, const nb::dict& rows, c
 
 void bind_particles(nb::module_& m) {
     bind_program<ParticleSystem>(
-        m, "ParticleProgram", "ParticleSnapshot", "A compiled scene of particles.", &make, nb::arg("bodies"),
-        nb::arg("rows"), nb::arg("springs"), nb::arg("fields"), nb::arg("gravity"), nb::arg("method"),
-        nb::arg("loads_change"), nb::arg("quantities"), nb::arg("observations"), nb::arg("time_left") = 0.0,
-        "Tables are dicts of columns, a row each. bodies: mass, position, velocity, load. rows and springs:\n"
-        "first, second (body or -1), first_point, second_point (of ends that are no body), rest_length, and\n"
-        "compliance, damping, or stiffness, viscosity. fields: strength, centre. Raises TimeoutError where\n"
-        "making it takes longer than `time_left` [s, 0 for no limit].");
+        m, "ParticleProgram", "ParticleSnapshot", "A compiled scene of particles.", &make, nb::arg("scene"),
+        nb::arg("quantities"), nb::arg("observations"), nb::arg("time_left") = 0.0,
+        "`scene` has tables, dicts of columns, a row each. bodies: mass, position, velocity, load. rows and\n"
+        "springs: first, second (body or -1), first_point, second_point (of ends that are no body), rest_length,\n"
+        "and compliance, damping, or stiffness, viscosity. fields: strength, centre. Beside them method, gravity\n"
+        "and loads_change. Raises TimeoutError where making it takes longer than `time_left` [s, 0 for no limit].");
 }
 
 }  // namespace spook

@@ -7,8 +7,8 @@ namespace spook {
 
 namespace {
 
-void read_bodies(const nb::dict& bodies, RigidScene& scene) {
-    Columns table(bodies, "bodies");
+void read_bodies(Entries& in, RigidScene& scene) {
+    Columns table(in, "bodies");
     const std::vector<Motion> motion = table.kinds<Motion>("motion", "motion");
     const Numbers particle = table.numbers("particle"), mass = table.numbers("mass"),
                   inertia = table.numbers("inertia", 3), inertia_axes = table.numbers("inertia_axes", 4),
@@ -52,8 +52,8 @@ void read_bodies(const nb::dict& bodies, RigidScene& scene) {
     table.expect_all_read();
 }
 
-void read_joints(const nb::dict& joints, RigidScene& scene) {
-    Columns table(joints, "joints");
+void read_joints(Entries& in, RigidScene& scene) {
+    Columns table(in, "joints");
     const std::vector<JointKind> kind = table.kinds<JointKind>("kind", "joint");
     const Numbers first = table.numbers("first"), second = table.numbers("second"),
                   first_point = table.numbers("first_point", 3),
@@ -84,8 +84,8 @@ void read_joints(const nb::dict& joints, RigidScene& scene) {
 
 Range all_joints(const RigidScene& scene) { return {scene.joints.size(), "joints"}; }
 
-void read_motors(const nb::dict& motors, RigidScene& scene) {
-    Columns table(motors, "motors");
+void read_motors(Entries& in, RigidScene& scene) {
+    Columns table(in, "motors");
     const Numbers joint = table.numbers("joint"), speed = table.numbers("speed"),
                   force = table.numbers("max_force"), pushes = table.numbers("pushes");
     for (std::size_t i = 0; i < table.rows(); ++i) {
@@ -98,8 +98,8 @@ void read_motors(const nb::dict& motors, RigidScene& scene) {
     table.expect_all_read();
 }
 
-void read_frictions(const nb::dict& frictions, RigidScene& scene) {
-    Columns table(frictions, "joint_frictions");
+void read_frictions(Entries& in, RigidScene& scene) {
+    Columns table(in, "joint_frictions");
     const Numbers joint = table.numbers("joint"), constant = table.numbers("constant", 2),
                   load = table.numbers("load", 2);
     for (std::size_t i = 0; i < table.rows(); ++i) {
@@ -110,16 +110,16 @@ void read_frictions(const nb::dict& frictions, RigidScene& scene) {
     table.expect_all_read();
 }
 
-void read_armatures(const nb::dict& armatures, RigidScene& scene) {
-    Columns table(armatures, "armatures");
+void read_armatures(Entries& in, RigidScene& scene) {
+    Columns table(in, "armatures");
     const Numbers joint = table.numbers("joint"), inertia = table.numbers("inertia");
     for (std::size_t i = 0; i < table.rows(); ++i)
         scene.joints[joint.index(i, all_joints(scene))].armature = inertia[i];
     table.expect_all_read();
 }
 
-void read_limits(const nb::dict& limits, RigidScene& scene) {
-    Columns table(limits, "limits");
+void read_limits(Entries& in, RigidScene& scene) {
+    Columns table(in, "limits");
     const Numbers joint = table.numbers("joint"), lower = table.numbers("lower"),
                   upper = table.numbers("upper"), compliance = table.numbers("compliance"),
                   damping = table.numbers("damping"), restitution = table.numbers("restitution");
@@ -135,8 +135,8 @@ void read_limits(const nb::dict& limits, RigidScene& scene) {
     table.expect_all_read();
 }
 
-void read_joint_springs(const nb::dict& springs, RigidScene& scene) {
-    Columns table(springs, "joint_springs");
+void read_joint_springs(Entries& in, RigidScene& scene) {
+    Columns table(in, "joint_springs");
     const Numbers joint = table.numbers("joint"), stiffness = table.numbers("stiffness"),
                   rest = table.numbers("rest"), damping = table.numbers("damping"),
                   force = table.numbers("max_force");
@@ -174,8 +174,8 @@ struct Outline {
 using Outlines = std::vector<Outline>;
 
 /// Corners of hulls and meshes, and the loops round their faces; both in ascending order of outline and face.
-Outlines read_outlines(const nb::dict& corners, const nb::dict& loops) {
-    Columns points(corners, "outline_corners"), rounds(loops, "outline_faces");
+Outlines read_outlines(Entries& in) {
+    Columns points(in, "outline_corners"), rounds(in, "outline_faces");
     const Numbers outline_of = points.numbers("outline"), place = points.numbers("position", 3),
                   loop_of = rounds.numbers("outline"), face = rounds.numbers("face"),
                   corner = rounds.numbers("corner");
@@ -200,10 +200,9 @@ Outlines read_outlines(const nb::dict& corners, const nb::dict& loops) {
     return outlines;
 }
 
-std::vector<Collider> read_colliders(const nb::dict& colliders, Outlines& outlines, std::size_t bodies,
-                                     const char* name) {
+std::vector<Collider> read_colliders(Entries& in, Outlines& outlines, std::size_t bodies, const char* name) {
     std::vector<Collider> read;
-    Columns table(colliders, name);
+    Columns table(in, name);
     const std::vector<ShapeKind> kind = table.kinds<ShapeKind>("kind", "shape");
     const Numbers body = table.numbers("body"), position = table.numbers("position", 3),
                   orientation = table.numbers("orientation", 4), radius = table.numbers("radius"),
@@ -238,8 +237,8 @@ std::vector<Collider> read_colliders(const nb::dict& colliders, Outlines& outlin
     return read;
 }
 
-void read_terms(const nb::dict& terms, RigidScene& scene) {
-    Columns table(terms, "terms");
+void read_terms(Entries& in, RigidScene& scene) {
+    Columns table(in, "terms");
     const Numbers row = table.numbers("row"), joint = table.numbers("joint"),
                   coefficient = table.numbers("coefficient");
     for (std::size_t i = 0; i < table.rows(); ++i)
@@ -248,8 +247,8 @@ void read_terms(const nb::dict& terms, RigidScene& scene) {
     table.expect_all_read();
 }
 
-void read_wire_points(const nb::dict& points, RigidScene& scene) {
-    Columns table(points, "wire_points");
+void read_wire_points(Entries& in, RigidScene& scene) {
+    Columns table(in, "wire_points");
     const Numbers wire = table.numbers("wire"), body = table.numbers("body"),
                   point = table.numbers("point", 3);
     for (std::size_t i = 0; i < table.rows(); ++i)
@@ -258,8 +257,8 @@ void read_wire_points(const nb::dict& points, RigidScene& scene) {
     table.expect_all_read();
 }
 
-void read_eyes(const nb::dict& eyes, RigidScene& scene) {
-    Columns table(eyes, "eyes");
+void read_eyes(Entries& in, RigidScene& scene) {
+    Columns table(in, "eyes");
     const Numbers wire = table.numbers("wire"), point = table.numbers("point"),
                   friction = table.numbers("friction"), turns = table.numbers("turns");
     for (std::size_t i = 0; i < table.rows(); ++i) {
@@ -277,8 +276,8 @@ void read_eyes(const nb::dict& eyes, RigidScene& scene) {
     table.expect_all_read();
 }
 
-void read_tyres(const nb::dict& tyres, RigidScene& scene) {
-    Columns table(tyres, "tyres");
+void read_tyres(Entries& in, RigidScene& scene) {
+    Columns table(in, "tyres");
     const Numbers joint = table.numbers("joint"), radius = table.numbers("radius"),
                   stiffness = table.numbers("slip_stiffness", 2), friction = table.numbers("friction", 2);
     for (std::size_t i = 0; i < table.rows(); ++i) {
@@ -290,8 +289,8 @@ void read_tyres(const nb::dict& tyres, RigidScene& scene) {
     table.expect_all_read();
 }
 
-void read_fluids(const nb::dict& fluids, RigidScene& scene) {
-    Columns table(fluids, "fluids");
+void read_fluids(Entries& in, RigidScene& scene) {
+    Columns table(in, "fluids");
     const Numbers density = table.numbers("density"), level = table.numbers("level"),
                   up = table.numbers("up", 3), velocity = table.numbers("velocity", 3),
                   drag = table.numbers("drag");
@@ -301,8 +300,8 @@ void read_fluids(const nb::dict& fluids, RigidScene& scene) {
 }
 
 /// Functions of time, and the knots of those that are tables.
-void read_drives(const nb::dict& drives, const nb::dict& knots, RigidScene& scene) {
-    Columns table(drives, "drives");
+void read_drives(Entries& in, RigidScene& scene) {
+    Columns table(in, "drives");
     const std::vector<DriveKind> kind = table.kinds<DriveKind>("kind", "drive");
     const std::vector<TimeKind> function = table.kinds<TimeKind>("function", "function of time");
     const Numbers index = table.numbers("index"), linear = table.numbers("linear", 3),
@@ -316,7 +315,7 @@ void read_drives(const nb::dict& drives, const nb::dict& knots, RigidScene& scen
                                 angular.vec(i),
                                 {function[i], offset[i], amplitude[i], rate[i], phase[i], {}, {}}});
     table.expect_all_read();
-    Columns rows(knots, "knots");
+    Columns rows(in, "knots");
     const Numbers drive = rows.numbers("drive"), time = rows.numbers("time"), value = rows.numbers("value");
     for (std::size_t i = 0; i < rows.rows(); ++i) {
         TimeFunction& of = scene.drives[drive.index(i, {scene.drives.size(), "drives"})].function;
@@ -326,8 +325,8 @@ void read_drives(const nb::dict& drives, const nb::dict& knots, RigidScene& scen
     rows.expect_all_read();
 }
 
-void read_no_contact(const nb::dict& no_contact, RigidScene& scene) {
-    Columns table(no_contact, "no_contact");
+void read_no_contact(Entries& in, RigidScene& scene) {
+    Columns table(in, "no_contact");
     const Numbers first = table.numbers("first"), second = table.numbers("second");
     const Range bodies{scene.bodies.size(), "bodies"};
     for (std::size_t i = 0; i < table.rows(); ++i)
@@ -335,8 +334,8 @@ void read_no_contact(const nb::dict& no_contact, RigidScene& scene) {
     table.expect_all_read();
 }
 
-void read_pair_frictions(const nb::dict& pairs, RigidScene& scene) {
-    Columns table(pairs, "pair_frictions");
+void read_pair_frictions(Entries& in, RigidScene& scene) {
+    Columns table(in, "pair_frictions");
     const Numbers first = table.numbers("first"), second = table.numbers("second");
     const Numbers friction = table.numbers("friction"), rolling = table.numbers("rolling_friction"),
                   torsional = table.numbers("torsional_friction");
@@ -347,9 +346,9 @@ void read_pair_frictions(const nb::dict& pairs, RigidScene& scene) {
     table.expect_all_read();
 }
 
-RigidMethod to_method(const nb::dict& method) {
+RigidMethod to_method(Entries& in) {
     RigidMethod out;
-    Options options(method);
+    Entries options(nb::cast<nb::dict>(in["method"]), "method: the option");
     options.read("time_step", out.time_step);
     options.read("substeps", out.substeps);
     options.read("refinements", out.refinements);
@@ -380,40 +379,34 @@ RigidMethod to_method(const nb::dict& method) {
     return out;
 }
 
-void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, const nb::dict& motors,
-          const nb::dict& limits, const nb::dict& joint_springs, const nb::dict& joint_frictions,
-          const nb::dict& armatures, const nb::dict& springs, const nb::dict& terms,
-          const nb::dict& wire_points, const nb::dict& eyes, const nb::dict& tyres, const nb::dict& fields,
-          const nb::dict& fluids, const nb::dict& floaters, const nb::dict& drives, const nb::dict& knots,
-          const nb::dict& colliders, const nb::dict& outline_corners, const nb::dict& outline_faces,
-          const nb::dict& no_contact, const nb::dict& pair_frictions, bool contacts, const Point& gravity,
-          const nb::dict& method, bool loads_change, const std::vector<QuantityRequest>& quantities,
+void make(RigidProgram* self, const nb::dict& tables, const std::vector<QuantityRequest>& quantities,
           const std::vector<Observation>& observations, double time_left) {
     RigidScene scene;
-    scene.gravity = to_vec(gravity);
-    scene.loads_change = loads_change;
-    scene.contacts = contacts;
-    scene.method = to_method(method);
-    read_bodies(bodies, scene);
-    read_joints(joints, scene);
-    read_motors(motors, scene);
-    read_limits(limits, scene);
-    read_joint_springs(joint_springs, scene);
-    read_frictions(joint_frictions, scene);
-    read_armatures(armatures, scene);
-    scene.springs = read_springs(springs, scene.bodies.size());
-    scene.fields = read_fields(fields);
-    read_terms(terms, scene);
-    read_wire_points(wire_points, scene);
-    read_eyes(eyes, scene);
-    read_tyres(tyres, scene);
-    read_fluids(fluids, scene);
-    read_drives(drives, knots, scene);
-    Outlines outlines = read_outlines(outline_corners, outline_faces);
-    scene.floaters = read_colliders(floaters, outlines, scene.bodies.size(), "floaters");
-    scene.colliders = read_colliders(colliders, outlines, scene.bodies.size(), "colliders");
-    read_no_contact(no_contact, scene);
-    read_pair_frictions(pair_frictions, scene);
+    Entries in(tables, "scene: the table");
+    read_settings(in, scene);
+    in.read("contacts", scene.contacts);
+    scene.method = to_method(in);
+    read_bodies(in, scene);
+    read_joints(in, scene);
+    read_motors(in, scene);
+    read_limits(in, scene);
+    read_joint_springs(in, scene);
+    read_frictions(in, scene);
+    read_armatures(in, scene);
+    scene.springs = read_springs(in, scene.bodies.size());
+    scene.fields = read_fields(in);
+    read_terms(in, scene);
+    read_wire_points(in, scene);
+    read_eyes(in, scene);
+    read_tyres(in, scene);
+    read_fluids(in, scene);
+    read_drives(in, scene);
+    Outlines outlines = read_outlines(in);
+    scene.floaters = read_colliders(in, outlines, scene.bodies.size(), "floaters");
+    scene.colliders = read_colliders(in, outlines, scene.bodies.size(), "colliders");
+    read_no_contact(in, scene);
+    read_pair_frictions(in, scene);
+    in.expect_all_read();
     make_in_time(self, scene, quantities, observations, time_left);
 }
 
@@ -421,19 +414,15 @@ void make(RigidProgram* self, const nb::dict& bodies, const nb::dict& joints, co
 
 void bind_rigid(nb::module_& m) {
     bind_program<RigidSystem>(
-        m, "RigidProgram", "RigidSnapshot", "A compiled scene with rigid bodies.", &make, nb::arg("bodies"),
-        nb::arg("joints"), nb::arg("motors"), nb::arg("limits"), nb::arg("joint_springs"),
-        nb::arg("joint_frictions"), nb::arg("armatures"), nb::arg("springs"), nb::arg("terms"),
-        nb::arg("wire_points"), nb::arg("eyes"), nb::arg("tyres"), nb::arg("fields"), nb::arg("fluids"),
-        nb::arg("floaters"), nb::arg("drives"), nb::arg("knots"), nb::arg("colliders"),
-        nb::arg("outline_corners"), nb::arg("outline_faces"), nb::arg("no_contact"),
-        nb::arg("pair_frictions"), nb::arg("contacts"), nb::arg("gravity"), nb::arg("method"),
-        nb::arg("loads_change"), nb::arg("quantities"), nb::arg("observations"), nb::arg("time_left") = 0.0,
-        "Tables are dicts of columns, a row each, in the names of RigidBodySpec, JointSpec and Primitive;\n"
-        "outlines of hulls and meshes are numbered in the order they come;\n"
-        "springs and fields as for ParticleProgram. A body is an index, -1 the world; motors, limits,\n"
-        "joint_springs, joint_frictions and armatures name the joint they drive. Raises TimeoutError where making it takes longer\n"
-        "than `time_left` [s, 0 for no limit].");
+        m, "RigidProgram", "RigidSnapshot", "A compiled scene with rigid bodies.", &make, nb::arg("scene"),
+        nb::arg("quantities"), nb::arg("observations"), nb::arg("time_left") = 0.0,
+        "`scene` has the tables that engine/rigid_program.py packs, each a dict of columns with a row for each\n"
+        "body, joint, … in the names of RigidBodySpec, JointSpec and Primitive, and beside them method, gravity,\n"
+        "contacts and loads_change; a table or column that is missing or unknown is a ValueError that names it.\n"
+        "Outlines of hulls and meshes are numbered in the order they come; springs and fields as for\n"
+        "ParticleProgram. A body is an index, -1 the world; motors, limits, joint_springs, joint_frictions and\n"
+        "armatures name the joint they drive. Raises TimeoutError where making it takes longer than\n"
+        "`time_left` [s, 0 for no limit].");
 }
 
 }  // namespace spook
