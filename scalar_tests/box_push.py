@@ -10,7 +10,7 @@ import numpy as np
 
 from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
-from spook_tracker.scalar_tests import case
+from spook_tracker.scalar_tests import case, overlap
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
@@ -299,5 +299,6 @@ TEST = case.ScalarTest(
             target_error=0.01,
             target_seconds=0.05,
         ),
+        overlap.ladder(scene, DURATION, of="hand, box and floor"),
     ),
 )

@@ -302,8 +302,9 @@ class Ladder:
         return configuration.time_steps or self.time_steps
 
     def all_steps(self) -> tuple[float, ...]:
-        """Time steps [s] of any configuration, coarse to fine."""
-        return tuple(sorted({h for one in self.configurations for h in self.steps_of(one)}, reverse=True))
+        """Time steps [s] of the ladder and of any configuration, coarse to fine: those of other engines."""
+        own = {h for one in self.configurations for h in one.time_steps}
+        return tuple(sorted({*self.time_steps, *own}, reverse=True))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -11,7 +11,7 @@ import numpy as np
 
 from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
-from spook_tracker.scalar_tests import case
+from spook_tracker.scalar_tests import case, overlap
 from spook_tracker.scalar_tests.bracket import break_count, break_point
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
@@ -331,5 +331,7 @@ TEST = case.ScalarTest(
             target_error=1e-9,
             target_seconds=0.1,
         ),
+        overlap.ladder(doll, DURATION, "ragdoll overlap", "the ragdoll and the floor"),
+        overlap.ladder(chain, DURATION, "chain overlap", "the chain and the floor"),
     ),
 )

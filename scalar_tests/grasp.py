@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from spook_tracker import engine
-from spook_tracker.scalar_tests import case
+from spook_tracker.scalar_tests import case, overlap
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
@@ -251,5 +251,6 @@ TEST = case.ScalarTest(
             target_error=1e-9,
             target_seconds=0.01,
         ),
+        overlap.ladder(functools.partial(scene, GRIPPED), DURATION, of="capsule and fingers"),
     ),
 )

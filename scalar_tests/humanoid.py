@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from spook_tracker import engine
-from spook_tracker.scalar_tests import case
+from spook_tracker.scalar_tests import case, overlap
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
@@ -233,5 +233,6 @@ TEST = case.ScalarTest(
             target_error=1e-6,
             target_seconds=0.05,
         ),
+        overlap.ladder(limp, FALL, of="the one that falls and the floor"),
     ),
 )

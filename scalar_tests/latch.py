@@ -9,7 +9,7 @@ import numpy as np
 
 from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
-from spook_tracker.scalar_tests import case
+from spook_tracker.scalar_tests import case, overlap
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
@@ -277,5 +277,6 @@ TEST = case.ScalarTest(
             target_error=3e-4,
             target_seconds=0.02,
         ),
+        overlap.ladder(functools.partial(scene, PUSHED), OPENING, of="bolt and strike"),
     ),
 )

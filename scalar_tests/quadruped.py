@@ -6,7 +6,7 @@ import functools
 import math
 
 from spook_tracker import engine
-from spook_tracker.scalar_tests import case
+from spook_tracker.scalar_tests import case, overlap
 from spook_tracker.scalar_tests.bracket import break_point, unbroken
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
@@ -234,5 +234,6 @@ TEST = case.ScalarTest(
             target_error=0.02,
             target_seconds=0.05,
         ),
+        overlap.ladder(scene, STANDS, of="feet and floor"),
     ),
 )

@@ -10,7 +10,7 @@ import numpy as np
 from spook_tracker import engine
 from spook_tracker.engine.joints import Constraint
 from spook_tracker.engine.observe import Observable
-from spook_tracker.scalar_tests import case
+from spook_tracker.scalar_tests import case, overlap
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.closed_form import ask, error
 from spook_tracker.scalar_tests.configurations import configured
@@ -29,6 +29,7 @@ RATE, TORQUE = 6.0, 100.0  # rad/s, N m: more than the friction of a wheel that 
 STEP, FIRST, DEEP = 0.03, 0.9, 0.6  # m, of each of two steps
 TIME_STEP = 1.0 / 60.0  # s
 LEVEL, DURATION = 0.5, 4.0  # s: before the first step, and until all wheels are on the second
+CLIMBS = 1.0  # s, until the first wheels are on the first step
 HILL = 0.3  # of the search for the weakest drive
 SPEED = RATE * RADIUS  # m/s
 WEIGHT = GRAVITY * (CHASSIS + LOAD + 6.0 * WHEEL)  # N
@@ -294,5 +295,6 @@ TEST = case.ScalarTest(
             target_error=0.005,
             target_seconds=0.05,
         ),
+        overlap.ladder(scene, CLIMBS, of="wheels and steps"),
     ),
 )

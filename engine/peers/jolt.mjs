@@ -10,6 +10,7 @@ serve(async (task) => {
   const WITHOUT_BOUND = 1e9; // m/s, rad/s: Jolt bounds all speeds
   const CONTACTS = 10240; // pairs that touch, at most: more do not fit into the memory Jolt keeps for a step
   const PLANE = 1e5; // m, half the edge of what stands for a plane without end
+  const ROUNDED = task.options.rounded ?? 0.05; // m, of edges, at most
 
   const given = new J.JoltSettings();
   const layers = new J.ObjectLayerPairFilterTable(1);
@@ -33,12 +34,12 @@ serve(async (task) => {
   function shapeOf(shape) {
     if (!shape) return new J.EmptyShape();
     if (shape.kind === "sphere") return new J.SphereShape(shape.radius);
-    if (shape.kind === "box") return new J.BoxShape(vec(shape.half), Math.min(0.05, 0.2 * Math.min(...shape.half)));
+    if (shape.kind === "box") return new J.BoxShape(vec(shape.half), Math.min(ROUNDED, 0.2 * Math.min(...shape.half)));
     if (shape.kind === "plane") return new J.PlaneShape(new J.Plane(vec(shape.normal), 0), null, PLANE);
     if (shape.kind === "compound") return compoundOf(shape.parts);
     if (shape.kind === "hull") return hullOf(shape.corners);
     if (shape.kind === "mesh") return meshOf(shape);
-    const rounded = Math.min(0.05, 0.2 * Math.min(shape.half, shape.radius)); // of a cylinder's edges
+    const rounded = Math.min(ROUNDED, 0.2 * Math.min(shape.half, shape.radius)); // of a cylinder's edges
     const upright = // along y; ours lies along z
       shape.kind === "cylinder"
         ? new J.CylinderShapeSettings(shape.half, shape.radius, rounded)

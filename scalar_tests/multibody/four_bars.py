@@ -284,7 +284,7 @@ TEST = case.ScalarTest(
             {
                 "low": ((1 / 480, 1 / 1000), (PLAIN_CONFIGURATION, _composed("order4", 1 / 20))),
                 "high": (
-                    (1 / 1000, 1 / 2000),
+                    (1 / 20, 1 / 40),
                     (
                         _composed("order4", 1 / 20, 1 / 40),
                         _composed("order6", 1 / 20),
