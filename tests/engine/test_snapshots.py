@@ -270,7 +270,7 @@ GAVE_UP = "after a solver has given up and is not asked again at once; no scene 
 PLACE = "where the rows of the last solve are, for readers; what is read comes along"
 LOOK = "when the tension of a composition is looked at next: one look more finds the same"
 NOT_READ: dict[str, dict[Path_, str]] = {
-    "particles": {(0, 3): SAMPLE, (0, 4): WORK, (0, 5): GAVE_UP, (0, 6, 4): FAILED, (0, 6, 6): ENERGY},
+    "particles": {(0, 3): SAMPLE, (0, 4): WORK, (0, 5): GAVE_UP, (0, 6, 4): FAILED},
     "rigid": {
         **dict.fromkeys([(0, 0, place) for place in (1, 2, 6, 14, 15, 18)], FAILED),
         **dict.fromkeys([(0, 3, 0, 4), (0, 3, 2), (0, 3, 3)], GAVE_UP),

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 from spook_tracker.engine import (
@@ -9,6 +12,7 @@ from spook_tracker.engine import (
     Energy,
     Method,
     Particle,
+    Position,
     Result,
     Scene,
     Spring,
@@ -83,3 +87,35 @@ def test_what_a_spring_makes_of_steps_that_are_too_long_for_it_ends_unsettled() 
     assert result.status == "unsettled"
     assert "out of nothing" in result.failure
     assert result.failed_body == "bob"
+
+
+@pytest.mark.parametrize("half", [False, True])
+@pytest.mark.parametrize(("light", "speed"), [(0.005, 2.5), (0.02, 0.1), (0.2, 2.5)])
+def test_a_load_that_rods_let_fall_is_told_with_what_holds_it(light: float, speed: float, half: bool) -> None:
+    """5 kg on nine light particles, 5 m of rods: what completes keeps the load within them."""
+    names = [f"{k}" for k in range(1, LINKS + 1)]
+    bodies = [
+        Particle(name=n, mass=light, position=(0.0, 0.0, -0.5 * k)) for k, n in enumerate(names, start=1)
+    ]
+    bodies[-1] = replace(bodies[-1], mass=5.0, velocity=(speed, 0.0, 0.0))
+    rods = [
+        Distance(name=f"to {b}", between=(a, b), compliance=0.0)
+        for a, b in zip([(0.0, 0.0, 0.0), *names], names, strict=False)
+    ]
+
+    def fell(string_stiffness: bool) -> tuple[Result, float]:
+        run = simulate(
+            Scene(bodies=tuple(bodies), constraints=tuple(rods), gravity=DOWN),
+            time_step=1 / 60,
+            duration=4.0,
+            method=Method(corrections=2 * half, half_step_velocities=half, string_stiffness=string_stiffness),
+            observe={"place": Trace(quantity=Position(names[-1]))},
+        )
+        return run, float(np.linalg.norm(run["place"], axis=1).max()) - 5.0
+
+    run, off = fell(False)
+    assert run.completed == (light == 0.2) == (off < 0.01)
+    if not run.completed:
+        assert run.status == "unsettled" and "string_stiffness=True" in run.failure
+    cured, off = fell(True)
+    assert cured.completed and off < 0.01

@@ -54,20 +54,12 @@ ParticleComposition::ParticleComposition(ParticleParts& parts, int order)
     }
 }
 
-void ParticleComposition::start(StageClock* clock, double energy) {
+void ParticleComposition::start(StageClock* clock) {
     clock_ = clock;
     std::vector<double> history = std::move(state_.history);
     std::fill(history.begin(), history.end(), 0.0);
     state_ = {};
     state_.history = std::move(history);
-    state_.energy.begun = energy, state_.energy.most_kinetic = kinetic_energy();
-}
-
-double ParticleComposition::kinetic_energy() const noexcept {
-    double sum = 0.0;
-    for (std::size_t node = 0; node < nodes_.v.size(); ++node)
-        if (nodes_.w[node] > 0.0) sum += 0.5 * dot(nodes_.v[node], nodes_.v[node]) / nodes_.w[node];
-    return sum;
 }
 
 void ParticleComposition::advance(std::int64_t steps) {
@@ -85,7 +77,6 @@ void ParticleComposition::advance(std::int64_t steps) {
         const int parts = state_.parts;
         for (int part = 0; part < parts; ++part) constrained_step(h_ / parts, 0);
         state_.halved_steps += parts - 1;
-        state_.energy.most_kinetic = std::max(state_.energy.most_kinetic, kinetic_energy());
     }
 }
 
@@ -334,7 +325,6 @@ void ParticleComposition::solve_rigidly() {
 
 /// Kicks up to where the step ended, by forces as they were: what is set from outside acts from there on.
 void ParticleComposition::catch_up() {
-    state_.energy.is_powered = true;
     if (state_.pending == 0.0) return;
     find_kicks();
     const double part = state_.pending / h_;

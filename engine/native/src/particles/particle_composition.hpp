@@ -15,8 +15,8 @@ public:
     /// `order`: 4, 6 or 8. The parts must outlive it.
     ParticleComposition(ParticleParts& parts, int order);
 
-    /// From the nodes' state at the start of a run, with its energy [J]; `clock` null means stages are not timed.
-    void start(StageClock* clock, double energy);
+    /// From the nodes' state at the start of a run; `clock` null means stages are not timed.
+    void start(StageClock* clock);
     void advance(std::int64_t steps);
     /// What is seen at the end of a step, without changing what goes on: velocities kicked and projected to the
     /// sample, forces from the accelerations there.
@@ -32,12 +32,8 @@ public:
         double pending = 0.0;          // s: half a stage still to be kicked (with rows) or drifted (without)
         std::int64_t stage_steps = 0;  // steps the history has seen
         std::int64_t newton_iterations = 0, halved_steps = 0;
-        bool lost = false;  // no step is short enough: nothing is a number from here on
-        int parts = 1;      // of a step, each of which tension allows
-        struct Energy {
-            double begun = 0.0, most_kinetic = 0.0;  // J
-            bool is_powered = false;                 // loads were set, which no book has
-        } energy;
+        bool lost = false;            // no step is short enough: nothing is a number from here on
+        int parts = 1;                // of a step, each of which tension allows
         std::vector<double> history;  // stages × three steps × rows, N
     };
 
@@ -47,7 +43,6 @@ public:
 private:
     void drift_kick(double tau) noexcept;
     void find_kicks() noexcept;
-    double kinetic_energy() const noexcept;
     bool is_too_taut(double length) noexcept;
     void constrained_step(double length, int depth);
     bool constrained_stage(double tau, double* history);

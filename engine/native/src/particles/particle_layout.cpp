@@ -2,10 +2,12 @@
 #include "particles/particle_system.hpp"
 
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <utility>
 
 #include "particles/path_order.hpp"
+#include "run/energy_made.hpp"
 
 namespace spook {
 
@@ -117,9 +119,14 @@ void ParticleSystem::reset(StageClock* clock) {
     seen_.v = nodes_.v;
     if (stiff_strings_) find_tensions();
     unread_ = -1;
-    if (composition_) composition_->start(clock, readings_.kinetic_energy() + readings_.potential_energy());
+    if (composition_) composition_->start(clock);
     else if (half_step_) half_kick_back();
+    noted_ = {};
     save();
+    noted_.begun = noted_.most;
+    for (int row = 0; row < readings_.rows() && !composition_; ++row)
+        noted_.begun_violated |= std::fabs(readings_.violation(row)) > initial_overstep;
+    for (const ParticleBody& body : scene_.bodies) noted_.is_powered |= norm(body.load) > 0.0;
 }
 
 }  // namespace spook

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <limits>
 #include <stdexcept>
 
@@ -18,17 +19,23 @@ void ParticleSystem::observe(Recorder& recorder, std::int64_t sample) {
     if (composition_) {
         if (sample > 0) read_composition();
     } else if (half_step_) {
-        if (clock_) velocity_stage<true>();
-        else velocity_stage<false>();
-        velocity_ready_ = true;
-        for (std::size_t node = 0; node < nodes_.v.size(); ++node)
-            seen_.v[node] = 0.5 * (seen_.v[node] + nodes_.v[node]);
+        look_ahead();
         if (sample == 0)
             for (int body = 0; body < readings_.bodies(); ++body)
                 seen_.v[nodes_.of_body[body]] = scene_.bodies[body].velocity;
     }
     recorder.sample(sample);
     if (clock_) clock_->mark(Stage::observe);
+}
+
+/// Velocities at mid-step are seen in the mean with those of the coming step.
+void ParticleSystem::look_ahead() {
+    seen_.v = nodes_.v;
+    if (clock_) velocity_stage<true>();
+    else velocity_stage<false>();
+    velocity_ready_ = true;
+    for (std::size_t node = 0; node < nodes_.v.size(); ++node)
+        seen_.v[node] = 0.5 * (seen_.v[node] + nodes_.v[node]);
 }
 
 /// Rows that cannot be told apart may leave the velocities at the sample no numbers, where the steps go on.
@@ -126,16 +133,62 @@ void ParticleSystem::count(RunReport& report, std::int64_t steps) const {
     report.residual = parts_.pgs.work.residual;
 }
 
-/// Asked once the final state was read: compositions keep energy, and their rows can add to it.
-void ParticleSystem::judge_end(RunReport& report) const {
-    const auto loaded = [](const ParticleBody& body) { return norm(body.load) > 0.0; };
-    if (!composition_ || rows_.size() == 0 || std::ranges::any_of(scene_.bodies, loaded)) return;
-    const ParticleComposition::State::Energy& ran = composition_->state().energy;
-    if (ran.is_powered) return;
-    const double kinetic = readings_.kinetic_energy();
+/// What the judge at the end of a run is to know, at places x between two blocks of steps. Where velocities lie half a step before or
+/// after x, energy is that with the mean of V at both ends of that step: without rows it is kept to second order.
+void ParticleSystem::note() {
+    if (rows_.size() == 0) return;
+    double kinetic = 0.0;
+    for (int body = 0; body < readings_.bodies(); ++body) {
+        const Vec3 v = nodes_.v[nodes_.of_body[body]];
+        kinetic += 0.5 * readings_.mass(body) * dot(v, v);
+    }
+    noted_.most_kinetic = std::max(noted_.most_kinetic, kinetic);
+    for (int k = 0; k < readings_.rows() && !stiff_strings_; ++k) {
+        const DistanceRow& row = scene_.rows[k];
+        const double open = readings_.violation(k), load = rows_.link[rows_.slot[k]].lambda / parts_.h;
+        if (row.compliance > rigid_compliance || !(open > noted_.open * row.rest_length)) continue;
+        noted_.open = open / row.rest_length, noted_.row = k;
+        noted_.gives_way = 2.0 * row.compliance * std::fabs(load) > open;
+    }
+    double potential = readings_.potential_energy();
+    const double way = composition_ ? 0.0 : velocity_ready_ ? parts_.h : -parts_.h;
+    const std::vector<Vec3> here = nodes_.x;
+    for (std::size_t node = 0; node < nodes_.size(); ++node) nodes_.x[node] += way * nodes_.v[node];
+    potential = 0.5 * (potential + readings_.potential_energy());
+    nodes_.x = here;
+    noted_.most = std::max(noted_.most, kinetic + potential);
+}
+
+/// Asked once the final state was read: what moves with energy out of nothing, or was found off rows that are rigid.
+void ParticleSystem::judge_end(RunReport& report) {
+    if (rows_.size() == 0 || noted_.begun_violated || report.status != Status::completed) return;
+    note();
+    const char* cure =
+        composition_     ? taut_cure
+        : stiff_strings_ ? "take smaller steps, or composition=\"order4\" without string_stiffness"
+        : scene_.method.iterative
+            ? "light bodies carry more tension than they can take in a step, T h²/(m l) above 0.3: "
+              "take smaller steps"
+            : "light bodies carry more tension than they can take in a step, T h²/(m l) above 0.3: "
+              "use string_stiffness=True, or smaller steps";
+    if (noted_.open > 1.0) {
+        const DistanceRow& row = scene_.rows[noted_.row];
+        char said[300];
+        std::snprintf(said, sizeof said, "was found %.3g m off a distance of %.3g m; %s",
+                      noted_.open * row.rest_length, row.rest_length,
+                      noted_.gives_way ? "give it less compliance" : cure);
+        return report.leave_unsettled(std::max(row.ends[0].body, row.ends[1].body), said);
+    }
+    if (noted_.is_powered) return;
+    double reached = noted_.most, least = 0.0;
+    if (composition_) reached = readings_.kinetic_energy() + readings_.potential_energy();
+    else {
+        const double fall = parts_.h * norm(scene_.gravity);
+        for (const ParticleBody& body : scene_.bodies) least += body.mass * fall * fall;
+    }
     const auto lightest = std::ranges::min_element(scene_.bodies, {}, &ParticleBody::mass);
-    judge_energy({ran.begun, kinetic + readings_.potential_energy(), std::max(ran.most_kinetic, kinetic)},
-                 static_cast<int>(lightest - scene_.bodies.begin()), taut_cure, report);
+    judge_energy({noted_.begun, reached, noted_.most_kinetic, least},
+                 static_cast<int>(lightest - scene_.bodies.begin()), cure, report);
 }
 
 std::vector<double> ParticleSystem::places() const {
@@ -151,20 +204,11 @@ std::vector<double> ParticleSystem::places() const {
 
 std::vector<double> ParticleSystem::final_state() {
     std::vector<double> state;
-    std::vector<Vec3> reported = nodes_.v;
-    if (composition_) {
-        composition_->read(seen_);
-        reported = seen_.v;
-    } else if (half_step_) {
-        if (velocity_ready_) reported = seen_.v;
-        else {
-            velocity_stage<false>();
-            for (std::size_t node = 0; node < nodes_.v.size(); ++node)
-                reported[node] = 0.5 * (reported[node] + nodes_.v[node]);
-        }
-    }
+    if (composition_) composition_->read(seen_);
+    else if (half_step_ && !velocity_ready_) look_ahead();
+    else if (!half_step_) seen_.v = nodes_.v;
     for (int body = 0; body < readings_.bodies(); ++body) {
-        const Vec3 x = readings_.position(body), v = reported[nodes_.of_body[body]];
+        const Vec3 x = readings_.position(body), v = readings_.velocity(body);
         state.insert(state.end(), {x.x, x.y, x.z, 1.0, 0.0, 0.0, 0.0, v.x, v.y, v.z, 0.0, 0.0, 0.0});
     }
     return state;

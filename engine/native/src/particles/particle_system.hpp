@@ -5,6 +5,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -37,7 +38,10 @@ public:
     void advance(std::int64_t steps);
     void observe(Recorder& recorder, std::int64_t sample);
     Health health() const noexcept;
-    void save() { keep(saved_); }
+    void save() {
+        keep(saved_);
+        note();
+    }
     void restore() { go_back(saved_); }
     struct Memory;
     /// All that the coming steps depend on, loads apart; going back to it gives the bits of going on from it.
@@ -53,7 +57,7 @@ public:
     /// Back to the start state; `clock` null means stages are not timed.
     void reset(StageClock* clock);
     void count(RunReport& report, std::int64_t steps) const;
-    void judge_end(RunReport& report) const;
+    void judge_end(RunReport& report);
     std::vector<double> final_state();
     /// The same without a solve: velocities are NaN.
     std::vector<double> places() const;
@@ -71,6 +75,8 @@ public:
     };
 
 private:
+    void note();
+    void look_ahead();
     void lay_out_paths(const std::vector<Path>& paths);
     void lay_out_plain();
 
@@ -113,6 +119,14 @@ private:
     Seen seen_;
     ParticleReadings readings_{scene_, parts_, seen_};
     Memory saved_;
+    struct Noted {  // between blocks of steps, for the judge at the end of a run
+        double begun = 0.0, most = -std::numeric_limits<double>::infinity(), most_kinetic = 0.0;  // J
+        double open = 0.0;  // of a row's length, that it was too long by
+        int row = -1;       // this row, of the scene; whether its compliance is why
+        bool gives_way = false;
+        bool is_powered = false;      // loads give energy that is in no book
+        bool begun_violated = false;  // nothing says how much energy such rows give
+    } noted_;
     StageClock* clock_ = nullptr;
 };
 

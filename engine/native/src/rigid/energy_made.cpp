@@ -82,16 +82,15 @@ void judge_stopped(const RigidModel& model, const RigidState& live, RunReport& r
     const auto& stopped = live.stopped;
     if (report.status != Status::completed || !(stopped.energy > max_energy_share * stopped.most_kinetic))
         return;
-    report.status = Status::unsettled;
-    report.failed_step = (stopped.step + model.method.substeps - 1) / model.method.substeps;
-    report.failed_body = stopped.body;
+    const std::int64_t step = (stopped.step + model.method.substeps - 1) / model.method.substeps;
     char said[220];
     std::snprintf(
         said, sizeof said,
         "was stopped where it was to rebound; such impacts have lost %.3g J, of %.3g J at most; take "
         "smaller steps, or more substeps, each of which meets others",
         stopped.energy, stopped.most_kinetic);
-    report.reason = said;
+    report.leave_unsettled(stopped.body, said);
+    report.failed_step = step;
 }
 
 /// Asked once the final state was read.

@@ -5,6 +5,7 @@
 #include <cstdio>
 
 #include "rigid/tolerances.hpp"
+#include "run/energy_made.hpp"
 
 namespace spook {
 
@@ -94,17 +95,13 @@ void judge_open_joints(const RigidModel& model, const RigidState& live, const Jo
         for (int i = 0; i < linear; ++i) open += violation[i] * violation[i];
         open = std::sqrt(open);
         if (!(open > joints.gain(k, 0).extent)) continue;
-        report.status = Status::unsettled;
-        report.failed_step = report.steps;
-        report.failed_body = model.constants[std::max(block.second, 0)].moves() && block.second >= 0
-                                 ? block.second
-                                 : block.first;
+        const bool second = block.second >= 0 && model.constants[block.second].moves();
         char said[160];
         std::snprintf(
             said, sizeof said,
             "was found %.3g m off its joint, further than the joint's arms reach; take smaller steps or less compliance",
             open);
-        report.reason = said;
+        report.leave_unsettled(second ? block.second : block.first, said);
         return;
     }
 }

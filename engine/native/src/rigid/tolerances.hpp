@@ -9,8 +9,7 @@ namespace spook {
 
 // energy_made.cpp
 namespace tolerances::energy_made {
-inline constexpr double initial_overstep = 1e-9;  // m or rad, of rows and overlaps
-inline constexpr int steps_between_looks = 16;    // of joints alone: a look costs a tenth of a plane step
+inline constexpr int steps_between_looks = 16;  // of joints alone: a look costs a tenth of a plane step
 }  // namespace tolerances::energy_made
 
 // impact.cpp
@@ -121,8 +120,7 @@ inline constexpr double steady_squared = 0x1p-106;  // square of the rounding of
 // runaway.cpp
 namespace tolerances::runaway {
 inline constexpr double passing_energy = 1e-6;  // of its spin's energy: what it has by going round its joint
-inline constexpr double rigid_compliance = 1e-5;  // m/N: what gives way more is meant to
-inline constexpr double taut = 0.3;               // of h² F / (m r): a body lighter for its load is loaded
+inline constexpr double taut = 0.3;             // of h² F / (m r): a body lighter for its load is loaded
 }  // namespace tolerances::runaway
 
 // sleep.cpp

@@ -22,15 +22,15 @@ inline void judge_energy(const EnergyGain& energy, int body, const char* cure, R
     const double least = energy_rounding_share * std::abs(energy.begun) + energy.least;
     if (report.status != Status::completed || !(gained > max_energy_share * energy.most_kinetic + least))
         return;
-    report.status = Status::unsettled;
-    report.failed_step = report.steps;
-    report.failed_body = body;
     char said[220];
     std::snprintf(said, sizeof said,
                   "was found to move with %.3g J that came out of nothing, of %.3g J at most; %s", gained,
                   energy.most_kinetic, cure);
-    report.reason = said;
+    report.leave_unsettled(body, said);
 }
+
+inline constexpr double initial_overstep = 1e-9;  // m or rad, of rows and overlaps
+inline constexpr double rigid_compliance = 1e-5;  // m/N: a row that gives way more is meant to
 
 inline constexpr const char* taut_cure =
     "where light bodies carry much tension, T h²/(m l) above 0.3, take smaller steps or no composition";

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "run/named_enum.hpp"
@@ -47,6 +48,14 @@ struct RunReport {
     std::vector<Recording> recordings;  // in the order the observables were given
     std::vector<double> final_state;    // bodies × 13: position, orientation, velocity, angular velocity
     std::string state_hash;
+
+    /// All steps done, and the values are kept, but they are not right, and it is seen in that body.
+    void leave_unsettled(int body, std::string why) {
+        status = Status::unsettled;
+        failed_step = steps;
+        failed_body = body;
+        reason = std::move(why);
+    }
 };
 
 }  // namespace spook
