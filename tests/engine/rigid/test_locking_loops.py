@@ -17,6 +17,7 @@ from spook_tracker.engine import (
     ConstraintForce,
     Distance,
     Hinge,
+    JointCoordinate,
     JointSpring,
     Method,
     Motor,
@@ -333,6 +334,60 @@ def test_a_loop_that_is_driven_is_not_called_locked(gravity: float, compliance: 
         h = H if pace < 1.0 else H / 8
         run = simulate(scene, time_step=h, duration=0.25)
         assert run.status == "completed", run.failure
+
+
+def three_cranks(third: float, motor: Motor) -> Scene:
+    """Of .3 m, the last of another length, that one rod couples: with another length it cannot move."""
+    cranks = [
+        RigidBody(name=f"crank {k}", mass=5.0, inertia=(0.3,) * 3, position=(k, 0.0, 0.0)) for k in range(3)
+    ]
+    rod = RigidBody(name="rod", mass=2.0, inertia=(0.01, 0.5, 0.5), position=(1.0, 0.0, 0.3))
+    joints = [
+        Hinge(
+            name=f"axle {k}",
+            between=(WORLD, f"crank {k}"),
+            at=(k, 0, 0),
+            axis=(0, 1, 0),
+            motor=None if k else motor,
+        )
+        for k in range(3)
+    ]
+    for k, length in enumerate((0.3, 0.3, third)):
+        joints.append(
+            Hinge(name=f"pin {k}", between=(f"crank {k}", "rod"), at=(k, 0, length), axis=(0, 1, 0))
+        )
+    return Scene(bodies=(*cranks, rod), constraints=tuple(joints), gravity=(0.0, 0.0, -G), contacts=False)
+
+
+@pytest.mark.parametrize("speed", [0.3, 1.0])
+def test_a_motor_that_forces_a_loop_open_is_told_and_one_with_a_bound_is_held(speed: float) -> None:
+    """Cranks with one too short, which turn only as far as joints give way: the motor's bound says who is stronger."""
+    free = Motor(speed=speed)
+
+    def run(third: float, motor: Motor) -> Result:
+        observe = finals(angle=JointCoordinate("axle 0"))
+        return simulate(three_cranks(third, motor), time_step=1 / 120, duration=4.0, observe=observe)
+
+    forced = run(0.2, free)
+    assert forced.status in ("unsettled", "diverged") and "bound the motor" in forced.failure
+    fits = run(0.3, free)
+    assert fits.completed and float(fits["angle"]) == pytest.approx(4.0 * speed, rel=0.01)
+    bounded = run(0.2, Motor(speed=speed, max_force=50.0))
+    assert bounded.completed and abs(float(bounded["angle"])) < 0.1
+
+
+@pytest.mark.parametrize("tilt", [0.3, 0.8])
+def test_so_is_one_that_forces_an_axis_out_of_line(tilt: float) -> None:
+    bar = four_bar(1e-8, tilt)
+
+    def driven(motor: Motor) -> Result:
+        crank = dataclasses.replace(bar.constraints[0], motor=motor)
+        scene = dataclasses.replace(bar, constraints=(crank, *bar.constraints[1:]))
+        return simulate(scene, time_step=H, duration=1.0)
+
+    forced = driven(Motor(speed=0.5))
+    assert forced.status == "unsettled" and "bound the motor" in forced.failure
+    assert driven(Motor(speed=0.5, max_force=1.0)).completed
 
 
 @pytest.mark.parametrize("compliance", [0.0, 1e-12])

@@ -6,6 +6,7 @@
 #include "linear/block_ldlt.hpp"
 #include "rigid/block_rows.hpp"
 #include "rigid/plane_step.hpp"
+#include "run/report.hpp"
 
 namespace spook {
 
@@ -24,6 +25,8 @@ public:
     void look();
     /// Whether a step in a plane needs a look at some loop, which the rows of the space are for. If not, it is seen.
     bool wants_look(const PlaneStep& plane);
+    /// A loop that leaves a motor nothing to move, and whose joints it has pulled open all the same, is unsettled. Asked at the end of a run.
+    void judge_forced(RunReport& report);
     /// Redundant rows had to be told apart, which those that agree need not: of which loop?
     void note_projected();
 
@@ -36,6 +39,9 @@ private:
         bool may_lock = false;             // whether its redundant rows are watched
         std::vector<double> weakness, repeated, square;  // per row; per unknown; per member, m²
 
+        /// How many ways it can move, by its rows as they are, and how many of these repeat others.
+        std::int64_t freedom = 0, redundant = 0;
+
         void repeat();
         double held_back(const LargeArray<BodyConstants>& constants, std::span<const BodyState> bodies,
                          const std::vector<int>& constrained) const;
@@ -46,6 +52,7 @@ private:
     void analyse_probes(Ties& ties, const std::vector<int>& at);
     void take_probe(Loop& loop, double part);
     void find_extents(Loop& loop);
+    bool find_freedom(Loop& loop);
     void watch(Loop& loop, RigidState::Watched& seen);
     double motion_of(const Loop& loop) const;
     double driven(const Loop& loop);

@@ -12,6 +12,7 @@
 #include "linear/disjoint_sets.hpp"
 #include "rigid/loop_watch.hpp"
 #include "rigid/tolerances.hpp"
+#include "run/energy_made.hpp"
 
 namespace spook {
 
@@ -126,14 +127,42 @@ void LoopWatch::begin() {
     if (loops_.empty()) return;
     rows_.assemble();
     for (Loop& loop : loops_) {
-        take_probe(loop, 0.0);
-        loop.probe.clear_counters();
-        loop.may_lock = false;
-        const double shorter = std::min(1.0, few_joints / static_cast<double>(loop.blocks.size()));
-        if (!loop.probe.factor(near_dependence * shorter * shorter)) continue;
-        const auto redundant = static_cast<std::int64_t>(loop.probe.counters().floored_pivots);
-        const auto rows = static_cast<std::int64_t>(loop.weakness.size());
-        loop.may_lock = redundant > 0 && loop.probe.unknowns() - 2 * rows + redundant > 0;
+        loop.may_lock = find_freedom(loop) && loop.redundant > 0 && loop.freedom > 0;
+    }
+}
+
+bool LoopWatch::find_freedom(Loop& loop) {
+    take_probe(loop, 0.0);
+    loop.probe.clear_counters();
+    const double shorter = std::min(1.0, few_joints / static_cast<double>(loop.blocks.size()));
+    if (!loop.probe.factor(near_dependence * shorter * shorter)) return false;
+    loop.redundant = static_cast<std::int64_t>(loop.probe.counters().floored_pivots);
+    loop.freedom =
+        loop.probe.unknowns() - 2 * static_cast<std::int64_t>(loop.weakness.size()) + loop.redundant;
+    return true;
+}
+
+void LoopWatch::judge_forced(RunReport& report) {
+    if (loops_.empty() || report.status != Status::completed || !joints_.drives().give_energy()) return;
+    rows_.assemble();
+    for (Loop& loop : loops_) {
+        double violation[6], most = forced_open;
+        int open = -1;
+        for (const int k : loop.blocks) {
+            joints_.violation(joints_.blocks()[k].joint, live_.bodies, violation);
+            for (int i = 0; i < joints_.blocks()[k].size; ++i) {
+                if (joints_.law(joints_.blocks()[k].joint, i).softness * model_.h >
+                    rigid_compliance * joints_.law(joints_.blocks()[k].joint, i).violation)
+                    continue;  // it is meant to give way
+                const double share = std::fabs(violation[i]) / joints_.gain(k, i).extent;
+                if (share > most) most = share, open = k;
+            }
+        }
+        if (open < 0 || loop.drives.empty() || !find_freedom(loop) || loop.freedom > 0) continue;
+        return report.leave_unsettled(
+            model_.mover(joints_.blocks()[open]),
+            "was pulled off its joint by a motor, in a loop of joints that leaves it nothing to move; put the loop "
+            "together so that it can, or bound the motor");
     }
 }
 

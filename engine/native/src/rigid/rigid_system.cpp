@@ -207,7 +207,8 @@ void RigidSystem::advance(std::int64_t steps) {
 
 Health RigidSystem::health() const {
     const auto cause = [this](bool known = false) {
-        return cause_of_runaway(model_, joints_, early_joints_, mixed_.contacts() != nullptr, known);
+        return cause_of_runaway(model_, joints_, early_joints_, mixed_.contacts() != nullptr, known,
+                                !bilateral_.loops.empty() && joints_.drives().give_energy());
     };
     if (live_.whirling >= 0) return {Status::diverged, live_.whirling, cause(true)};
     if (live_.lost >= 0)
@@ -285,10 +286,11 @@ RigidSystem::Work RigidSystem::work_done() const noexcept {
     return mixed_.contacts() ? done + Work{mixed_.contacts()->factor_counters()} : done;
 }
 
-void RigidSystem::judge_end(RunReport& report) const {
+void RigidSystem::judge_end(RunReport& report) {
     energy_.judge(report);
     judge_stopped(model_, live_, report);
     judge_open_joints(model_, live_, joints_, report);
+    bilateral_.loops.judge_forced(report);
 }
 
 void RigidSystem::count(RunReport& report, std::int64_t steps) const {

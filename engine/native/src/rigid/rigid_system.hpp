@@ -74,7 +74,7 @@ public:
     std::vector<double> final_state();
     /// The same without a solve: velocities are NaN.
     std::vector<double> places() const { return readings_.states(false); }
-    void judge_end(RunReport& report) const;
+    void judge_end(RunReport& report);
 
     /// What can be observed.
     const RigidReadings& read() const noexcept { return readings_; }

@@ -59,7 +59,8 @@ int find_whirling(const RigidModel& model, const RigidState& live, const JointSe
 
 /// Why a run ended, if tension did it; `known`: that it did.
 const char* cause_of_runaway(const RigidModel& model, const JointSet& joints,
-                             const LargeArray<JointState>& early, bool touching, bool known) noexcept {
+                             const LargeArray<JointState>& early, bool touching, bool known,
+                             bool forced) noexcept {
     if (!known && (model.composed || early.size() != joints.states.size())) return "";
     for (const JointBlock& block : joints.blocks())
         for (const bool second : {false, true}) {
@@ -68,7 +69,10 @@ const char* cause_of_runaway(const RigidModel& model, const JointSet& joints,
             known = is_taut(block, early[block.joint], second, model.constants[body].mass, model.h);
         }
     if (!known) return "";
-    return model.stiff
+    return forced
+               ? "ran away: its joints carry more than so light a body can take in a step (T h²/(m l) is above 0.3); "
+                 "where their loop leaves its motor nothing to move, bound the motor, else take a smaller time step"
+           : model.stiff
                ? "ran away: its joints carry more than so light a body can take in a step (T h²/(m l) is "
                  "above 0.3), and their load changes within one, while string_stiffness knows that of "
                  "the step before; use composition=\"order4\" without it, or a smaller time step"

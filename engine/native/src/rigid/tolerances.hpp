@@ -105,6 +105,7 @@ inline constexpr double min_repeated = 1e-4;   // of what the loads would set in
 inline constexpr double standing_ratio = 3.0;  // times the speed that a loop has had
 inline constexpr double point_arm = 1e-6;      // of the mean arm: shorter ones are rounding
 inline constexpr double min_growth = 0.2;  // over n² of its joints: of lifts 1.8, of an axis off by 1e-2 .02
+inline constexpr double forced_open = 1e-2;  // of a joint's arms, or rad: a motor has pulled it open
 inline constexpr double named_share = 1e-3;  // of the largest share: a joint that is named
 }  // namespace tolerances::rigid_locking
 
