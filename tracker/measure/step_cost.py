@@ -184,7 +184,7 @@ def held(example: Example, start: Callable[..., Run]) -> Mapping[str, float]:
     """A second of the scene, held and stepped one by one three times: each step's time is its least of the three."""
     steps = max(1, min(WATCHED, round(1.0 / example.time_step)))
     least = [math.inf] * steps
-    before, most = _allocated(), 0.0
+    before, most = allocated(), 0.0
     for _ in range(3):
         run = start(example.scene, time_step=example.time_step, method=example.method)
         for step in range(steps):
@@ -192,7 +192,7 @@ def held(example: Example, start: Callable[..., Run]) -> Mapping[str, float]:
             run.step()
             least[step] = min(least[step], time.perf_counter() - begun)
         if before is not None:
-            most = max(most, (_allocated() or 0.0) - before)
+            most = max(most, (allocated() or 0.0) - before)
         del run
     found = {"real_time_factor": steps * example.time_step / math.fsum(least), "worst_step_time": max(least)}
     return found if before is None else {**found, "memory": most / MEGABYTE}
@@ -228,7 +228,7 @@ def _of_allocator() -> Callable[[], _Account] | None:
     return cast("Callable[[], _Account]", account)
 
 
-def _allocated() -> float | None:
+def allocated() -> float | None:
     """Bytes in use of the C allocator in this process."""
     account = _of_allocator()
     if account is None:

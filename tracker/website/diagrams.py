@@ -83,7 +83,7 @@ def moving(trends: Iterable[Trend]) -> list[Trend]:
     return [
         t
         for t in trends
-        if len(t.nights) >= FEWEST_NIGHTS and any(_differ(t.said[0][0], sample) for sample, *_ in t.said.each)
+        if len(t.nights) >= FEWEST_NIGHTS and any(_differ(t.said[0][0], sample) for sample in t.distinct)
     ]
 
 
