@@ -20,7 +20,7 @@ from spook_tracker.tracker.judge.calibration import ladder_timing, that_counts, 
 from spook_tracker.tracker.measure import timing as clock
 from spook_tracker.tracker.store.database import session_on
 from spook_tracker.tracker.store.history import History
-from spook_tracker.tracker.store.record import add_again
+from spook_tracker.tracker.store.record import add_again, record
 from tests.places import TOYS
 
 ASKED: dict[str, Any] = {
@@ -99,11 +99,12 @@ def earlier(tmp_path_factory: pytest.TempPathFactory) -> Path:
     with pytest.MonkeyPatch.context() as patch:
         measured = scripted(patch)
         document, chance = library.run(**ASKED), random.Random(5)
-        for number in range(NIGHTS, 1, -1):
-            library.record(before(document, number, chance), url)
         measured.times, measured.factors = 0, [1.3]
         slow = library.run(**ASKED)
-        library.record(before(slow, 1, chance), url)
+        with session_on(url) as session:
+            for number in range(NIGHTS, 1, -1):
+                record(session, before(document, number, chance))
+            record(session, before(slow, 1, chance))
     return file
 
 
