@@ -136,14 +136,14 @@ void ParticleSystem::count(RunReport& report, std::int64_t steps) const {
 /// What the judge at the end of a run is to know, at places x between two blocks of steps. Where velocities lie half a step before or
 /// after x, energy is that with the mean of V at both ends of that step: without rows it is kept to second order.
 void ParticleSystem::note() {
-    if (rows_.size() == 0) return;
+    if (rows_.size() == 0 || stiff_strings_) return;
     double kinetic = 0.0;
     for (int body = 0; body < readings_.bodies(); ++body) {
         const Vec3 v = nodes_.v[nodes_.of_body[body]];
         kinetic += 0.5 * readings_.mass(body) * dot(v, v);
     }
     noted_.most_kinetic = std::max(noted_.most_kinetic, kinetic);
-    for (int k = 0; k < readings_.rows() && !stiff_strings_; ++k) {
+    for (int k = 0; k < readings_.rows(); ++k) {
         const DistanceRow& row = scene_.rows[k];
         const double open = readings_.violation(k), load = rows_.link[rows_.slot[k]].lambda / parts_.h;
         if (row.compliance > rigid_compliance || !(open > noted_.open * row.rest_length)) continue;
@@ -159,13 +159,14 @@ void ParticleSystem::note() {
     noted_.most = std::max(noted_.most, kinetic + potential);
 }
 
+/// With string_stiffness tension lets nothing fall, and neither is asked.
 /// Asked once the final state was read: what moves with energy out of nothing, or was found off rows that are rigid.
 void ParticleSystem::judge_end(RunReport& report) {
-    if (rows_.size() == 0 || noted_.begun_violated || report.status != Status::completed) return;
+    if (rows_.size() == 0 || stiff_strings_ || noted_.begun_violated || report.status != Status::completed)
+        return;
     note();
     const char* cure =
-        composition_     ? taut_cure
-        : stiff_strings_ ? "take smaller steps, or composition=\"order4\" without string_stiffness"
+        composition_ ? taut_cure
         : scene_.method.iterative
             ? "light bodies carry more tension than they can take in a step, T h²/(m l) above 0.3: "
               "take smaller steps"
