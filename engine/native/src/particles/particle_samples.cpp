@@ -152,10 +152,10 @@ void ParticleSystem::note() {
     }
     double potential = readings_.potential_energy();
     const double way = composition_ ? 0.0 : velocity_ready_ ? parts_.h : -parts_.h;
-    const std::vector<Vec3> here = nodes_.x;
+    trial_ = nodes_.x;
     for (std::size_t node = 0; node < nodes_.size(); ++node) nodes_.x[node] += way * nodes_.v[node];
     potential = 0.5 * (potential + readings_.potential_energy());
-    nodes_.x = here;
+    nodes_.x = trial_;
     noted_.most = std::max(noted_.most, kinetic + potential);
 }
 
