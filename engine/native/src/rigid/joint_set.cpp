@@ -113,10 +113,10 @@ void JointSet::follow_turns(const Joint& joint, std::span<const BodyState> bodie
     const double turn = turn_in_step(time_step_, first, second);
     if (!(share_of_bend(turn) > 0.0)) return;
     const int linear = joint.constants.holds.linear();
-    const double of_point = linear < 3
-                                ? turn
-                                : turn_of_arms(time_step_, first, carried(first, joint.constants.first_arm),
-                                               second, carried(second, joint.constants.second_arm));
+    const double of_arms = linear < 3
+                               ? turn
+                               : turn_of_arms(time_step_, first, carried(first, joint.constants.first_arm),
+                                              second, carried(second, joint.constants.second_arm));
     BodyState behind[2] = {first, second}, next[2] = {first, second}, ahead[2];
     for (int i = 0; i < 2; ++i) {
         const int body = i == 0 ? joint.first : joint.second;
@@ -129,7 +129,7 @@ void JointSet::follow_turns(const Joint& joint, std::span<const BodyState> bodie
     for (int k = 0; k < joint.constants.rows; ++k) {
         const double relaxation = 0.25 * (1.0 / joint.gain[k].upsilon - 1.0);
         const double share =
-            k < linear ? share_of_bend(of_point) : share_of_bend(turn) * share_of_angles(turn);
+            k < linear ? share_of_point(turn, of_arms) : share_of_bend(turn) * share_of_angles(turn);
         right.right[k] -= share * joint.gain[k].violation * (0.25 * (on[k] + back[k]) + relaxation * on[k]);
     }
 }

@@ -83,8 +83,8 @@ void LockedTree::follow_turns(std::size_t k, std::span<const BodyState> bodies, 
         const double relaxation = 0.25 * (1.0 / gain.upsilon[i] - 1.0);
         return gain.violation[i] * (0.25 * (after + before) + relaxation * after);
     };
-    const double of_point = turn_of_arms(loads.time_step, child, work.arm, other, work.other_arm);
-    work.left.linear -= share_of_bend(of_point) * lead(0, on.linear, back.linear);
+    const double of_arms = turn_of_arms(loads.time_step, child, work.arm, other, work.other_arm);
+    work.left.linear -= share_of_point(turn, of_arms) * lead(0, on.linear, back.linear);
     work.left.angular -= share_of_bend(turn) * share_of_angles(turn) * lead(1, on.angular, back.angular);
 }
 

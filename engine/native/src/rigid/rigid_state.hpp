@@ -65,13 +65,18 @@ void refresh(const BodyConstants& body, BodyState& state) noexcept;
 /// the bend of its angles, 0 where it turns by a radian: then where an axle points does not follow from how it spins.
 double share_of_bend(double turn) noexcept;
 double share_of_angles(double turn) noexcept;
+/// The same of a point, where bodies and the arms that hold it turn by so much: of a spin that turns far in a step it is not known how
+/// it is itself turned, and what lies along it is led about by its arm's turn alone.
+inline double share_of_point(double turn, double of_arms) noexcept {
+    return std::lerp(share_of_bend(of_arms), share_of_bend(turn), share_of_angles(turn));
+}
 /// The larger turn of two bodies in a step h [rad].
 inline double turn_in_step(double h, const BodyState& first, const BodyState& second) noexcept {
     return h * std::sqrt(std::max(dot(first.angular_velocity, first.angular_velocity),
                                   dot(second.angular_velocity, second.angular_velocity)));
 }
 
-/// The larger turn in a step h [rad] of two arms that bodies hold a point by: what lies along a spin is not led about by it.
+/// The larger turn in a step h [rad] of two arms that bodies hold a point by.
 inline double turn_of_arms(double h, const BodyState& first, Vec3 first_arm, const BodyState& second,
                            Vec3 second_arm) noexcept {
     const auto square = [](Vec3 spin, Vec3 arm) {
