@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from hypothesis import HealthCheck, settings
 from sqlalchemy import make_url
 from sqlalchemy.orm import Session
 
@@ -29,6 +30,10 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 # As wide as a pipe, wherever the tests run: pytest's workers say 80 of themselves.
 os.environ["COLUMNS"] = str(PIPE_WIDTH)
+
+# What is claimed of drawn values is no matter of how busy the machine is.
+settings.register_profile("any machine", deadline=None, suppress_health_check=[HealthCheck.too_slow])
+settings.load_profile("any machine")
 
 # Minutes of work in few tests: they start first, so that all workers end at about the same time.
 LONG = (

@@ -159,8 +159,8 @@ void ParticleSystem::note() {
     noted_.most = std::max(noted_.most, kinetic + potential);
 }
 
-/// With string_stiffness tension lets nothing fall, and neither is asked.
-/// Asked once the final state was read: what moves with energy out of nothing, or was found off rows that are rigid.
+/// Asked once the final state was read: what moves with energy out of nothing, or was found off rows that are rigid. With
+/// string_stiffness tension lets nothing fall, and neither is asked.
 void ParticleSystem::judge_end(RunReport& report) {
     if (rows_.size() == 0 || stiff_strings_ || noted_.begun_violated || report.status != Status::completed)
         return;
