@@ -123,7 +123,7 @@ void ParticleSystem::reset(StageClock* clock) {
     else if (half_step_) half_kick_back();
     noted_ = {};
     save();
-    noted_.begun = noted_.most;
+    noted_.begun = readings_.kinetic_energy() + readings_.potential_energy();
     for (int row = 0; row < readings_.rows() && !composition_; ++row)
         noted_.begun_violated |= std::fabs(readings_.violation(row)) > initial_overstep;
     for (const ParticleBody& body : scene_.bodies) noted_.is_powered |= norm(body.load) > 0.0;

@@ -119,10 +119,10 @@ private:
     Seen seen_;
     ParticleReadings readings_{scene_, parts_, seen_};
     Memory saved_;
-    struct Noted {  // between blocks of steps, for the judge at the end of a run
-        double begun = 0.0, most = -std::numeric_limits<double>::infinity(), most_kinetic = 0.0;  // J
-        double open = 0.0;  // of a row's length, that it was too long by
-        int row = -1;       // this row, of the scene; whether its compliance is why
+    struct Noted {                               // between blocks of steps, for the judge at the end of a run
+        double begun = 0.0, most_kinetic = 0.0;  // J
+        double open = 0.0;                       // of a row's length, that it was too long by
+        int row = -1;                            // this row, of the scene; whether its compliance is why
         bool gives_way = false;
         bool is_powered = false;      // loads give energy that is in no book
         bool begun_violated = false;  // nothing says how much energy such rows give
