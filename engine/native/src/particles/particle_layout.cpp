@@ -122,10 +122,14 @@ void ParticleSystem::reset(StageClock* clock) {
     if (composition_) composition_->start(clock);
     else if (half_step_) half_kick_back();
     noted_ = {};
+    bool begun_violated = false, rigid = false;
+    for (int row = 0; row < readings_.rows(); ++row) {
+        begun_violated |= std::fabs(readings_.violation(row)) > initial_overstep;
+        rigid |= scene_.rows[row].compliance <= rigid_compliance;
+    }
+    noted_.asked = !stiff_strings_ && (composition_ ? rows_.size() > 0 : rigid && !begun_violated);
     save();
     noted_.begun = readings_.kinetic_energy() + readings_.potential_energy();
-    for (int row = 0; row < readings_.rows() && !composition_; ++row)
-        noted_.begun_violated |= std::fabs(readings_.violation(row)) > initial_overstep;
     for (const ParticleBody& body : scene_.bodies) noted_.is_powered |= norm(body.load) > 0.0;
 }
 

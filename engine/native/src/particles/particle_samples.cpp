@@ -135,13 +135,15 @@ void ParticleSystem::count(RunReport& report, std::int64_t steps) const {
 
 /// What the judge at the end of a run is to know, at places x between two blocks of steps.
 void ParticleSystem::note() {
-    if (rows_.size() == 0 || stiff_strings_) return;
-    double kinetic = 0.0;
-    for (int body = 0; body < readings_.bodies(); ++body) {
-        const Vec3 v = nodes_.v[nodes_.of_body[body]];
-        kinetic += 0.5 * readings_.mass(body) * dot(v, v);
+    if (!noted_.asked) return;
+    if (composition_) {
+        double kinetic = 0.0;
+        for (int body = 0; body < readings_.bodies(); ++body) {
+            const Vec3 v = nodes_.v[nodes_.of_body[body]];
+            kinetic += 0.5 * readings_.mass(body) * dot(v, v);
+        }
+        noted_.most_kinetic = std::max(noted_.most_kinetic, kinetic);
     }
-    noted_.most_kinetic = std::max(noted_.most_kinetic, kinetic);
     for (int k = 0; k < readings_.rows(); ++k) {
         const DistanceRow& row = scene_.rows[k];
         const double open = readings_.violation(k), load = rows_.link[rows_.slot[k]].lambda / parts_.h;
@@ -154,8 +156,7 @@ void ParticleSystem::note() {
 /// Asked once the final state was read: what moves with energy out of nothing, or was found off rows that are rigid. With
 /// string_stiffness tension lets nothing fall, and neither is asked.
 void ParticleSystem::judge_end(RunReport& report) {
-    if (rows_.size() == 0 || stiff_strings_ || noted_.begun_violated || report.status != Status::completed)
-        return;
+    if (!noted_.asked || report.status != Status::completed) return;
     note();
     const char* cure =
         composition_ ? taut_cure

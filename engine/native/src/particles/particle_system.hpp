@@ -124,8 +124,8 @@ private:
         double open = 0.0;                       // of a row's length, that it was too long by
         int row = -1;                            // this row, of the scene; whether its compliance is why
         bool gives_way = false;
-        bool is_powered = false;      // loads give energy that is in no book
-        bool begun_violated = false;  // nothing says how much energy such rows give
+        bool is_powered = false;  // loads give energy that is in no book
+        bool asked = false;       // not where rows begin violated: nothing says what energy they give
     } noted_;
     StageClock* clock_ = nullptr;
 };
