@@ -76,9 +76,9 @@ class Result:
     An "unsettled" run did all its steps, but in some of them the solver left more than
     `Method.unsettled_residual`: values are kept, `failure` says where, `residual` how much; a later step rests
     on a wrong one. So did one that made more than a twentieth of the largest kinetic energy out of nothing, by a composition or
-    by corrections, of particles on rods or with its books kept by whatever method. So did one whose particles came off a rod by
-    its length. So did one that lost as much in impacts that were stopped without
-    the rebound they were to have.
+    by corrections; with its books kept, by whatever method. So did one whose particles came off a rod by its length, one whose
+    motor pulled a loop of joints open that cannot move, and one that lost as much in impacts that were stopped without the
+    rebound they were to have.
     `counters` are exact integers, equal on every machine: steps, rows_assembled, block_operations, ...
     `state_hash` is a hash of the bits of the final state.
     `broken` lists the joints and wires that broke, in that order.

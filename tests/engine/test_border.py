@@ -94,6 +94,8 @@ def test_a_table_or_an_option_too_many_or_too_few_is_named(kind: str, table: str
             f"scene: the table '{table}' is missing",
         ),
         (whole | {"wheels": {}}, "scene: the table 'wheels' means nothing here"),
+        (whole | {table: 3}, f"scene: the table '{table}' is no dict"),
+        (whole | {"method": None}, "scene: the table 'method' is no dict"),
         (whole | {"method": method | {"colour": 1}}, "method: the option 'colour' means nothing here"),
         (whole | {"method": {"time_step": 0.01}}, "method: the option 'substeps' is missing"),
     ):

@@ -361,7 +361,7 @@ def three_cranks(third: float, motor: Motor) -> Scene:
 
 @pytest.mark.parametrize("speed", [0.3, 1.0])
 def test_a_motor_that_forces_a_loop_open_is_told_and_one_with_a_bound_is_held(speed: float) -> None:
-    """Cranks with one too short, which turn only as far as joints give way: the motor's bound says who is stronger."""
+    """Cranks with one too short, which turn only as far as joints give way: a motor without a bound opens them, one with a bound stops."""
     free = Motor(speed=speed)
 
     def run(third: float, motor: Motor) -> Result:

@@ -52,6 +52,12 @@ nb::handle Entries::operator[](const char* name) {
     return entries_[name];
 }
 
+nb::dict Entries::dict(const char* name) {
+    const nb::handle entry = (*this)[name];
+    if (!nb::isinstance<nb::dict>(entry)) refuse(name, "is no dict");
+    return nb::borrow<nb::dict>(entry);
+}
+
 void Entries::expect_all_read() const {
     if (!unread_.empty()) refuse(*unread_.begin(), "means nothing here");
 }
@@ -61,7 +67,7 @@ void Entries::refuse(const std::string& name, const std::string& why) const {
 }
 
 Columns::Columns(Entries& scene, const char* table)
-    : Columns(nb::cast<nb::dict>(scene[table]), std::string(table) + ": the column") {}
+    : Columns(scene.dict(table), std::string(table) + ": the column") {}
 
 Columns::Columns(const nb::dict& columns, std::string called)
     : called_(std::move(called)), columns_(columns, called_), empty_(nb::len(columns) == 0) {

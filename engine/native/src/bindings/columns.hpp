@@ -50,6 +50,8 @@ public:
     Entries(const nb::dict& entries, std::string called);
 
     nb::handle operator[](const char* name);
+    /// An entry that is a dict itself; another is an error.
+    nb::dict dict(const char* name);
     template <class T> void read(const char* name, T& value) { value = nb::cast<T>((*this)[name]); }
     template <class Enum> void read_kind(const char* name, Enum& value) {
         value = from_text<Enum>(nb::cast<std::string>((*this)[name]), name);

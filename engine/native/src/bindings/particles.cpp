@@ -9,7 +9,7 @@ namespace {
 
 ParticleMethod to_method(Entries& in) {
     ParticleMethod out;
-    Entries options(nb::cast<nb::dict>(in["method"]), "method: the option");
+    Entries options(in.dict("method"), "method: the option");
     options.read("time_step", out.time_step);
     options.read("substeps", out.substeps);
     options.read("corrections", out.corrections);

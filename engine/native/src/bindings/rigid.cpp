@@ -348,7 +348,7 @@ void read_pair_frictions(Entries& in, RigidScene& scene) {
 
 RigidMethod to_method(Entries& in) {
     RigidMethod out;
-    Entries options(nb::cast<nb::dict>(in["method"]), "method: the option");
+    Entries options(in.dict("method"), "method: the option");
     options.read("time_step", out.time_step);
     options.read("substeps", out.substeps);
     options.read("refinements", out.refinements);

@@ -14,6 +14,7 @@
 #include "rigid/joint_rows.hpp"
 #include "rigid/joint_state.hpp"
 #include "rigid/joint_stops.hpp"
+#include "run/energy_made.hpp"
 
 namespace spook {
 
@@ -55,6 +56,8 @@ public:
     /// Coefficients of one of a joint's own rows: Ups, (4/h) Ups, Sig.
     struct RowLaw {
         double upsilon, violation, softness;
+        /// Whether the row is meant to, in steps h.
+        bool gives_way(double h) const noexcept { return softness * h > rigid_compliance * violation; }
         bool operator==(const RowLaw&) const = default;
     };
     RowLaw law(int joint, int row) const noexcept {

@@ -12,7 +12,6 @@
 #include "linear/disjoint_sets.hpp"
 #include "rigid/loop_watch.hpp"
 #include "rigid/tolerances.hpp"
-#include "run/energy_made.hpp"
 
 namespace spook {
 
@@ -151,9 +150,7 @@ void LoopWatch::judge_forced(RunReport& report) {
         for (const int k : loop.blocks) {
             joints_.violation(joints_.blocks()[k].joint, live_.bodies, violation);
             for (int i = 0; i < joints_.blocks()[k].size; ++i) {
-                if (joints_.law(joints_.blocks()[k].joint, i).softness * model_.h >
-                    rigid_compliance * joints_.law(joints_.blocks()[k].joint, i).violation)
-                    continue;  // it is meant to give way
+                if (joints_.law(joints_.blocks()[k].joint, i).gives_way(model_.h)) continue;
                 const double share = std::fabs(violation[i]) / joints_.gain(k, i).extent;
                 if (share > most) most = share, open = k;
             }

@@ -5,7 +5,6 @@
 #include <cstdio>
 
 #include "rigid/tolerances.hpp"
-#include "run/energy_made.hpp"
 
 namespace spook {
 
@@ -92,8 +91,7 @@ void judge_open_joints(const RigidModel& model, const RigidState& live, const Jo
         const JointState& state = joints.states[block.joint];
         const int linear = block.axial ? 0 : holds_of(joints.constants(block.joint).kind).linear();
         if (linear == 0 || state.broken) continue;
-        const JointSet::RowLaw law = joints.law(block.joint, 0);
-        if (law.softness * model.h > rigid_compliance * law.violation) continue;  // it is meant to give way
+        if (joints.law(block.joint, 0).gives_way(model.h)) continue;
         double violation[6], open = 0.0;
         joints.violation(block.joint, live.bodies, violation);
         for (int i = 0; i < linear; ++i) open += violation[i] * violation[i];
