@@ -31,7 +31,8 @@ from .timing import stage_seconds
 LIMIT = 60.0  # s of a run
 ROUNDS = 5
 SHORTEST = 4e-3  # s of a run: a clock and a call are a thousandth of it
-FEWEST_STEPS, MOST_STEPS = 20, 20_000
+FEWEST_STEPS = 20
+MOST_RUNS = 16  # of a scene that lasts less than that
 COMPARED = 20  # steps after which the answers of both ways are laid beside each other
 WATCHED = 200  # steps that are looked at one by one
 MEGABYTE = 1e6
@@ -78,10 +79,10 @@ def leaving_out(test: ScalarTest, simulate: Simulate) -> LeavingOut | None:
     if not added:
         return LeavingOut()
     every = tuple(added)
-    steps = _steps(example, simulate)
+    steps, repeats = _length(example, simulate)
     ways: list[tuple[str, ...]] = [(), *((option,) for option in added), *([every] if len(every) > 1 else [])]
     runs = [example_run(example, steps, way) for way in ways]
-    rounds = [[_once(run, simulate) for run in runs] for _ in range(ROUNDS)]
+    rounds = [[_taken(run, simulate, repeats) for run in runs] for _ in range(ROUNDS)]
     whole = [[one for one in taken if one is not None] for taken in rounds]
     if any(len(taken) < len(runs) for taken in whole):
         return None
@@ -93,17 +94,30 @@ def leaving_out(test: ScalarTest, simulate: Simulate) -> LeavingOut | None:
     return LeavingOut(tuple(added.values()), saved, times, _difference(example, every, simulate))
 
 
-def _steps(example: Example, simulate: Simulate) -> int:
-    """So many that a run is long enough for the clock."""
-    steps, more = FEWEST_STEPS, FEWEST_STEPS
-    while more <= MOST_STEPS:
-        taken = _once(example_run(example, more, ()), simulate)
-        if taken is None:  # a scene that ends, as a path does: no longer than it lasts
+def _length(example: Example, simulate: Simulate) -> tuple[int, int]:
+    """Steps of a run that is long enough for the clock, and how many runs are: a scene is over when its motion is, and what has died
+    away is in denormal numbers, with which a step of oscillator_filter costs five times as much."""
+    steps, more, last, taken = (
+        FEWEST_STEPS,
+        FEWEST_STEPS,
+        round(example.duration / example.time_step),
+        math.inf,
+    )
+    while more <= last:
+        found = _once(example_run(example, more, ()), simulate)
+        if found is None:  # a scene that ends, as a path does: no longer than it lasts
             break
-        steps, more = more, 2 * more
+        steps, more, taken = more, 2 * more, found
         if taken >= SHORTEST:
             break
-    return steps
+    return steps, max(1, min(MOST_RUNS, math.ceil(SHORTEST / taken)))
+
+
+def _taken(run: OneRun, simulate: Simulate, repeats: int) -> float | None:
+    """Mean seconds of so many runs; None if one failed."""
+    each = [_once(run, simulate) for _ in range(repeats)]
+    done = [one for one in each if one is not None]
+    return math.fsum(done) / repeats if len(done) == repeats else None
 
 
 def _once(run: OneRun, simulate: Simulate) -> float | None:

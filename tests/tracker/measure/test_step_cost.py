@@ -62,6 +62,21 @@ def test_the_whole_step_is_laid_beside_the_step_as_compiled() -> None:
     assert [one * 100.0 for one in found.saved.values()] == pytest.approx([2.0, 3.0, 1.0], rel=0.11)
 
 
+def test_a_scene_is_timed_while_it_lasts_and_as_often_as_the_clock_asks() -> None:
+    """What has died away is in denormal numbers: a night was red by what these cost, at an engine as fast as ever."""
+    test, asked = CATALOGUE["oscillator_filter"], []
+
+    def swift(scene: Any, **options: Any) -> Any:
+        asked.append((options["method"].force_stages, options["steps"]))
+        return replace(engine.simulate(scene, **options), cpu_seconds=1e-7 * options["steps"])
+
+    assert leaving_out(test, swift) is not None
+    last = test.example().duration / test.example().time_step
+    timed = [steps for forced, steps in asked if not forced]
+    assert 0.5 * last < max(timed) <= last
+    assert timed.count(max(timed)) >= step_cost.ROUNDS * step_cost.MOST_RUNS
+
+
 def test_a_stage_that_runs_though_it_is_not_needed_breaks_the_limit() -> None:
     test = CATALOGUE["pendulum"]
     for slow, outcome in ((1.0, "value"), (8.0, "out_of_limit")):
