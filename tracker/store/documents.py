@@ -8,11 +8,15 @@ from functools import cached_property
 
 from spook_tracker.tracker.document.json_form import encode
 from spook_tracker.tracker.document.kept import Kept
+from spook_tracker.tracker.document.points import Points, Stretches
 from spook_tracker.tracker.document.run_document import (
     FigureData,
     MapData,
     Point,
+    Run,
     RunDocument,
+    Runs,
+    Said,
     Sample,
     SeriesDefinition,
     SeriesHistory,
@@ -28,6 +32,7 @@ class DocumentHistory:
         self.documents = {d.id: d for d in documents}
         self.kept = Kept()
         self.bare: dict[int, list[Sample]] = {}
+        self.said: dict[tuple[str, str, str, bool, bool], Sample] = {}
         made = {id(d.samples): d for d in documents}  # many nights may have the same
         self.made = {
             samples: hashlib.sha256(encode((d.series, d.samples))).hexdigest() for samples, d in made.items()
@@ -59,23 +64,39 @@ class DocumentHistory:
     @cached_property
     def _by_engine(self) -> Mapping[str, Mapping[str, SeriesHistory]]:
         """The series of each engine: a page is about one, a table about all of them."""
+        newest: dict[str, SeriesDefinition] = {}
+        gathered: dict[str, dict[str, tuple[list[Run], list[Said]]]] = {}
+        known: dict[tuple[int, str], Said] = {}
+        for run in self.documents.values():
+            newest |= {d.key: d for d in run.series}
+            of_engine = gathered.setdefault(run.engine.name, {})
+            for sample in self._bare(run):
+                version = newest[sample.series].test_version
+                said = known.setdefault((id(sample), version), (sample, version, True))
+                runs, told = of_engine.setdefault(sample.series, ([], []))
+                runs.append(run)
+                told.append(said)
+        shared: dict[tuple[int, ...], Runs] = {}
         found: dict[str, dict[str, SeriesHistory]] = {}
-        for key, series in self.series(evidence=False).items():
-            points: dict[str, list[Point]] = {}
-            for point in series.points:
-                points.setdefault(point.run.engine.name, []).append(point)
-            for engine, own in points.items():
-                found.setdefault(engine, {})[key] = SeriesHistory(series.definition, tuple(own))
+        for engine, of_engine in gathered.items():
+            for key, (runs, told) in sorted(of_engine.items()):
+                of_all = shared.setdefault(tuple(map(id, runs)), Runs(runs))
+                found.setdefault(engine, {})[key] = SeriesHistory(
+                    newest[key], Points(of_all, Stretches.of(told))
+                )
         return found
 
     def _bare(self, run: RunDocument) -> list[Sample]:
-        """The samples of a run without what stands behind them."""
+        """The samples of a run without what stands behind them: what says the same is one object, as out of a database."""
         place = id(run.samples)  # many nights may have the same
         if place not in self.bare:
             self.bare[place] = [
-                Sample(
-                    series=s.series, value=s.value, outcome=s.outcome, passed=s.passed,
-                    set_point_held=s.set_point_held,
+                self.said.setdefault(
+                    (s.series, s.value.hex(), s.outcome, s.passed, s.set_point_held),
+                    Sample(
+                        series=s.series, value=s.value, outcome=s.outcome, passed=s.passed,
+                        set_point_held=s.set_point_held,
+                    ),
                 )
                 for s in run.samples
             ]  # fmt: skip
