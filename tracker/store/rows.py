@@ -194,6 +194,7 @@ def asked_text(asked: document.Asked | None) -> str:
     return "" if asked is None else json_of(asked)
 
 
+@lru_cache(maxsize=64)  # most nights are asked for the same
 def asked_of(text: str) -> document.Asked | None:
     return decode(text, document.Asked) if text else None
 

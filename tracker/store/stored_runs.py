@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeVar, cast
@@ -34,7 +33,7 @@ from .sample_rows import (
     sample_of,
     sample_rows,
 )
-from .versions import RunInfo, resolve
+from .versions import RunInfo, is_ordered, resolve
 
 if TYPE_CHECKING:
     from sqlalchemy.orm import Session
@@ -193,17 +192,39 @@ class StoredRuns:
         columns = ", ".join(
             f'"{name}"' for name in (*RUN, "started_at", "asked", "engine_version_id", "machine_id")
         )
+        stored = [
+            (rows.stored_moment(began), engines[engine], machines[machine], rows.asked_of(asked), told)
+            for *told, began, asked, engine, machine in self._reader.rows(f"SELECT {columns} FROM run")
+        ]
+        place, lineage = self._commits((engine, started) for started, engine, *_ in stored)
+        last = len(place)
         runs = [
             RunInfo(
-                engine=engines[row[-2]],
-                machine=machines[row[-1]],
-                asked=rows.asked_of(row[-3]),
-                started_at=rows.stored_moment(row[-4]),
-                **dict(zip(RUN, row[:-4], strict=True)),
+                started_at=started, engine=engine, machine=machine, asked=asked,
+                lineage=lineage[engine.git_hash] if is_ordered(engine) else "",
+                **dict(zip(RUN, told, strict=True)),
             )
-            for row in self._reader.rows(f"SELECT {columns} FROM run")
-        ]
-        return self._in_commit_order(runs)
+            for started, engine, machine, asked, told in stored
+        ]  # fmt: skip
+        runs.sort(
+            key=lambda run: (place[run.engine.git_hash] if run.ordered else last, run.started_at, run.id)
+        )
+        return tuple(in_release_order(runs))
+
+    def _commits(
+        self, runs: Iterable[tuple[EngineVersion, datetime]]
+    ) -> tuple[dict[str, int], dict[str, str]]:
+        """Of what was run and when: by commit, its place in the order of commits and its lineage."""
+        parents: dict[str, tuple[str, ...]] = {}
+        age: dict[str, tuple[str, ...]] = {}
+        for engine, started in runs:
+            if is_ordered(engine):
+                parents[engine.git_hash] = engine.parents
+                made = _utc(engine.commit_time), started.isoformat()
+                age[engine.git_hash] = min(age.get(engine.git_hash, made), made)
+        known = git.order(self.repository, age) if len(age) > 1 else []
+        ordered = commit_order(age, parents, age.__getitem__, known)
+        return {commit: place for place, commit in enumerate(ordered)}, lineages(age, parents, known)
 
     def _table(self, table: str, kind: type[EngineVersion | Machine]) -> list[rows.Row]:
         """The rows of a table that holds such things, by their columns."""
@@ -212,28 +233,6 @@ class StoredRuns:
         return [
             dict(zip(columns, row, strict=True)) for row in self._reader.rows(f"SELECT {named} FROM {table}")
         ]
-
-    def _in_commit_order(self, runs: list[RunInfo]) -> tuple[RunInfo, ...]:
-        parents: dict[str, tuple[str, ...]] = {}
-        age: dict[str, tuple[str, ...]] = {}
-        for run in runs:
-            if run.ordered:
-                engine = run.engine
-                parents[engine.git_hash] = engine.parents
-                made = (_utc(engine.commit_time), _utc(run.started))
-                age[engine.git_hash] = min(age.get(engine.git_hash, made), made)
-        known = git.order(self.repository, age) if len(age) > 1 else []
-        lineage = lineages(age, parents, known)
-        runs = [replace(run, lineage=lineage[run.engine.git_hash]) if run.ordered else run for run in runs]
-        place = {
-            commit: index for index, commit in enumerate(commit_order(age, parents, age.__getitem__, known))
-        }
-        last = len(place)
-        ordered = sorted(
-            runs,
-            key=lambda run: (place[run.engine.git_hash] if run.ordered else last, run.started_at, run.id),
-        )
-        return tuple(in_release_order(ordered))
 
     def _read_names(self) -> dict[int, str]:
         """Series id to the key the series has today: renames followed to their end."""

@@ -55,7 +55,12 @@ class RunInfo:
     @property
     def ordered(self) -> bool:
         """Built from a commit as it stands: only such runs have a place in the commit order."""
-        return bool(self.engine.git_hash) and not self.engine.dirty
+        return is_ordered(self.engine)
+
+
+def is_ordered(engine: document.EngineVersion) -> bool:
+    """Whether it is of a commit as that stands."""
+    return bool(engine.git_hash) and not engine.dirty
 
 
 def resolve(runs: Sequence[RunInfo], name: str, commit_of: Callable[[str], str | None]) -> RunInfo:

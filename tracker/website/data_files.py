@@ -49,22 +49,21 @@ def inert(cell: Cell) -> Cell:
     return cell
 
 
+class _Inert(dict[str, Cell]):
+    """Texts as cells, as the same ones stand night after night; what is no text `csv` writes as `inert` does."""
+
+    def __missing__(self, text: str) -> Cell:
+        self[text] = cell = inert(text)
+        return cell
+
+
 def table(columns: Sequence[str], lines: Iterable[Sequence[Cell]]) -> bytes:
     """A CSV file in UTF-8, lines ended as RFC 4180 says."""
     out = io.StringIO()
     writer = csv.writer(out, lineterminator="\r\n")
     writer.writerow([inert(name) for name in columns])
-    known: dict[str, Cell] = {}  # the same texts stand night after night
-
-    def shown(cell: Cell) -> Cell:
-        if type(cell) is not str:
-            return inert(cell)
-        found = known.get(cell)
-        if found is None:
-            found = known[cell] = inert(cell)
-        return found
-
-    writer.writerows([list(map(shown, line)) for line in lines])
+    known = _Inert()
+    writer.writerows([[known[cell] if type(cell) is str else cell for cell in line] for line in lines])
     return out.getvalue().encode("utf-8", "replace")
 
 
@@ -126,7 +125,7 @@ def _counted(trend: Trend, night: int) -> Cell:
     place = bisect_left(trend.nights, night)
     if trend.nights[place : place + 1] != [night]:
         return None
-    value = trend.values[place]
+    value = trend.said[place][0].value
     return int(value) if value.is_integer() else value
 
 
@@ -178,16 +177,30 @@ def steady(test: TestHistory) -> list[Trend]:
 
 
 class NightTexts:
-    """What files say of a night, written once: thousands of lines name the same."""
+    """What files say of a night, written once: thousands of lines name the same, and most nights are in none."""
 
     def __init__(self, nights: Sequence[Night]) -> None:
-        self.cells: list[str] = []  # the last cells of a line of a CSV file, with its end
-        self.fields: list[tuple[str, msgspec.Raw]] = []  # id, and fields in JSON
-        for night in nights:
-            version, commit = night.engine.version, night.engine.git_hash
-            self.cells.append(f"{_written(night.started, version, commit)}\r\n")
-            fields = {"started": night.started, "version": version, "git_hash": commit}
-            self.fields.append((night.id, msgspec.Raw(encode(fields))))
+        self._nights = nights
+        self._cells: dict[int, str] = {}
+        self._fields: dict[int, tuple[str, msgspec.Raw]] = {}
+
+    def cells(self, place: int) -> str:
+        """The last cells of a line of a CSV file, with its end."""
+        if place not in self._cells:
+            night = self._nights[place]
+            told = _written(night.started, night.engine.version, night.engine.git_hash)
+            self._cells[place] = f"{told}\r\n"
+        return self._cells[place]
+
+    def fields(self, place: int) -> tuple[str, msgspec.Raw]:
+        """Its id, and fields in JSON."""
+        if place not in self._fields:
+            night = self._nights[place]
+            told = {
+                "started": night.started, "version": night.engine.version, "git_hash": night.engine.git_hash,
+            }  # fmt: skip
+            self._fields[place] = night.id, msgspec.Raw(encode(told))
+        return self._fields[place]
 
 
 def _written(*cells: Cell) -> str:
@@ -205,14 +218,13 @@ def _changes(trend: Trend, texts: NightTexts) -> Iterable[str]:
         d.test, d.configuration, d.metric, d.time_step, parameters, d.role, d.kind, d.unit, low, high,
         *(d.set_point or (None, None)),
     )  # fmt: skip
-    cells = texts.cells
     known: dict[int, str] = {}  # what samples say, which come again and again
     for i, sample in trend.changes:
         said = known.get(id(sample))
         if said is None:
             said = known[id(sample)] = f"{first},{sample.value!r},{sample.outcome},{sample.set_point_held},"
         yield said
-        yield cells[nights[i]]
+        yield texts.cells(nights[i])
 
 
 def run_times(book: Book) -> Iterator[tuple[str, bytes, Callable[[], bytes]]]:
@@ -311,10 +323,10 @@ def _series(
     own = {name: said.pop(name) for name in OWN if name in said}
     shared = encode({name: value for name, value in said.items() if name not in WHOLE}).decode()
     changes = []
-    nights, fields = trend.nights, texts.fields
+    nights = trend.nights
     known: dict[int, tuple[float | str, str]] = {}  # what samples say, which come again and again
     for i, sample in trend.changes:
-        night, told = fields[nights[i]]
+        night, told = texts.fields(nights[i])
         used[night] = told
         now = known.get(id(sample))
         if now is None:

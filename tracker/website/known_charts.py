@@ -40,9 +40,7 @@ class KnownCharts:
         self._events: dict[str, list[Event]] = {}
         for event in events:
             self._events.setdefault(event.definition.key, []).append(event)
-        self._of_night = [
-            _short(f"{night.index} {night.label}".encode("utf-8", "replace")) for night in nights
-        ]
+        self._of_nights: dict[int, bytes] = {}
         self._of_said: dict[int, bytes] = {}
 
     def view(self, trend: Trend, title: str = "") -> View:
@@ -81,15 +79,22 @@ class KnownCharts:
         first = first_drawn(count)
         whole = trend.definition, title, goes_on, last == 1, first, nights[0], list(map(repr, events))
         of_night = self._of_night
-        parts = [encode(whole), of_night[nights[first]]]
+        parts = [encode(whole), of_night(nights[first])]
         known = self._of_said
         for one in {id(one): one for one in said.each if id(one) not in known}.values():
             told = one[0]
             known[id(one)] = _short(f"{told.value!r} {told.outcome}".encode("utf-8", "replace"))
         parts += [known[id(one)] for one in said.each]
-        parts += [of_night[nights[end - 1]] for end in said.ends[: -1 if goes_on else None]]
-        parts += [of_night[nights[end]] for end in (0, *said.ends[:-1])]
+        parts += [of_night(nights[end - 1]) for end in said.ends[: -1 if goes_on else None]]
+        parts += [of_night(nights[end]) for end in (0, *said.ends[:-1])]
         return hashlib.blake2b(b"".join(parts), digest_size=16).digest()
+
+    def _of_night(self, place: int) -> bytes:
+        """What a chart says of a night: most nights are in none."""
+        if place not in self._of_nights:
+            night = self._nights[place]
+            self._of_nights[place] = _short(f"{night.index} {night.label}".encode("utf-8", "replace"))
+        return self._of_nights[place]
 
 
 def _short(told: bytes) -> bytes:

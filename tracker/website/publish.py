@@ -256,9 +256,7 @@ def _data(told: Book, events: Sequence[Event], causes: Sequence[Cause], author: 
         "regressions": data_files.regressions(events),
     }
     for name, (columns, lines) in tables.items():
-        source = _bytes_of(
-            {"lines": [[repr(c) if isinstance(c, float) else c for c in line] for line in lines]}
-        )
+        source = repr(lines).encode("utf-8", "backslashreplace")
         yield f"data/{name}.csv", source, partial(data_files.table, columns, lines)
         if name != "tonight":  # the same numbers stand in the JSON of each test
             yield f"data/{name}.json", source, partial(data_files.records, columns, lines)
