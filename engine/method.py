@@ -91,14 +91,14 @@ class Method:
                        "unsettled": the row furthest from its law, its impulse against where a step of projection would
                        put it; so does one that stopped early and left bodies sunk into each other by a fiftieth of the
                        smaller one's radius
-    sleep_speed        bodies slower than this [m/s], |v| + |w| r, for `sleep_after` seconds sleep; 0: none does. They do so
-                       by islands, all that are connected by contacts, joints and springs, and wake at once, in the same
-                       step, when a body meets one of them, a kinematic one that touches or holds one moves, or a load,
-                       motor or spring of one is set. Asleep they have no speed, keep their places to the last bit, cost
-                       next to nothing, and forces read as they were last; what speed they had is lost. Never asleep:
-                       bodies in scenes where nothing can touch, that displace a fluid, whose load or joint follows the
-                       time or whose joints' friction follows their load, and what touches a moving surface. Plain steps
-                       only
+    sleep_speed        bodies slower than this [m/s], |v| + |w| r, for `sleep_after` seconds sleep, unless they gained a
+                       hundredth of it in that time or nothing held them; 0: none does. They do so by islands, all that are
+                       connected by contacts, joints and springs, and wake at once, in the same step, when a body meets one
+                       of them, a kinematic one that touches or holds one moves, or a load, motor or spring of one is set.
+                       Asleep they have no speed, keep their places to the last bit, cost next to nothing, and forces read
+                       as they were last; what speed they had is lost. Never asleep: bodies in scenes where nothing can
+                       touch, that displace a fluid, whose load or joint follows the time or whose joints' friction follows
+                       their load, and what touches a moving surface. Plain steps only
     sleep_after        how long bodies must have been that slow, s
     refinements        iterative refinements against the true equations after each factorisation
     floor              pivot floor in the factor only, relative to the diagonal

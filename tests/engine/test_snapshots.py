@@ -22,6 +22,7 @@ from spook_tracker.engine import (
     Scene,
     SimulationFailed,
     Snapshot,
+    Sphere,
     _core,
     start,
 )
@@ -36,6 +37,7 @@ from tests.scenes import coupling as coupling_scenes
 from tests.scenes import particle as particle_scenes
 from tests.scenes import rigid as rigid_scenes
 from tests.scenes import sleep as sleep_scenes
+from tests.scenes.corpus import solid
 
 Made = tuple[Scene, float, Method]
 BEFORE, AFTER = 40, 50  # steps
@@ -51,6 +53,9 @@ def corpus() -> dict[str, Made]:
     made["a stack asleep"] = (
         sleep_scenes.scene(sleep_scenes.FLOOR, *sleep_scenes.stack()), sleep_scenes.TIME_STEP, sleep_scenes.sleepy(),
     )  # fmt: skip
+    slows = solid("ball", Sphere(0.1), (0.0, 0.0, 0.1), velocity=(0.021, 0.0, 0.0))  # slow from step 15 on
+    uphill = Scene(bodies=(sleep_scenes.FLOOR, slows), gravity=(-0.004, 0.0, -sleep_scenes.GRAVITY))
+    made["about to sleep"] = (uphill, sleep_scenes.TIME_STEP, sleep_scenes.sleepy())
     few = Method(solver="iterative", iterations=2)
     made["unsettled"] = (islands((40,), few)[0], 0.01, few)
     for kind, scenes in (("particles", particle_scenes), ("rigid", rigid_scenes)):

@@ -311,6 +311,20 @@ def test_what_begins_to_fall_slowly_is_not_asleep(hung: bool) -> None:
         assert fallen == pytest.approx(0.5 * gravity * seconds**2 - 0.01 * seconds, abs=1e-3)
 
 
+@pytest.mark.parametrize("solver", SOLVERS)
+@pytest.mark.parametrize("rolls", [False, True])
+def test_what_gets_faster_is_not_asleep_however_slowly(rolls: bool, solver: str) -> None:
+    """From rest on a slope of .05 degrees: half of sleep_speed after a second, sliding or rolling."""
+    pull = GRAVITY * math.radians(0.05)
+    surface = {"material": ROUGH if rolls else SMOOTH}
+    floor = RigidBody(name="floor", motion="static", shape=Plane(), position=(0.0, 0.0, 0.0), **surface)
+    ball = solid("ball", Sphere(0.1), (0.0, 0.0, 0.1), **surface)
+    slope = Scene(bodies=(floor, ball), gravity=(pull, 0.0, -GRAVITY))
+    run = held(slope, sleepy(solver), round(3.0 / TIME_STEP))
+
+    assert run.state["ball"][0] == pytest.approx((5 / 7 if rolls else 1.0) * pull * 9.0 / 2.0, rel=0.02)
+
+
 @pytest.mark.parametrize(("thrown", "slow"), [(4.0, 3.0), (0.5, 3.0)])
 def test_what_flies_is_left_alone_however_slow_it_is_at_its_top(thrown: float, slow: float) -> None:
     """To the bits of a run without sleeping: what nothing holds is not at rest."""

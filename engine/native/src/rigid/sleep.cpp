@@ -70,6 +70,7 @@ void Sleeping::begin() {
     if (!rules_.on()) return;
     live_.sleep.island.assign(model_.constants.size(), 0);
     live_.sleep.quiet.assign(model_.constants.size(), 0);
+    live_.sleep.since.assign(model_.constants.size(), 0.0);
 }
 
 /// Rows of sleepers are read where all rows are while others are solved with bounds.
@@ -96,19 +97,31 @@ void Sleeping::note_velocities() {
     for (const int i : model_.constrained) start_places_[i].velocity = live_.bodies[i].velocity;
 }
 
-/// Whether a body's surface was slower in the step than what sleeps may be, by its velocities and by where it got [m/s]; and
-/// at least half of its load was held: what falls is slow at first, and not at rest.
-bool Sleeping::still(int i) const noexcept {
+/// How fast a body's surface was in the step, by its velocities and by where it got [m/s].
+double Sleeping::surface_speed(int i) const noexcept {
     const BodyState& s = live_.bodies[i];
     const auto& [displacement, velocity, start_turn] = start_places_[i];
-    const Vec3 load = model_.h * forces_.acceleration(i), gained = s.velocity - velocity;
-    if (dot(gained, load) > 0.5 * dot(load, load)) return false;
     const double way = norm(s.displacement - displacement) / model_.h;
     const double speed = std::max(norm(s.velocity), way);
-    if (model_.constants[i].particle) return speed < model_.method.sleep_speed;
+    if (model_.constants[i].particle) return speed;
     const Quat turn = s.turn * conjugate(start_turn);
     const double turned = 2.0 * norm(Vec3{turn.x, turn.y, turn.z}) / model_.h;
-    return speed + rules_.reach[i] * std::max(norm(s.angular_velocity), turned) < model_.method.sleep_speed;
+    return speed + rules_.reach[i] * std::max(norm(s.angular_velocity), turned);
+}
+
+/// Whether a body was slower in the step than what sleeps may be, and is not about to move: what falls is slow at first, so
+/// half of its load must have been held, and so is what starts to roll or swing, so it must be no faster than it was when
+/// it began to be slow. What is gets faster begins anew.
+bool Sleeping::still(int i) noexcept {
+    const Vec3 load = model_.h * forces_.acceleration(i);
+    const Vec3 gained = live_.bodies[i].velocity - start_places_[i].velocity;
+    if (dot(gained, load) > 0.5 * dot(load, load)) return false;
+    const double speed = surface_speed(i);
+    if (!(speed < model_.method.sleep_speed)) return false;
+    double& since = live_.sleep.since[i];
+    if (live_.sleep.quiet[i] == 0) since = speed;
+    return live_.sleep.quiet[i] + 1 < rules_.after ||
+           speed - since <= gained_share * model_.method.sleep_speed;
 }
 
 /// For how many steps each body has been still; whether some has been for long enough.

@@ -22,6 +22,7 @@ struct SleepRules {
 struct Sleep {
     std::vector<int> island;          // per body: of sleepers, one more than its first body; 0: awake
     std::vector<std::int64_t> quiet;  // per body: steps it has been at rest, at most what is asked
+    std::vector<double> since;        // per body: how fast its surface was in the first of them, m/s
     std::size_t sleepers = 0;
     std::int64_t slept = 0;  // steps of h, of all bodies
 };

@@ -46,7 +46,8 @@ private:
         Quat turn;
     };
     bool is_moving(int body) const noexcept;
-    bool still(int body) const noexcept;
+    double surface_speed(int body) const noexcept;
+    bool still(int body) noexcept;
     bool count_still_steps();
     const Islands& find_islands(std::vector<char>& kept_up);
     void keep_jacobians();

@@ -127,7 +127,8 @@ inline constexpr double taut = 0.3;             // of h² F / (m r): a body ligh
 // sleep.cpp
 namespace tolerances::sleep {
 inline constexpr double far = 1e3;  // m: as far out may a sleeper lie on a plane that begins to turn
-}
+inline constexpr double gained_share = 0.01;  // of sleep_speed: what gained more while slow is going to move
+}  // namespace tolerances::sleep
 
 // solve_velocities.cpp
 namespace tolerances::solve_velocities {
