@@ -1,5 +1,5 @@
 // The turn of a free body: Euler's equations by small steps of Runge and Kutta, what is kept, and steady spins of any rate.
-#include "rigid/rotation.hpp"
+#include "collision/rotation.hpp"
 
 #include <limits>
 

@@ -41,6 +41,15 @@ inline constexpr double level =
 inline constexpr double prefer_flat = 1e-5;
 inline constexpr double overlay_slop = 1e-7;  // of the thickness
 
+// rotation.cpp
+namespace tolerances::rotation {
+inline constexpr double series_angle = 0x1p-4;  // rad: up to here series and quadrature are exact to rounding
+inline constexpr double short_angle = 0x1p-10;  // rad: up to here with two nodes
+inline constexpr double piece_angle = 4.0;      // rad: what its start's invariants serve for
+inline constexpr double tumbling_angle = 1000.0;    // rad
+inline constexpr double steady_squared = 0x1p-106;  // square of the rounding of a direction
+}  // namespace tolerances::rotation
+
 // solid_pairs.cpp
 namespace tolerances::solid_pairs {
 inline constexpr double near_tie =

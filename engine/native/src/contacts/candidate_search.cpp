@@ -54,9 +54,10 @@ bool CandidateSearch::reachable(const StepMotion& motion, const Contact& contact
 }
 
 void CandidateSearch::begin(StepMotion& motion, const std::vector<Vec6>& free_velocity,
-                            ContactPoints& points) {
+                            const ContactCache& last, ContactPoints& points) {
     const ContactOptions& options = motion.options();
     woken.clear();
+    last_ = &last;
     margins_.begin(motion.bodies(), options.time_step, motion.velocity, free_velocity,
                    options.solver == SolverKind::iterative || options.impacts == ImpactOrder::successive);
     find_open(motion, points);
@@ -116,7 +117,9 @@ void CandidateSearch::look_at(const IndexPair& pair, const StepMotion& motion, C
     if (open.apart.gap > reach) return;
     const bool solids = first.shape.faceted() && second.shape.faceted();
     const double size = std::max(bodies.radius[first.body], bodies.radius[second.body]);
-    if (!first.shape.faceted() && !second.shape.faceted() && open.apart.gap > 1e-6 * size) {
+    const bool pressed =
+        (bodies.driven[first.body] || bodies.driven[second.body]) && last_->pressed(pair_of(pair));
+    if (!first.shape.faceted() && !second.shape.faceted() && open.apart.gap > 1e-6 * size && !pressed) {
         open_.pairs.push_back(open);  // clearly apart: no need for its points
         return;
     }
@@ -129,7 +132,10 @@ void CandidateSearch::look_at(const IndexPair& pair, const StepMotion& motion, C
         const auto is_triangle = [](const Primitive& shape) { return shape.kind == ShapeKind::triangle; };
         if (!scratch_.empty() || solids || is_triangle(first.shape) || is_triangle(second.shape))
             open_.pairs.push_back(open);
-        return;
+        if (!pressed || std::none_of(scratch_.begin(), scratch_.end(),
+                                     [&](const Contact& contact) { return reachable(motion, contact); }))
+            return;
+        open_.pairs.back().pressed = true;
     }
     for (std::size_t i = 1; i < scratch_.size(); ++i)  // a few, nearly always in order
         for (std::size_t at = i; at > 0 && by_key(scratch_[at], scratch_[at - 1]); --at)

@@ -16,8 +16,10 @@ class CandidateSearch {
 public:
     explicit CandidateSearch(Detection shapes) : detection(std::move(shapes)) {}
 
-    /// Finds the points that are closed where the step begins, and the pairs near enough to meet.
-    void begin(StepMotion& motion, const std::vector<Vec6>& free_velocity, ContactPoints& points);
+    /// Finds the points that are closed where the step begins, and the pairs near enough to meet. What a joint
+    /// drives goes where no forces tell: if it pressed in the `last` step and is near enough yet, it has its points at once.
+    void begin(StepMotion& motion, const std::vector<Vec6>& free_velocity, const ContactCache& last,
+               ContactPoints& points);
     /// The same pairs once more, of which those that have points are known.
     void find_open(StepMotion& motion, ContactPoints& points);
     /// Finds more of both where some body goes further than was looked for. `changed` names bodies with another velocity than
@@ -26,7 +28,7 @@ public:
 
     /// Casts the open pairs, once a step is begun those of bodies that `changed` names: the others were judged before.
     /// Those that meet get points. How many they are.
-    int find_impacts(const Cast& cast, const std::vector<char>& changed, const StepMotion& motion,
+    int find_impacts(const Cast& cast, const std::vector<char>& changed, StepMotion& motion,
                      ContactPoints& points);
     /// An impact that is no event acts with the bodies at the start of the step, or the angular momentum of both would
     /// not be kept: with the points of that moment, if their rows stop the approach, else at the point of the meeting,
@@ -49,6 +51,8 @@ public:
 private:
     void look_at(const std::vector<IndexPair>& near, StepMotion& motion, ContactPoints& points);
     void look_at(const IndexPair& pair, const StepMotion& motion, ContactPoints& points);
+    bool presses(const OpenPair& open, const std::vector<Vec6>& velocity, const StepMotion& motion,
+                 const ContactPoints& points) const;
     bool reachable(const StepMotion& motion, const Contact& contact) const;
     StepContact& add_point(const ContactModel& model, ContactPoints& points, const Contact& contact,
                            const Pose& first, const Pose& second, double toi);
@@ -60,13 +64,14 @@ private:
                    const ContactPoints& points) const;
     bool add_toi_point_at_start(const OpenPair& open, double time, const std::vector<Vec6>& velocity,
                                 const StepMotion& motion, ContactPoints& points);
-    bool add_toi_points(const OpenPair& open, double time, const std::vector<Vec6>& velocity,
-                        const StepMotion& motion, ContactPoints& points);
+    bool add_toi_points(const OpenPair& open, double time, const std::vector<Vec6>& along,
+                        const std::vector<Vec6>& velocity, const StepMotion& motion, ContactPoints& points);
     bool is_known(const ContactPoints& points, const Contact& contact, std::size_t from, std::size_t end,
                   double size, bool& named) const;
 
     OpenPairs open_;
     SearchMargins margins_;
+    const ContactCache* last_ = nullptr;  // of the step that is looked through
     // Of one look:
     std::vector<Meeting> meetings_;
     std::vector<IndexPair> near_, grazing_;  // where the search was widened; pairs, see skip_grazing()

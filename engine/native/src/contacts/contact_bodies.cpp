@@ -8,22 +8,28 @@ namespace spook {
 using namespace tolerances::contact_bodies;
 
 ContactBodies::ContactBodies(const Detection& detection, std::vector<int> solver_indices,
-                             std::vector<IndexPair> joint_pairs)
+                             std::vector<JointTie> ties, std::vector<Tumbler> tumbling)
     : solver_index(std::move(solver_indices)),
-      joints(std::move(joint_pairs)),
+      joints(std::move(ties)),
       jointed(solver_index.size(), 0),
+      driven(solver_index.size(), 0),
       ball(detection.balls()),
       radius(detection.radius()),
-      swings(!detection.single_points()) {
+      swings(!detection.single_points()),
+      tumblers(std::move(tumbling)) {
     for (std::size_t b = 0; b < count(); ++b) {
         if (solver_index[b] < 0) continue;
         body_of.resize(std::max(body_of.size(), static_cast<std::size_t>(solver_index[b]) + 1));
         body_of[solver_index[b]] = static_cast<int>(b);
     }
-    for (const auto& [a, b] : joints) {
-        if (a >= 0) jointed[a] = 1;
-        if (b >= 0) jointed[b] = 1;
-    }
+    for (const JointTie& joint : joints)
+        for (const int body : {joint.first, joint.second}) {
+            if (body < 0) continue;
+            jointed[body] = 1;
+            if (joint.driven) driven[body] = 1;
+            if (joint.stops)
+                ball[body] = 0;  // its impacts are met at the step's start, as those of stops are
+        }
 }
 
 double ContactBodies::slack(const Contact& contact) const noexcept {

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "collision/detection.hpp"
+#include "collision/rotation.hpp"
 #include "contacts/contact_material.hpp"
 #include "contacts/contact_options.hpp"
 #include "contacts/tolerances.hpp"
@@ -13,11 +14,25 @@
 
 namespace spook {
 
+/// Two bodies with rows of a joint, −1 for the world: whether it has a stop, and whether a motor or a kinematic body moves it.
+struct JointTie {
+    int first, second;
+    bool stops = false, driven = false;
+};
+
+/// A body whose angular velocity changes where no torque acts, for its moments of inertia differ.
+struct Tumbler {
+    int body;
+    FreeRotor rotor;
+    Vec3 moments;  // principal, kg m²
+    Mat3 axes;     // principal ones in those of the body
+};
+
 struct ContactBodies {
     /// solver_index[b] is the body's index in MixedSystem, or −1 if it does not move by itself (static, kinematic).
     /// `joints` are the pairs of bodies that rows of joints tie.
-    ContactBodies(const Detection& detection, std::vector<int> solver_indices,
-                  std::vector<IndexPair> joint_pairs);
+    ContactBodies(const Detection& detection, std::vector<int> solver_indices, std::vector<JointTie> ties,
+                  std::vector<Tumbler> tumblers = {});
 
     std::size_t count() const noexcept { return solver_index.size(); }
     bool moves(std::size_t body) const noexcept { return solver_index[body] >= 0; }
@@ -52,11 +67,13 @@ struct ContactBodies {
     bool is_closed(const Contact& contact) const noexcept { return is_closed(contact, contact.point.gap); }
 
     std::vector<int> solver_index, body_of;  // and back
-    std::vector<IndexPair> joints;
+    std::vector<JointTie> joints;
     std::vector<char> jointed;   // bodies with rows of joints
+    std::vector<char> driven;    // those with one that is driven
     std::vector<char> ball;      // whose only surface is a sphere round their centre, and that no stop holds
     std::vector<double> radius;  // m
     bool swings = false;         // some surface has sides: what turns on it may meet elsewhere
+    std::vector<Tumbler> tumblers;  // of those that move by themselves
 };
 
 struct ContactSurfaces {

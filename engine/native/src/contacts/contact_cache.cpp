@@ -38,6 +38,15 @@ bool ContactCache::has_pair(std::uint64_t pair) const noexcept {
     return at != points.end() && pair_of(at->contact) == pair;
 }
 
+bool ContactCache::pressed(std::uint64_t pair) const noexcept {
+    auto at = std::lower_bound(
+        points.begin(), points.end(), pair,
+        [](const CachedContact& cached, std::uint64_t k) { return pair_of(cached.contact) < k; });
+    for (; at != points.end() && pair_of(at->contact) == pair; ++at)
+        if (at->normal > 0.0 && !(at->impact > 0.0)) return true;
+    return false;
+}
+
 void ContactCache::put_to_sleep(const std::vector<int>& sleepers, std::size_t bodies) {
     asleep.resize(bodies, 0);
     for (const int body : sleepers) asleep[body] = 1;

@@ -27,11 +27,11 @@ void note_initial_penetrations(const ContactModel& model, const ContactPoints& p
 
 ContactStage::ContactStage(Detection detection, const std::vector<SurfaceMaterial>& materials,
                            std::vector<int> solver_index, const ContactOptions& options,
-                           std::vector<IndexPair> joints, std::vector<char> yielding,
-                           std::vector<PairFriction> pair_frictions)
-    : model_(
-          std::make_shared<ContactModel>(ContactBodies{detection, std::move(solver_index), std::move(joints)},
-                                         ContactSurfaces{materials, std::move(pair_frictions)}, options)),
+                           std::vector<JointTie> joints, std::vector<char> yielding,
+                           std::vector<PairFriction> pair_frictions, std::vector<Tumbler> tumblers)
+    : model_(std::make_shared<ContactModel>(
+          ContactBodies{detection, std::move(solver_index), std::move(joints), std::move(tumblers)},
+          ContactSurfaces{materials, std::move(pair_frictions)}, options)),
       motion_(model_),
       search_(std::move(detection)),
       projector_(model_, std::move(yielding)) {}
@@ -45,7 +45,7 @@ bool ContactStage::detect(const std::vector<Pose>& poses, const std::vector<Vec6
     impacts_.begin_step(*model_);
     ran_away_ = false;  // of a step that was taken back, or is over
 
-    search_.begin(motion_, free_velocity, points_);
+    search_.begin(motion_, free_velocity, state_.cache, points_);
     motion_.predict(free_velocity);
     const std::size_t closed_points = points_.all.size();
     if (!state_.initial_penetration_known) note_initial_penetrations(*model_, points_, state_);

@@ -58,17 +58,15 @@ namespace spook {
 class ContactStage {
 public:
     /// One material and one solver index per body of the scene; `joints` are the pairs of bodies that rows of joints tie;
-    /// `yielding`: per block of those rows, whether it gives way while overlaps are parted, as springs do.
+    /// `yielding`: per block of those rows, whether it gives way while overlaps are parted, as springs do; `tumblers`: bodies
+    /// whose moments of inertia differ.
     ContactStage(Detection detection, const std::vector<SurfaceMaterial>& materials,
                  std::vector<int> solver_index, const ContactOptions& options,
-                 std::vector<IndexPair> joints = {}, std::vector<char> yielding = {},
-                 std::vector<PairFriction> pair_frictions = {});
+                 std::vector<JointTie> joints = {}, std::vector<char> yielding = {},
+                 std::vector<PairFriction> pair_frictions = {}, std::vector<Tumbler> tumblers = {});
 
     /// Whether any contact can ever be; if not, the stage can be left out.
     bool possible() const noexcept { return search_.detection.possible(); }
-
-    /// Impacts of this body are met at the start of the step, like the stops of its joints, never at their own time.
-    void leave_at_start(int body) noexcept { model_->bodies.ball[body] = 0; }
 
     /// Finds this step's contacts. `velocity` is v and `free_velocity` v + h M⁻¹ f, one per body of the scene.
     /// False if there is none: nothing else need be called in this step, but meets() where there are joints.

@@ -89,9 +89,9 @@ void ImpactQueue::find_islands(const OpenPairs& open_pairs, const StepMotion& mo
                                const ContactPoints& points) {
     const ContactBodies& bodies = motion.bodies();
     connected_.begin(static_cast<int>(bodies.body_of.size()));
-    for (const auto& [a, b] : bodies.joints)
-        if (a >= 0 && b >= 0 && bodies.moves(a) && bodies.moves(b))
-            connected_.tie(bodies.solver_index[a], bodies.solver_index[b]);
+    for (const JointTie& joint : bodies.joints)
+        if (joint.first >= 0 && joint.second >= 0 && bodies.moves(joint.first) && bodies.moves(joint.second))
+            connected_.tie(bodies.solver_pair(joint));
     points.tie(bodies, connected_);
     for (const OpenPair& open : open_pairs.pairs)
         if (possible_ && !open.has_met()) connected_.tie(bodies.solver_pair(open));

@@ -39,8 +39,25 @@ double CandidateSearch::meeting(const OpenPair& open, const Cast& cast, const St
     return time;
 }
 
-int CandidateSearch::find_impacts(const Cast& cast, const std::vector<char>& changed,
-                                  const StepMotion& motion, ContactPoints& points) {
+/// Whether a point of the pair presses along `velocity`: what else turns in then is as deep as where bodies touch.
+bool CandidateSearch::presses(const OpenPair& open, const std::vector<Vec6>& velocity,
+                              const StepMotion& motion, const ContactPoints& points) const {
+    const std::uint64_t key = pair_of(open.pair);
+    const double h = motion.options().time_step;
+    const auto end = points.all.begin() + static_cast<std::ptrdiff_t>(points.ordered);
+    auto at = std::lower_bound(points.all.begin(), end, key, [](const StepContact& point, std::uint64_t k) {
+        return pair_of(point.contact) < k;
+    });
+    for (; at != end && pair_of(at->contact) == key; ++at)
+        if (at->contact.point.gap + h * relative_velocity(*at, at->contact.point.normal, velocity) <=
+            closed * motion.bodies().size(at->contact))
+            return true;
+    return false;
+}
+
+int CandidateSearch::find_impacts(const Cast& given, const std::vector<char>& changed, StepMotion& motion,
+                                  ContactPoints& points) {
+    const Cast cast{motion.along(given.velocity), given.when};
     const std::vector<Vec6>& velocity = cast.velocity;
     const bool late = cast.when != Cast::When::ahead;
     meetings_.clear();
@@ -56,7 +73,9 @@ int CandidateSearch::find_impacts(const Cast& cast, const std::vector<char>& cha
     for (std::size_t at = 0; at < all; ++at) {  // nearly all pass: the others are gathered first
         asked_[count] = asked_[at];
         const OpenPair& open = open_.pairs[asked_[at]];
-        count += !open.has_met() && !passes(open, motion, points, velocity);
+        count += !open.has_met() && !passes(open, motion, points, velocity) &&
+                 !(open.pressed &&
+                   (cast.when != Cast::When::solved || presses(open, given.velocity, motion, points)));
     }
     for (std::size_t at = 0; at < count; ++at) {
         if (at + ahead < count) prefetch_bodies(open_.pairs[asked_[at + ahead]], motion.poses, motion.dv_ext);
@@ -74,8 +93,8 @@ int CandidateSearch::find_impacts(const Cast& cast, const std::vector<char>& cha
         }
         const auto& [k, time] = meetings_[at];
         OpenPair& open = open_.pairs[k];
-        if (!(late && add_toi_point_at_start(open, time, velocity, motion, points)) &&
-            !add_toi_points(open, time, velocity, motion, points))
+        if (!(late && add_toi_point_at_start(open, time, given.velocity, motion, points)) &&
+            !add_toi_points(open, time, velocity, given.velocity, motion, points))
             continue;
         open_.meet(open);
         ++found;
@@ -111,10 +130,11 @@ bool CandidateSearch::add_toi_point_at_start(const OpenPair& open, double time,
 }
 
 /// The points of a pair that meets at `time`, with the bodies where they will be then.
-bool CandidateSearch::add_toi_points(const OpenPair& open, double time, const std::vector<Vec6>& velocity,
-                                     const StepMotion& motion, ContactPoints& points) {
+bool CandidateSearch::add_toi_points(const OpenPair& open, double time, const std::vector<Vec6>& along,
+                                     const std::vector<Vec6>& velocity, const StepMotion& motion,
+                                     ContactPoints& points) {
     const int a = open.first, b = open.second;
-    const OpenWays way(step(motion, points), open, velocity);
+    const OpenWays way(step(motion, points), open, along);
     const Pose first = way.first.body_at(time), second = way.second.body_at(time);
     const Vec3 led = (way.first_body.position - motion.poses[a].position) -
                      (way.second_body.position - motion.poses[b].position);

@@ -63,6 +63,7 @@ struct OpenPair {
     int first, second;  // bodies; the first is negative once they have met: they have points then
     Separation apart;
     double first_arm = 0.0, second_arm = 0.0;  // see turning_arm(); negative: a plane
+    bool pressed = false;  // in the last step, and has points already: asked where these do not press now
     bool has_met() const noexcept { return first < 0; }
 };
 

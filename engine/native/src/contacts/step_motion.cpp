@@ -8,6 +8,8 @@
 
 namespace spook {
 
+using namespace tolerances::step_motion;
+
 void StepMotion::begin(const std::vector<Pose>& at, const std::vector<Vec6>& v,
                        const std::vector<Vec6>& free_velocity) {
     const std::size_t bodies = model_->bodies.count();
@@ -33,6 +35,25 @@ void StepMotion::predict(const std::vector<Vec6>& free_velocity) {
 
 bool StepMotion::moves_along_forces(int body) const {
     return !is_free(body) && is_along(linear(dv_ext[body]), linear(velocity[body]));
+}
+
+const std::vector<Vec6>& StepMotion::along(const std::vector<Vec6>& given) {
+    const double h = model_->options.time_step;
+    if (model_->bodies.tumblers.empty()) return given;
+    along_ = given;
+    for (const Tumbler& body : model_->bodies.tumblers) {
+        const Vec3 w = angular(given[body.body]);
+        const double turn = h * norm(w);
+        if (turn * turn < closed || turn > furthest_mean) continue;
+        const Mat3 axes = poses[body.body].rotation * body.axes;
+        const Vec3 p = transposed_times(axes, w);
+        const Quat q = body.rotor.turn(h, {p.x * body.moments.x, p.y * body.moments.y, p.z * body.moments.z});
+        const Vec3 e = axes * Vec3{q.x, q.y, q.z};
+        const double sine = norm(e);
+        const Vec3 mean = (2.0 * arc_tangent(sine, q.w) / (h * sine)) * e;
+        along_[body.body][3] = mean.x, along_[body.body][4] = mean.y, along_[body.body][5] = mean.z;
+    }
+    return along_;
 }
 
 void StepMotion::apply_forces_until(std::size_t b, double part) {

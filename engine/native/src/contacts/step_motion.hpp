@@ -50,6 +50,8 @@ struct StepMotion {
         event_rotation[body] = there;
         velocity[body][3] = w.x, velocity[body][4] = w.y, velocity[body][5] = w.z;
     }
+    /// The same velocities, with the mean angular velocity of what tumbles in the step in the place of that it begins with.
+    const std::vector<Vec6>& along(const std::vector<Vec6>& velocity);
     /// Where a body begins its way of this step. An event's bodies have gone part of it with another velocity.
     Pose moved(int body, const std::vector<Vec6>& along) const;
     /// Approach and push, from the current velocities.
@@ -85,6 +87,7 @@ struct StepMotion {
 
 private:
     std::shared_ptr<const ContactModel> model_;
+    std::vector<Vec6> along_;
 };
 
 }  // namespace spook

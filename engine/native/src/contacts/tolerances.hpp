@@ -223,6 +223,11 @@ inline constexpr std::size_t few_points = 100;     // of an island: solved for a
 inline constexpr int many_rounds = 8;              //   unless that has been done so often
 }  // namespace tolerances::solve_by_pgs
 
+// step_motion.cpp
+namespace tolerances::step_motion {
+inline constexpr double furthest_mean = 3.0;  // rad: what tumbles further in a step has no mean turn
+}  // namespace tolerances::step_motion
+
 // supported_bodies.cpp
 namespace tolerances::supported_bodies {
 inline constexpr double pressed_by = 1e-9;  // of a kick: what presses less does not

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collision/rotation.hpp"
 #include "linear/elementary.hpp"
-#include "rigid/rotation.hpp"
 
 namespace spook {
 

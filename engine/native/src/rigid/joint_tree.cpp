@@ -4,8 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collision/rotation.hpp"
 #include "rigid/joint_forest.hpp"
-#include "rigid/rotation.hpp"
 #include "rigid/tolerances.hpp"
 
 namespace spook {

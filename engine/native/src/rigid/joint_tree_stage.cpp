@@ -2,10 +2,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collision/rotation.hpp"
 #include "linear/elementary.hpp"
 #include "rigid/joint_rounds.hpp"
 #include "rigid/joint_tree.hpp"
-#include "rigid/rotation.hpp"
 
 namespace spook {
 

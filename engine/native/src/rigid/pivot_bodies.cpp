@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "rigid/rotation.hpp"
+#include "collision/rotation.hpp"
 
 namespace spook {
 

@@ -5,12 +5,6 @@
 namespace spook {
 namespace {
 
-bool isotropic(Vec3 inertia) noexcept { return inertia.x == inertia.y && inertia.y == inertia.z; }
-
-}  // namespace
-
-namespace {
-
 Mat3 turned(const Mat3& start, const BodyState& state) noexcept {
     Mat3 r = state.turn_less_one * start;
     for (int i = 0; i < 9; ++i) r.m[i] += start.m[i];

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "collision/rotation.hpp"
 #include "rigid/rigid_scene.hpp"
-#include "rigid/rotation.hpp"
 
 namespace spook {
 
@@ -36,6 +36,8 @@ struct BodyState {
     Mat3 turn_less_one;  // rotation matrix of `turn`, minus the identity
     Mat3 inertia;        // world axes
 };
+
+inline bool isotropic(Vec3 inertia) noexcept { return inertia.x == inertia.y && inertia.y == inertia.z; }
 
 inline Vec3 position(const BodyConstants& body, const BodyState& state) noexcept {
     return body.start + state.displacement;

@@ -36,17 +36,33 @@ void MixedRows::take_stages(RigidModel& model) {
     breaks_ = stages.take(Stage::break_joints);
 }
 
+namespace {
+
+std::vector<Tumbler> tumblers(const RigidModel& model) {
+    std::vector<Tumbler> found;
+    for (int b = 0; b < model.bodies(); ++b) {
+        const BodyConstants& body = model.constants[b];
+        if (body.moves() && !body.particle && !isotropic(body.inertia))
+            found.push_back(
+                {b, body.rotor, body.inertia, transpose(body.start_rotation) * body.start_principal});
+    }
+    return found;
+}
+
+}  // namespace
+
 void MixedRows::take_contacts(const RigidScene& scene) {
     std::vector<char> dynamic;
     std::vector<SurfaceMaterial> materials;
-    std::vector<IndexPair> joint_pairs;
+    std::vector<JointTie> ties;
     std::vector<char> yielding;
     for (const JointBlock& block : joints_.blocks()) {
-        joint_pairs.push_back({block.first, block.second});
+        ties.push_back({block.first, block.second, joints_.may_stop(block), is_driven(block)});
         yielding.push_back(joints_.has_spring(block) || gives_way(joints_.constants(block.joint).kind));
     }
     for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
-        for (int body : joints_.others(k)) joint_pairs.push_back({joints_.blocks()[k].first, body});
+        for (int body : joints_.others(k))
+            ties.push_back({ties[k].first, body, ties[k].stops, ties[k].driven});
     for (const RigidBodySpec& spec : scene.bodies) {
         dynamic.push_back(spec.motion == Motion::dynamic);
         materials.push_back(spec.material);
@@ -67,13 +83,7 @@ void MixedRows::take_contacts(const RigidScene& scene) {
         ContactOptions{model_.h, model_.method.friction, solver, model_.method.iterations,
                        model_.method.residual_tolerance, model_.method.floor, model_.method.refinements,
                        model_.method.impacts, stops_rebound(scene), model_.method.unsettled_residual},
-        joint_pairs, yielding, std::move(pairs));
-    for (const JointBlock& block : joints_.blocks())
-        for (const int body : {block.first, block.second})
-            if (body >= 0 && joints_.may_stop(block)) fresh_contacts_->leave_at_start(body);
-    for (int k = 0; k < static_cast<int>(joints_.blocks().size()); ++k)
-        for (const int body : joints_.others(k))
-            if (joints_.may_stop(joints_.blocks()[k])) fresh_contacts_->leave_at_start(body);
+        std::move(ties), yielding, std::move(pairs), tumblers(model_));
 }
 
 void MixedRows::begin() {

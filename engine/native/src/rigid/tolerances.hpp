@@ -109,15 +109,6 @@ inline constexpr double forced_open = 1e-2;  // of a joint's arms, or rad: a mot
 inline constexpr double named_share = 1e-3;  // of the largest share: a joint that is named
 }  // namespace tolerances::rigid_locking
 
-// rotation.cpp
-namespace tolerances::rotation {
-inline constexpr double series_angle = 0x1p-4;  // rad: up to here series and quadrature are exact to rounding
-inline constexpr double short_angle = 0x1p-10;  // rad: up to here with two nodes
-inline constexpr double piece_angle = 4.0;      // rad: what its start's invariants serve for
-inline constexpr double tumbling_angle = 1000.0;    // rad
-inline constexpr double steady_squared = 0x1p-106;  // square of the rounding of a direction
-}  // namespace tolerances::rotation
-
 // runaway.cpp
 namespace tolerances::runaway {
 inline constexpr double passing_energy = 1e-6;  // of its spin's energy: what it has by going round its joint
@@ -135,7 +126,7 @@ namespace tolerances::solve_velocities {
 inline constexpr double led_share =
     0.1;  // of the kinetic energy: a step in which joints do more work leads bodies
 inline constexpr double most_of_alone =
-    100.0;  // times the work of leading each row back by itself: what a chain of bodies may take
+    10.0;  // times the work of leading each row back by itself: what a chain of bodies may take
 }  // namespace tolerances::solve_velocities
 
 // step.cpp

@@ -8,13 +8,13 @@
 // With a = j₂ − j₃, b = j₁ − j₃ and P₁², P₃² the squares of p there, s(t) = sn(√A t)/√A with s'² = (1 − A s²)(1 − B s²),
 // A = a b P₃², B = b (b − a) P₁². Jacobi's addition theorem then moves p by rational functions of itself, and no phase is
 // looked for. Which of A and B is larger, so about which axis p circles, makes no difference.
-#include "rigid/rotation.hpp"
+#include "collision/rotation.hpp"
 
 #include <algorithm>
 #include <cmath>
 
+#include "collision/tolerances.hpp"
 #include "linear/elementary.hpp"
-#include "rigid/tolerances.hpp"
 
 namespace spook {
 namespace {
