@@ -8,6 +8,7 @@ import pytest
 
 from spook_tracker.engine import (
     WORLD,
+    AngularVelocity,
     Box,
     Capsule,
     Hinge,
@@ -266,6 +267,38 @@ def test_a_driven_slide_pushes_a_box_as_statics_say():
     speed = run["v"]
     assert run.status == "completed"
     assert speed[0] == pytest.approx((force - mu * box * G) / (pusher + box), rel=1e-9)
+
+
+@pytest.mark.parametrize("solver", ["direct", "iterative"])
+@pytest.mark.parametrize("mass", [5.0, 8.0])
+def test_what_slips_out_of_a_gripper_falls_straight(mass: float, solver: str) -> None:
+    """Of all ways to share a load among four corners the even one: a = g − 2 mu F / m, without a turn, while whole faces touch."""
+    force, mu, seconds = 50.0, 0.4, 0.1
+    rough = Material(friction=mu)
+    pads = [
+        solid(name, Box((0.06, 0.02, 0.1)), (0.0, y, 0.0), 0.5, material=rough)
+        for name, y in (("left", 0.035), ("right", -0.035))
+    ]
+    presses = tuple(
+        Prismatic(
+            name=f"presses {pad.name}",
+            between=(WORLD, pad.name),
+            axis=(0, 1, 0),
+            compliance=0.0,
+            motor=Motor(force=-math.copysign(force, pad.position[1])),
+        )
+        for pad in pads
+    )
+    held = solid("box", Box((0.05, 0.05, 0.05)), (0.0, 0.0, 0.0), mass, material=rough)
+    run = simulate(
+        Scene(bodies=(*pads, held), constraints=presses, gravity=(0.0, 0.0, -G)),
+        duration=seconds,
+        time_step=STEP,
+        method=Method(solver=solver),
+        observe=finals(v=Velocity("box"), w=AngularVelocity("box")),
+    )
+    assert run["v"][2] == pytest.approx(-(G - 2.0 * mu * force / mass) * seconds, rel=1e-3)
+    assert np.linalg.norm(run["w"]) < 1e-3
 
 
 @pytest.mark.parametrize("rate", [60, 240])

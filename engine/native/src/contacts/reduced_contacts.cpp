@@ -296,6 +296,50 @@ void ReducedContacts::iterate() {
         else find_disc(unit);
 }
 
+/// Iterations load one point alone of several that share a load, and what slides is turned by it. Rough points of a pair of which
+/// none is known to push start from where they push alike, and from friction that is found for all at once.
+void ReducedContacts::share_new_loads(const MixedSystem& system) {
+    new_pairs_.clear();
+    for (std::size_t k = 0, next = 0; k < units_.size(); k = next) {
+        const RowBlock& first = system.rows[units_[k].block];
+        NewPair pair;
+        bool known = false;
+        for (; next < units_.size(); ++next) {
+            const Unit& unit = units_[next];
+            const RowBlock& block = system.rows[unit.block];
+            if (block.first != first.first || block.second != first.second) break;
+            if (!block.is_contact || block.state[0] != RowState::free || !(unit.own > 0.0)) continue;
+            if (unit.normal >= 0) pair.slips.push_back(static_cast<int>(next));
+            else pair.normals.push_back(unit.at), known = known || z_[unit.at] > 0.0;
+        }
+        if (!known && pair.slips.size() > 1) new_pairs_.push_back(std::move(pair));
+    }
+    for (int k = 0; k < sharing_iterations; ++k)
+        for (const NewPair& pair : new_pairs_) share(pair);
+}
+
+void ReducedContacts::share(const NewPair& pair) {
+    const std::size_t n = static_cast<std::size_t>(rows_);
+    double u = 0.0, own = 0.0;
+    for (const int i : pair.normals) {
+        u += u_[i];
+        for (const int j : pair.normals)
+            own += w_[n * static_cast<std::size_t>(i) + static_cast<std::size_t>(j)];
+    }
+    const double by = std::max(-u / own, -z_[pair.normals.front()]);
+    for (const int i : pair.normals) change(i, by);
+    slip_ = u_;  // all slips before any is met
+    const double points = static_cast<double>(pair.normals.size());
+    for (const int k : pair.slips) {
+        const Unit& unit = units_[k];
+        const double bound = unit.coefficient * z_[unit.normal];
+        double t[2] = {};
+        for (int i = 0; i < unit.size; ++i) t[i] = z_[unit.at + i] - slip_[unit.at + i] / (points * unit.own);
+        const double size = length(t[0], t[1]), share = size > bound ? bound / size : 1.0;
+        for (int i = 0; i < unit.size; ++i) change(unit.at + i, share * t[i] - z_[unit.at + i]);
+    }
+}
+
 /// Iterations find which rows push and which slide, Newton's method the answer; where it does not, both again from its end.
 void ReducedContacts::settle(Report& report, double goal, int iterations) {
     best_residual_ = unbounded;
@@ -340,6 +384,8 @@ ReducedContacts::Report ReducedContacts::solve(MixedSystem& system, const std::v
     reduce(system);
     for (const Unit& unit : units_)
         if (unit.normal < 0) z_[unit.at] = std::clamp(z_[unit.at], unit.lower, unit.upper);
+    measure();
+    share_new_loads(system);
     for (int pass = 0; pass < passes; ++pass) {
         measure();
         settle(report, exact * speed_, iterations);

@@ -62,6 +62,11 @@ private:
     void couple();
     void couple_refined(const MixedSystem& system);
     void change(int at, double by);
+    struct NewPair {
+        std::vector<int> normals, slips;  // rows of its points' normals, and units of their friction
+    };
+    void share_new_loads(const MixedSystem& system);
+    void share(const NewPair& pair);
     void iterate();
     void find_row(const Unit& unit);
     void find_disc(const Unit& unit);
@@ -78,6 +83,8 @@ private:
         int first_edge = -1, second_edge = -1, further_edge = -1;
     };
     std::vector<Joint> joints_;
+    std::vector<NewPair> new_pairs_;
+    std::vector<double> slip_;
     MassFactors mass_;
     bool floored_ = false;                // pivots, by the last factorisation
     std::vector<double> response_;        // columns U⁻ᵀ Gᵀ; A⁻¹ Gᵀ where pivots are floored; of all unknowns

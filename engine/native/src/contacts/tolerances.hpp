@@ -194,6 +194,7 @@ inline constexpr double still_jammed = 0.9;      // of its depth when it did not
 
 // reduced_contacts.cpp
 namespace tolerances::reduced_contacts {
+inline constexpr int sharing_iterations = 30;     // over pairs of bodies with new points
 inline constexpr double exact = 1e-14;            // a residual, of the speeds in the system: rounding
 inline constexpr double good = 1e-11;             // one that is an answer
 inline constexpr int rounds = 3;                  // of iterations and Newton's method
