@@ -215,6 +215,23 @@ def test_it_turns_as_far_as_its_spin_says(name: str) -> None:
     assert math.log2(wrong(1 / 120) / wrong(1 / 240)) == pytest.approx(2.0, abs=0.1)
 
 
+@pytest.mark.parametrize("turn", [0.1, 0.7])
+def test_a_motor_turns_as_fast_as_it_is_told_about_any_axis(turn: float) -> None:
+    """The spin of a body with three moments, about none of its own axes, bends within a step, to first order."""
+    steps = 400
+    body = RigidBody(name="box", mass=1.0, inertia=(1.0, 2.0, 3.0), position=(0.0, 0.0, 0.0))
+    motor = Motor(speed=turn * 60.0)
+    axle = Hinge(name="axle", between=(WORLD, "box"), axis=(1.0, 2.0, 3.0), compliance=0.0, motor=motor)
+    run = simulate(
+        Scene(bodies=(body,), constraints=(axle,)),
+        time_step=1 / 60,
+        steps=steps,
+        observe=traces(angle=JointCoordinate("axle")),
+    )
+
+    assert run["angle"][-1] - run["angle"][steps // 2] == pytest.approx(turn * steps / 2, rel=1e-6)
+
+
 def rods(motor: Motor | None, count: int = 2) -> Scene:
     """Let go level, about an axis across."""
     bodies = tuple(

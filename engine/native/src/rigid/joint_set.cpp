@@ -3,16 +3,46 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "linear/disjoint_sets.hpp"
 #include "rigid/rotors.hpp"
+#include "rigid/tolerances.hpp"
 #include "rigid/tyre_rows.hpp"
 
 namespace spook {
 
+using namespace tolerances::joint_set;
+
 namespace {
 
 constexpr double kUnbounded = std::numeric_limits<double>::infinity();
+
+/// Two bodies a step before and after, and as they are.
+struct Around {
+    BodyState behind[2], next[2], ahead[2];
+};
+
+Around around(std::span<const BodyConstants> turning, IndexPair pair, const BodyState& first,
+              const BodyState& second, double h) noexcept {
+    Around at{{first, second}, {first, second}, {first, second}};
+    if (pair.first >= 0) look_around(turning[pair.first], h, at.behind[0], at.next[0], at.ahead[0]);
+    if (pair.second >= 0) look_around(turning[pair.second], h, at.behind[1], at.next[1], at.ahead[1]);
+    return at;
+}
+
+/// How much faster a joint turns in a step than as it begins, at the spin at hand [rad/s]: of first order in h where a body spins
+/// about an axis that is none of its own, for what keeps its momentum in the step does not keep its spin.
+double bend_of_turn(const JointConstants& joint, std::span<const BodyConstants> turning, IndexPair pair,
+                    const BodyState& first, const BodyState& second, double h) noexcept {
+    const double share = share_of_bend(turn_in_step(h, first, second));
+    if (!(share > 0.0)) return 0.0;
+    const auto [behind, next, ahead] = around(turning, pair, first, second, h);
+    const AxialRow here = axial_row(joint, next[0], next[1]);
+    const double there = axial_row(joint, ahead[0], ahead[1]).coordinate;
+    const double bend = std::remainder(there - here.coordinate - h * here.rate, 2.0 * std::numbers::pi) / h;
+    return std::abs(bend) > rounding_of_turn * std::abs(here.rate) ? share * bend : 0.0;
+}
 
 }  // namespace
 
@@ -117,12 +147,8 @@ void JointSet::follow_turns(const Joint& joint, std::span<const BodyState> bodie
                                ? turn
                                : turn_of_arms(time_step_, first, carried(first, joint.constants.first_arm),
                                               second, carried(second, joint.constants.second_arm));
-    BodyState behind[2] = {first, second}, next[2] = {first, second}, ahead[2];
-    for (int i = 0; i < 2; ++i) {
-        const int body = i == 0 ? joint.first : joint.second;
-        if (body >= 0) look_around(turning[body], time_step_, behind[i], next[i], ahead[i]);
-        else ahead[i] = next[i];
-    }
+    const auto [behind, next, ahead] =
+        around(turning, {joint.first, joint.second}, first, second, time_step_);
     double on[6], back[6];
     joint_curvature(joint.constants, next[0], next[1], ahead[0], ahead[1], time_step_, OpenGap::stays, on);
     joint_curvature(joint.constants, first, second, behind[0], behind[1], -time_step_, OpenGap::stays, back);
@@ -149,7 +175,13 @@ void JointSet::assemble_axial(const JointBlock& block, std::span<const BodyState
         return k++;
     };
     if (axial.has_motor) {
-        const int motor = next(axial.speed);
+        const bool follows =
+            !turning.empty() && joint.follows && joint.constants.kind != JointKind::prismatic;
+        const double faster =
+            follows ? bend_of_turn(joint.constants, turning, {joint.first, joint.second},
+                                   state_of(joint.first, bodies), state_of(joint.second, bodies), time_step_)
+                    : 0.0;
+        const int motor = next(axial.speed - faster);
         right.lower[motor] = axial.pushes ? axial.impulse : -axial.impulse;
         right.upper[motor] = axial.impulse;
     }

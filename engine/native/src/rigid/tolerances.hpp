@@ -20,6 +20,11 @@ inline constexpr double again = 1e-9;  // of a stop's rebound: slower it is not 
 // Read by several parts
 inline constexpr double slight_tilt = 1e-17;  // its square: what K need not know of
 
+// joint_set.cpp
+namespace tolerances::joint_set {
+inline constexpr double rounding_of_turn = 1e-9;  // of a rate: what spins about an axis of its own keeps it
+}  // namespace tolerances::joint_set
+
 // joint_stops.cpp
 namespace tolerances::joint_stops {
 inline constexpr double unreachable_rate = 1e5;  // m/s or rad/s: no gap that takes more closes within a step,
