@@ -33,7 +33,7 @@ METHODS = {
     "composition of order 8": Method(composition="order8"),
     "general solver forced in": Method(force_stages=("solve_block",)),
     "string stiffness": Method(string_stiffness=True),
-    "iterative, 50 sweeps": Method(solver="iterative", iterations=50, residual_tolerance=0.0),
+    "iterative, 50 iterations": Method(solver="iterative", iterations=50, residual_tolerance=0.0),
 }
 
 

@@ -244,6 +244,7 @@ class Configuration:
     expected_order: float | None  # None: no order expected (rounding level, or no smooth error)
     order_range: tuple[float, float] | None = None  # time steps [s] of the asymptotic range
     time_steps: tuple[float, ...] = ()  # s, coarse to fine; none: those of the ladder
+    formerly: tuple[str, ...] = ()  # its names before, oldest first: histories go on
 
 
 class _Simulated(BaseException):

@@ -16,10 +16,12 @@ METHODS = {
     **dict.fromkeys(("order4", "order 4"), Method(composition="order4")),
     **dict.fromkeys(("order6", "order 6"), Method(composition="order6")),
     **dict.fromkeys(("order8", "order 8"), Method(composition="order8")),
-    **dict.fromkeys(("iterative", "iterative, 50 sweeps"), Method(solver="iterative")),
-    "iterative, 200 sweeps": Method(solver="iterative", iterations=200),
+    **dict.fromkeys(("iterative", "iterative, 50 iterations"), Method(solver="iterative")),
+    "iterative, 200 iterations": Method(solver="iterative", iterations=200),
     "direct, no refinement": Method(refinements=0),
 }
+
+FORMERLY = {f"iterative, {count} iterations": (f"iterative, {count} sweeps",) for count in (50, 200)}
 
 
 def configured(
@@ -32,6 +34,7 @@ def configured(
             method=METHODS[name],
             expected_order=order,
             order_range=None if order is None else order_range,
+            formerly=FORMERLY.get(name, ()),
         )
         for name, order in orders.items()
     )

@@ -223,7 +223,7 @@ TEST = case.ScalarTest(
             unit="%",
             time_steps=tuple(1.0 / n for n in (30, 60, 120)),
             configurations=configured(
-                {"direct": None, "direct, no refinement": None, "iterative, 50 sweeps": None}
+                {"direct": None, "direct, no refinement": None, "iterative, 50 iterations": None}
             ),
             error=ladder_error,
             target_error=None,

@@ -250,7 +250,7 @@ TEST = case.ScalarTest(
             unit="1",
             time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
             configurations=configured(
-                {"direct": None, "iterative, 50 sweeps": None, "iterative, 200 sweeps": None}
+                {"direct": None, "iterative, 50 iterations": None, "iterative, 200 iterations": None}
             ),
             error=ladder_error,
             target_error=0.1,

@@ -103,8 +103,8 @@ LADDERS = (
             {
                 "direct": None,
                 "direct, no refinement": None,
-                "iterative, 50 sweeps": None,
-                "iterative, 200 sweeps": None,
+                "iterative, 50 iterations": None,
+                "iterative, 200 iterations": None,
             }
         ),
         error=ladder_error,

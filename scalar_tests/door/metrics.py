@@ -151,7 +151,7 @@ LADDERS = (
         unit="%",
         time_steps=tuple(1.0 / n for n in (30, 60, 120, 240)),
         configurations=configured(
-            {"direct": None, "direct, no refinement": None, "iterative, 50 sweeps": None}
+            {"direct": None, "direct, no refinement": None, "iterative, 50 iterations": None}
         ),
         error=ladder_error,
         target_error=1e-6,

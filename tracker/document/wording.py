@@ -149,7 +149,7 @@ def margin(definition: SeriesDefinition, value: float) -> Margin:
         return Margin(over, share)
     if share < 1e-2:
         below = allowed / used
-        times_below = "over a million" if below >= 1e6 else number(below, 2)
+        times_below = "over a million" if below >= 1e6 else number(float(f"{below:.2g}"))
         return Margin(f"{times_below} times below the limit", share)
     return Margin(f"{number(100 * share, 3)} % of the limit", share)
 

@@ -252,7 +252,8 @@ def _failed_when_timed(point: ErrorPoint, failed: Outcome) -> ErrorPoint:
 
 def _version(ladder: Ladder, configuration: Configuration, *more: object) -> str:
     """Version of what a series of the ladder measures; `more` is what its rungs do not depend on."""
-    facts = (ladder.name, ladder.unit, configuration.name, configuration.method, *more)
+    name = configuration.formerly[0] if configuration.formerly else configuration.name
+    facts = (ladder.name, ladder.unit, name, configuration.method, *more)
     return definition_hash(ladder.error, facts)
 
 

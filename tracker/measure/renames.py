@@ -1,4 +1,5 @@
-"""Series that had another name before: a test or a metric says what it was called, and its history goes on."""
+"""Series that had another name before: a test, a metric or a ladder's configuration says what it was called, and its history
+goes on."""
 
 from __future__ import annotations
 
@@ -14,24 +15,44 @@ from spook_tracker.tracker.document.run_document import SeriesDefinition
 def with_aliases(
     series: Iterable[SeriesDefinition], tests: Mapping[str, ScalarTest]
 ) -> tuple[SeriesDefinition, ...]:
-    """The series with the keys they had under earlier names of their test and of their metric."""
+    """The series with the keys they had under earlier names of their test, their configuration and their metric."""
     earlier = {
         (name, metric.name): metric.formerly
         for name, test in tests.items()
         for _, metric in test.metrics()
         if metric.formerly
     }
-    return tuple(_renamed(found, tests, earlier.get((found.test, found.metric), ())) for found in series)
+    ways = {
+        (name, way.name): way.formerly
+        for name, test in tests.items()
+        for ladder in test.ladders
+        for way in ladder.configurations
+        if way.formerly
+    }
+    return tuple(
+        _renamed(
+            found,
+            tests,
+            earlier.get((found.test, found.metric), ()),
+            ways.get((found.test, found.configuration), ()) if found.metric.startswith("ladder:") else (),
+        )
+        for found in series
+    )
 
 
 def _renamed(
-    found: SeriesDefinition, tests: Mapping[str, ScalarTest], metrics: tuple[str, ...]
+    found: SeriesDefinition,
+    tests: Mapping[str, ScalarTest],
+    metrics: tuple[str, ...],
+    configurations: tuple[str, ...],
 ) -> SeriesDefinition:
     test = tests.get(found.test)
     names = test.formerly if test else ()
-    if not names and not metrics:
+    if not names and not metrics and not configurations:
         return found
     _, configuration, _, *rest = found.key.split("/")
-    pairs = itertools.product((found.test, *names), (found.metric, *metrics))
-    keys = ("/".join([name, configuration, metric, *rest]) for name, metric in pairs)
+    earlier = itertools.product(
+        (found.test, *names), (configuration, *configurations), (found.metric, *metrics)
+    )
+    keys = ("/".join([name, way, metric, *rest]) for name, way, metric in earlier)
     return msgspec.structs.replace(found, aliases=tuple(key for key in keys if key != found.key))

@@ -58,6 +58,7 @@ def test_units_and_prefixes() -> None:
         (4.904, "smaller_magnitude", 1.635, "33.3 % of the limit"),
         (4.904, "smaller_magnitude", -1.635, "33.3 % of the limit"),
         (4.9e-9, "smaller_magnitude", 4.1e-16, "over a million times below the limit"),
+        (4.9e-9, "smaller_magnitude", 1.0584e-13, "46000 times below the limit"),
         (4.9e-9, "smaller_magnitude", 0.0, "exact"),
         (1.0, "smaller_magnitude", 3.0, "3 times the limit"),
         (1.0, "smaller_magnitude", 1.02, "2 % over"),

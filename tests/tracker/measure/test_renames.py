@@ -1,4 +1,4 @@
-"""A test or a metric that is renamed in the catalogue goes on where it stood under its old name."""
+"""A test, a metric or a configuration that is renamed in the catalogue goes on where it stood under its old name."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from click.testing import CliRunner
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.library import record, run
+from spook_tracker.tracker.measure.ladder import rung_series
+from spook_tracker.tracker.measure.renames import with_aliases
 
 OLD = CATALOGUE["falling_object"]
 METRIC = OLD.measurements[0].metrics[0]
@@ -41,6 +43,22 @@ NEW = replace(
 pytestmark = pytest.mark.usefixtures("in_process")
 BEFORE, AFTER = {"falling_object": OLD}, {"dropped_object": NEW}
 RENAMED = {"dropped_object": replace(OLD, formerly=("falling_object",))}
+
+
+LADDERED = CATALOGUE["simple_pendulum"]
+OTHERWISE = replace(
+    LADDERED,
+    ladders=tuple(
+        replace(
+            ladder,
+            configurations=tuple(
+                replace(way, name=f"{way.name}, renamed", formerly=(way.name,))
+                for way in ladder.configurations
+            ),
+        )
+        for ladder in LADDERED.ladders
+    ),
+)
 
 
 def measured(catalogue: str) -> Any:
@@ -86,3 +104,13 @@ def test_a_new_name_alone_is_not_another_definition() -> None:
     old, new = (metric_series("t", OLD, first, metric).test_version for metric in (METRIC, renamed))
     assert old == new
     assert metric_series("t", OLD, first, replace(METRIC, name="renamed")).test_version != old
+
+
+def test_the_ladder_of_a_renamed_configuration_goes_on() -> None:
+    old, new = (
+        with_aliases(rung_series("simple_pendulum", test), {"simple_pendulum": test})
+        for test in (LADDERED, OTHERWISE)
+    )
+    assert [found.key for found in old] == [found.aliases[0] for found in new]
+    assert [found.test_version for found in old] == [found.test_version for found in new]
+    assert not {found.key for found in old} & {found.key for found in new}
