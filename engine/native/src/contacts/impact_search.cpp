@@ -57,7 +57,8 @@ bool CandidateSearch::presses(const OpenPair& open, const std::vector<Vec6>& vel
 
 int CandidateSearch::find_impacts(const Cast& given, const std::vector<char>& changed, StepMotion& motion,
                                   ContactPoints& points) {
-    const Cast cast{motion.along(given.velocity), given.when};
+    const bool steady = motion.bodies().tumblers.empty();
+    const Cast cast{steady ? given.velocity : motion.along(given.velocity), given.when};
     const std::vector<Vec6>& velocity = cast.velocity;
     const bool late = cast.when != Cast::When::ahead;
     meetings_.clear();

@@ -39,7 +39,6 @@ bool StepMotion::moves_along_forces(int body) const {
 
 const std::vector<Vec6>& StepMotion::along(const std::vector<Vec6>& given) {
     const double h = model_->options.time_step;
-    if (model_->bodies.tumblers.empty()) return given;
     along_ = given;
     for (const Tumbler& body : model_->bodies.tumblers) {
         const Vec3 w = angular(given[body.body]);
