@@ -355,7 +355,7 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
     double blur = start_blur * best.map, met = -1.0;  // the blur where the path was met last
     int stalled = 0, jumps = -1, losses = 0;          // jumps made, negative on the path; times it was lost
     double least = unbounded;                         // residual of this row of jumps, m/s
-    near_ = nearest, hold_ = loosest_hold;
+    near_ = tolerances::cone_newton::nearest, hold_ = loosest_hold;
     Left before = best;
     const double goal = goal_from(best);
     while (best.speed > goal && report.iterations < max_iterations && losses < max_losses) {
