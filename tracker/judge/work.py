@@ -86,14 +86,14 @@ class Sums:
         self.groups: dict[tuple[str, str, str, str, str, tuple[int, ...]], list[Pair]] = {}
         self._texts: dict[int, tuple[str, str]] = {}
 
-    def texts(self, pairs: Sequence[Pair]) -> tuple[tuple[str, ...], list[str]]:
-        """The series, and what they said, each in order."""
+    def texts(self, members: Sequence[tuple[str, Pair]]) -> tuple[tuple[str, ...], list[str]]:
+        """The series, by the names they have now, and what they said, each in order."""
         texts = self._texts
-        for pair in pairs:
+        for key, pair in members:
             if id(pair) not in texts:
                 d, s = pair
-                texts[id(pair)] = f"{d.key} {d.test_version}", f"{d.key} {s.value!r} {s.state_hash}"
-        both = [texts[id(pair)] for pair in pairs]
+                texts[id(pair)] = f"{key} {d.test_version}", f"{key} {s.value!r} {s.state_hash}"
+        both = [texts[id(pair)] for _, pair in members]
         return tuple(sorted([series for series, _ in both])), sorted([said for _, said in both])
 
 
@@ -105,26 +105,35 @@ def with_work(
     The definition's hash stands for the series summed over and for the build: other sums are not comparable. `known` has
     the sums of the runs before, whose samples must not have gone: what many runs share is summed once.
     """
-    grouped: dict[tuple[str, str, str], list[tuple[SeriesDefinition, Sample]]] = {}
-    for pair in samples.values():
+    grouped: dict[tuple[str, str, str], list[tuple[str, Pair]]] = {}
+    for key, pair in samples.items():
         definition, sample = pair
         if sample.counters:
-            place = (definition.test, definition.configuration, FAMILIES[definition.kind])
-            grouped.setdefault(place, []).append(pair)
+            test, configuration = definition.test, definition.configuration
+            if key != definition.key:  # measured under an earlier name
+                test, configuration, *_ = key.split("/")
+            grouped.setdefault((test, configuration, FAMILIES[definition.kind]), []).append((key, pair))
     found = dict(samples)
     known = known or Sums()
     for (test, configuration, family), members in grouped.items():
-        group = engine.compiler, engine.flags, test, configuration, family, tuple(map(id, members))
+        group = (
+            engine.compiler,
+            engine.flags,
+            test,
+            configuration,
+            family,
+            tuple(id(pair) for _, pair in members),
+        )
         if group in known.groups:
             found.update((pair[0].key, pair) for pair in known.groups[group])
             continue
         sums = known.groups[group] = []
         facts, said = known.texts(members)
         answers = _hash(*said)
-        tolerance = max(d.iteration_tolerance for d, _ in members)
-        roles = dict(chain.from_iterable(d.counter_roles.items() for d, _ in members))
+        tolerance = max(d.iteration_tolerance for _, (d, _) in members)
+        roles = dict(chain.from_iterable(d.counter_roles.items() for _, (d, _) in members))
         done: dict[str, int] = {}
-        for _, sample in members:
+        for _, (_, sample) in members:
             for name, count in sample.counters.items():
                 if name in JUDGED or name in roles:
                     done[name] = done.get(name, 0) + count
@@ -133,7 +142,7 @@ def with_work(
             allowed = tolerance if counter in ITERATIONS else 0.0
             explains = roles.get(counter) == "explaining"
             definition = _definition(
-                asked, members[0][0].title, facts, allowed, engine.compiler, engine.flags, explains
+                asked, members[0][1][0].title, facts, allowed, engine.compiler, engine.flags, explains
             )
             sample = Sample(
                 series=definition.key, value=Number(count), outcome="value", passed=True, set_point_held=True,

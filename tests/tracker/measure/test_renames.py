@@ -12,6 +12,8 @@ from click.testing import CliRunner
 
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.tracker.cli.main import main
+from spook_tracker.tracker.cli.recorded import history_of
+from spook_tracker.tracker.judge.work import with_work
 from spook_tracker.tracker.library import record, run
 from spook_tracker.tracker.measure.ladder import rung_series
 from spook_tracker.tracker.measure.renames import with_aliases
@@ -114,3 +116,19 @@ def test_the_ladder_of_a_renamed_configuration_goes_on() -> None:
     assert [found.key for found in old] == [found.aliases[0] for found in new]
     assert [found.test_version for found in old] == [found.test_version for found in new]
     assert not {found.key for found in old} & {found.key for found in new}
+
+
+def test_exact_work_goes_on_under_the_new_name(tmp_path: Path) -> None:
+    database = f"sqlite:///{tmp_path}/t.db"
+    record(measured("BEFORE"), database)
+    record(measured("RENAMED"), database)
+    with history_of(database) as history:
+        old, new = (
+            {
+                key: (definition.test_version, sample.value)
+                for key, (definition, sample) in with_work(history.samples(told.id), told.engine).items()
+                if definition.kind == "work"
+            }
+            for told in history.runs()
+        )
+    assert old == new != {}
