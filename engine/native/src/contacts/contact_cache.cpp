@@ -31,18 +31,19 @@ const CachedContact* ContactCache::find(std::uint64_t key) const noexcept {
     return at != points.end() && at->contact.key == key ? &*at : nullptr;
 }
 
-bool ContactCache::has_pair(std::uint64_t pair) const noexcept {
-    const auto at = std::lower_bound(
+std::vector<CachedContact>::const_iterator ContactCache::first_of(std::uint64_t pair) const noexcept {
+    return std::lower_bound(
         points.begin(), points.end(), pair,
         [](const CachedContact& cached, std::uint64_t k) { return pair_of(cached.contact) < k; });
+}
+
+bool ContactCache::has_pair(std::uint64_t pair) const noexcept {
+    const auto at = first_of(pair);
     return at != points.end() && pair_of(at->contact) == pair;
 }
 
 bool ContactCache::pressed(std::uint64_t pair) const noexcept {
-    auto at = std::lower_bound(
-        points.begin(), points.end(), pair,
-        [](const CachedContact& cached, std::uint64_t k) { return pair_of(cached.contact) < k; });
-    for (; at != points.end() && pair_of(at->contact) == pair; ++at)
+    for (auto at = first_of(pair); at != points.end() && pair_of(at->contact) == pair; ++at)
         if (at->normal > 0.0 && !(at->impact > 0.0)) return true;
     return false;
 }

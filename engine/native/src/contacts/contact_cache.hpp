@@ -35,6 +35,8 @@ struct ContactCache {
     bool has_pair(std::uint64_t pair) const noexcept;
     /// Whether that pair rested on each other in the last step, without an impact.
     bool pressed(std::uint64_t pair) const noexcept;
+    /// The first point of that pair, or where it would be.
+    std::vector<CachedContact>::const_iterator first_of(std::uint64_t pair) const noexcept;
 
     /// What such bodies touch is put by, or taken up again. `bodies`: of the scene.
     void put_to_sleep(const std::vector<int>& sleepers, std::size_t bodies);

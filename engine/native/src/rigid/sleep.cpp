@@ -111,7 +111,7 @@ double Sleeping::surface_speed(int i) const noexcept {
 
 /// Whether a body was slower in the step than what sleeps may be, and is not about to move: what falls is slow at first, so
 /// half of its load must have been held, and so is what starts to roll or swing, so it must be no faster than it was when
-/// it began to be slow. What is gets faster begins anew.
+/// it began to be slow. What gets faster begins anew.
 bool Sleeping::still(int i) noexcept {
     const Vec3 load = model_.h * forces_.acceleration(i);
     const Vec3 gained = live_.bodies[i].velocity - start_places_[i].velocity;
