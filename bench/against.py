@@ -27,7 +27,8 @@ import bench.bench_heaps as heaps
 import bench.bench_particles as scenes
 import bench.bench_smooth as smooth
 from spook_tracker.engine import Box, Distance, Method, Particle, Scene, Spring, compile
-from spook_tracker.scalar_tests import double_pendulum, rotating_box
+from spook_tracker.scalar_tests.oscillators import double_pendulum
+from spook_tracker.scalar_tests.rotation import rotating_box
 
 SLICE = 1e-3  # s
 STEP = 1e-3  # s of simulated time: a chain of 100 links at 1/60 s is beyond what its rows can hold

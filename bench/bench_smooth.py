@@ -30,9 +30,10 @@ from spook_tracker.engine import (
     simulate,
 )
 from spook_tracker.engine.find import find
-from spook_tracker.scalar_tests import spinning_top, swinging_door
 from spook_tracker.scalar_tests.case import Simulate
+from spook_tracker.scalar_tests.mechanisms import swinging_door
 from spook_tracker.scalar_tests.multibody import four_bars
+from spook_tracker.scalar_tests.rotation import spinning_top
 
 ORDER6, ORDER8 = Method(composition="order6"), Method(composition="order8")
 ROUNDS = 7

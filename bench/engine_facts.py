@@ -23,7 +23,7 @@ from functools import partial
 
 import numpy as np
 
-import spook_tracker.scalar_tests.pendulum.scene as pendulum
+import spook_tracker.scalar_tests.thesis.pendulum.scene as pendulum
 from spook_tracker.engine import (
     PLAIN,
     Ball,
@@ -41,14 +41,14 @@ from spook_tracker.engine import (
 )
 from spook_tracker.engine.find import find
 from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.scalar_tests.beam.scene import COUNT as BOXES
-from spook_tracker.scalar_tests.beam.scene import scene as beam
 from spook_tracker.scalar_tests.case import Example, Measurement, Metric, ScalarTest, Simulate
-from spook_tracker.scalar_tests.chain import LENGTH, MASS, hanging_chain, level_chain
-from spook_tracker.scalar_tests.door.scene import forces, least_norm_forces
-from spook_tracker.scalar_tests.inclined_plane.scene import scene as slope
-from spook_tracker.scalar_tests.resting_stack import EDGE
-from spook_tracker.scalar_tests.resting_stack import scene as stack
+from spook_tracker.scalar_tests.ropes.chain import LENGTH, MASS, hanging_chain, level_chain
+from spook_tracker.scalar_tests.stacks.resting_stack import EDGE
+from spook_tracker.scalar_tests.stacks.resting_stack import scene as stack
+from spook_tracker.scalar_tests.thesis.beam.scene import COUNT as BOXES
+from spook_tracker.scalar_tests.thesis.beam.scene import scene as beam
+from spook_tracker.scalar_tests.thesis.door.scene import forces, least_norm_forces
+from spook_tracker.scalar_tests.thesis.inclined_plane.scene import scene as slope
 
 TIME_STEP = 1.0 / 60.0  # s
 LINKS, SWING = 26, 22.0  # s, as long as the thesis lets its chain swing

@@ -40,7 +40,7 @@ from spook_tracker.engine import (
     simulate,
 )
 from spook_tracker.engine.joints import Constraint
-from spook_tracker.scalar_tests import scissor_lift
+from spook_tracker.scalar_tests.mechanisms import scissor_lift
 
 COUNT = 4500
 STEP = 1 / 480  # s

@@ -2,7 +2,7 @@
 
     python bench/piles.py [--largest 10000] [--no-ladder]
 
-Each pile is asked what the nightly's pile of 1000 is asked (`scalar_tests/pile.py`): deepest overlap, load on the
+Each pile is asked what the nightly's pile of 1000 is asked (`scalar_tests/stacks/pile.py`): deepest overlap, load on the
 floor, energy that never rises. What the floor shall carry is found beside it on springs and dashpots
 (`tests/oracles/pile.py`). The ladder of each size runs over sweeps and substeps, that of 1000 over solvers, too; its
 errors are overlap and missing load, and each of its rungs must have an answer, a load as of springs, and no rise of the
@@ -23,7 +23,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent))
 
 from spook_tracker.engine import Method, SimulationFailed, simulate
-from spook_tracker.scalar_tests import pile
+from spook_tracker.scalar_tests.stacks import pile
 from tests.oracles.pile import missing_loads
 
 SIZES = (1000, 10_000)

@@ -31,9 +31,9 @@ sys.path.insert(0, str(Path(__file__).parent.parent))
 from spook_tracker.engine import PLAIN, Final, Position, Scene, prepare
 from spook_tracker.engine.find import OURS, EngineMissing, find
 from spook_tracker.engine.protocol import NotSupported, Task, refuse_unsupported
-from spook_tracker.scalar_tests import resting_grid
-from spook_tracker.scalar_tests.inclined_plane import slope_grid
-from spook_tracker.scalar_tests.pendulum import scene as pendulum
+from spook_tracker.scalar_tests.stacks import resting_grid
+from spook_tracker.scalar_tests.thesis.inclined_plane import slope_grid
+from spook_tracker.scalar_tests.thesis.pendulum import scene as pendulum
 
 COUNTS = (1, 16, 256, 4096)
 STEPS_A_SECOND = (60, 240, 1000)

@@ -50,14 +50,16 @@ What cannot be simulated is refused with one sentence, and a run that goes wrong
     spook_tracker.engine.errors.SceneError: particle 'ghost': mass must be positive, not 0
 """
 
-from spook_tracker.engine.bodies import WORLD, Body, Material, PairFriction, Particle, RigidBody
-from spook_tracker.engine.build_info import BuildInfo, build_info
-from spook_tracker.engine.compiler import compile, explain
-from spook_tracker.engine.couplings import Relation, Wire
-from spook_tracker.engine.errors import EngineError, MethodError, SceneError
-from spook_tracker.engine.forces import CentralGravity, Fluid, Load, Spring
-from spook_tracker.engine.helpers import axis_angle, bar, gear_pair
-from spook_tracker.engine.joints import (
+from spook_tracker.misuse import explain_misuse
+
+from .bodies import WORLD, Body, Material, PairFriction, Particle, RigidBody
+from .build_info import BuildInfo, build_info
+from .compiler import compile, explain
+from .couplings import Relation, Wire
+from .errors import EngineError, MethodError, SceneError
+from .forces import CentralGravity, Fluid, Load, Spring
+from .helpers import axis_angle, bar, gear_pair
+from .joints import (
     Ball,
     Cylindrical,
     Distance,
@@ -71,9 +73,9 @@ from spook_tracker.engine.joints import (
     Prismatic,
     Universal,
 )
-from spook_tracker.engine.meshes import HeightField, TriangleMesh
-from spook_tracker.engine.method import PLAIN, Method
-from spook_tracker.engine.observe import (
+from .meshes import HeightField, TriangleMesh
+from .method import PLAIN, Method
+from .observe import (
     AngularMomentum,
     AngularVelocity,
     ConstraintForce,
@@ -97,11 +99,11 @@ from spook_tracker.engine.observe import (
     Velocity,
     Violation,
 )
-from spook_tracker.engine.program import Program, StageChoice
-from spook_tracker.engine.result import Books, Broken, Result, SimulationFailed
-from spook_tracker.engine.run import Run, start
-from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.shapes import (
+from .program import Program, StageChoice
+from .result import Books, Broken, Result, SimulationFailed
+from .run import Run, start
+from .scene import Scene
+from .shapes import (
     Box,
     Capsule,
     Compound,
@@ -114,11 +116,10 @@ from spook_tracker.engine.shapes import (
     Shape,
     Sphere,
 )
-from spook_tracker.engine.simulation import Prepared, prepare, simulate
-from spook_tracker.engine.snapshot import Snapshot
-from spook_tracker.engine.time_functions import Ramp, Sinusoid, Table, TimeFunction
-from spook_tracker.engine.tyres import Tyre
-from spook_tracker.misuse import explain_misuse
+from .simulation import Prepared, prepare, simulate
+from .snapshot import Snapshot
+from .time_functions import Ramp, Sinusoid, Table, TimeFunction
+from .tyres import Tyre
 
 __all__ = [
     "PLAIN",

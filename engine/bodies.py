@@ -7,11 +7,11 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from spook_tracker.engine import check, polytope
-from spook_tracker.engine.check import Rotation, Vector
-from spook_tracker.engine.errors import SceneError
-from spook_tracker.engine.shapes import Plane, Shape
-from spook_tracker.engine.time_functions import TimeFunction, at_start, number_or_function
+from . import check, polytope
+from .check import Rotation, Vector
+from .errors import SceneError
+from .shapes import Plane, Shape
+from .time_functions import TimeFunction, at_start, number_or_function
 
 WIDEST_FRICTION = 1000.0  # times, between friction along a direction and across it: thirty for a pair
 WORLD = "world"  # the name that stands for the fixed world at one end of a constraint

@@ -23,13 +23,13 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from spook_tracker.engine.bodies import Particle, RigidBody
-from spook_tracker.engine.check import Vector
-from spook_tracker.engine.couplings import Wire
-from spook_tracker.engine.forces import Fluid, Load, Spring
-from spook_tracker.engine.joints import AxialJoint, Hinge, Joint, frictions
-from spook_tracker.engine.method import Method
-from spook_tracker.engine.observe import (
+from .bodies import Particle, RigidBody
+from .check import Vector
+from .couplings import Wire
+from .forces import Fluid, Load, Spring
+from .joints import AxialJoint, Hinge, Joint, frictions
+from .method import Method
+from .observe import (
     AngularVelocity,
     ConstraintForce,
     ContactCount,
@@ -42,9 +42,9 @@ from spook_tracker.engine.observe import (
     Trace,
     Velocity,
 )
-from spook_tracker.engine.result import Books, Result
-from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.tyres import Tyre
+from .result import Books, Result
+from .scene import Scene
+from .tyres import Tyre
 
 Array = npt.NDArray[np.float64]
 MOST_MADE = 0.05  # of the largest kinetic energy, as energy_made.hpp has it

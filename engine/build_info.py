@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from spook_tracker.engine import _core
+from . import _core
 
 
 @dataclass(frozen=True, slots=True)

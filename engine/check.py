@@ -7,7 +7,7 @@ import operator
 from collections.abc import Iterable
 from typing import Any
 
-from spook_tracker.engine.errors import MethodError, SceneError
+from .errors import MethodError, SceneError
 
 Vector = tuple[float, float, float]
 Rotation = tuple[float, float, float, float]  # unit quaternion (w, x, y, z), body to world

@@ -7,17 +7,18 @@ import sys
 from collections.abc import Mapping
 from types import MappingProxyType
 
-from spook_tracker.engine.bodies import Particle
-from spook_tracker.engine.errors import MethodError, SceneError
-from spook_tracker.engine.forces import Fluid, Load
-from spook_tracker.engine.joints import Distance
-from spook_tracker.engine.method import DEFAULT, Method
-from spook_tracker.engine.observe import Observable
-from spook_tracker.engine.particle_program import compile_particles
-from spook_tracker.engine.program import Program, StageChoice
-from spook_tracker.engine.rigid_program import compile_rigid
-from spook_tracker.engine.scene import Scene
 from spook_tracker.misuse import explained
+
+from .bodies import Particle
+from .errors import MethodError, SceneError
+from .forces import Fluid, Load
+from .joints import Distance
+from .method import DEFAULT, Method
+from .observe import Observable
+from .particle_program import compile_particles
+from .program import Program, StageChoice
+from .rigid_program import compile_rigid
+from .scene import Scene
 
 NOTHING: Mapping[str, Observable] = MappingProxyType({})
 

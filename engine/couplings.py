@@ -11,10 +11,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from spook_tracker.engine import check
-from spook_tracker.engine.bodies import WORLD
-from spook_tracker.engine.check import Vector
-from spook_tracker.engine.errors import SceneError
+from . import check
+from .bodies import WORLD
+from .check import Vector
+from .errors import SceneError
 
 COMPLIANCE = (
     1e-8  # m/N and rad/(N m) of every constraint, where none is given: docs/explanation/compliance.md

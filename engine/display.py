@@ -11,11 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
-from spook_tracker.engine.errors import EngineError
+from .errors import EngineError
 
 if TYPE_CHECKING:
-    from spook_tracker.engine.result import Result
-    from spook_tracker.engine.scene import Scene
+    from .result import Result
+    from .scene import Scene
 
 GROUP = "spook_tracker.display"
 

@@ -18,12 +18,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.errors import EngineError
-from spook_tracker.engine.observe import Observable
-from spook_tracker.engine.protocol import Adapter, Configuration, run
-from spook_tracker.engine.result import Result
-from spook_tracker.engine.scene import Scene
+from .build_info import BuildInfo
+from .errors import EngineError
+from .observe import Observable
+from .protocol import Adapter, Configuration, run
+from .result import Result
+from .scene import Scene
 
 OURS = ("spook", "engine")
 GROUP = "spook_tracker.engines"

@@ -6,11 +6,11 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from spook_tracker.engine import check
-from spook_tracker.engine.bodies import WORLD
-from spook_tracker.engine.check import Vector
-from spook_tracker.engine.errors import SceneError
-from spook_tracker.engine.time_functions import TimeFunction
+from . import check
+from .bodies import WORLD
+from .check import Vector
+from .errors import SceneError
+from .time_functions import TimeFunction
 
 End = str | Vector  # a body's name, or a fixed point of the world [m]
 ORIGIN: Vector = (0.0, 0.0, 0.0)

@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from spook_tracker.engine import check
-from spook_tracker.engine.bodies import RigidBody
-from spook_tracker.engine.check import Rotation, Vector
-from spook_tracker.engine.couplings import Relation
-from spook_tracker.engine.errors import SceneError
-from spook_tracker.engine.shapes import Box, Capsule, Shape
 from spook_tracker.misuse import explained
+
+from . import check
+from .bodies import RigidBody
+from .check import Rotation, Vector
+from .couplings import Relation
+from .errors import SceneError
+from .shapes import Box, Capsule, Shape
 
 
 @explained

@@ -6,12 +6,12 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from spook_tracker.engine.couplings import Relation, Wire
-from spook_tracker.engine.joints import AxialJoint, frictions
-from spook_tracker.engine.program import table
-from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.time_functions import at_start
-from spook_tracker.engine.tyres import Tyre
+from .couplings import Relation, Wire
+from .joints import AxialJoint, frictions
+from .program import table
+from .scene import Scene
+from .time_functions import at_start
+from .tyres import Tyre
 
 
 def drives(scene: Scene, step: float) -> dict[str, Any]:

@@ -16,13 +16,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
-from spook_tracker.engine import check
-from spook_tracker.engine.check import Vector
-from spook_tracker.engine.couplings import COMPLIANCE, Relation, Wire
-from spook_tracker.engine.errors import SceneError
-from spook_tracker.engine.forces import ORIGIN, End, check_ends, check_held
-from spook_tracker.engine.time_functions import TimeFunction, least, number_or_function
-from spook_tracker.engine.tyres import Tyre
+from . import check
+from .check import Vector
+from .couplings import COMPLIANCE, Relation, Wire
+from .errors import SceneError
+from .forces import ORIGIN, End, check_ends, check_held
+from .time_functions import TimeFunction, least, number_or_function
+from .tyres import Tyre
 
 PerDegree = float | tuple[float, ...]
 

@@ -10,10 +10,10 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
-from spook_tracker.engine import check, polytope
-from spook_tracker.engine.check import Vector
-from spook_tracker.engine.errors import SceneError
-from spook_tracker.engine.shapes import Shape
+from . import check, polytope
+from .check import Vector
+from .errors import SceneError
+from .shapes import Shape
 
 MOST_TRIANGLES = 1_000_000
 MOST_DRAWN = 2000

@@ -9,11 +9,11 @@ import warnings
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
-from spook_tracker.engine.check import entries, one_of
-from spook_tracker.engine.errors import MethodError
+from .check import entries, one_of
+from .errors import MethodError
 
 if TYPE_CHECKING:
-    from spook_tracker.engine.scene import Scene
+    from .scene import Scene
 
 STAGES_THAT_CAN_BE_FORCED = {  # as it is asked for: the stage that comes
     "collision": "collision",

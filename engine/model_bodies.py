@@ -9,8 +9,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from xml.etree import ElementTree
 
-from spook_tracker.engine.errors import EngineError
-from spook_tracker.engine.model_file import Watched
+from .errors import EngineError
+from .model_file import Watched
 
 DEEPEST = 200  # elements within elements, bodies that hang from bodies; engines read models recursively
 MOVES_URDF = (

@@ -9,7 +9,7 @@ from xml.parsers import expat
 
 import numpy as np
 
-from spook_tracker.engine.model_bodies import ModelError
+from .model_bodies import ModelError
 
 ENTITIES = "declares XML entities, which no model needs; write out what they stand for"
 MOST_POINTS = 50_000_000  # of a picture, which takes some thirty bytes a point while it is read

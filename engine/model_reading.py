@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from xml.etree import ElementTree
 
-from spook_tracker.engine.model_bodies import (
+from .model_bodies import (
     DEEPEST,
     Body,
     ModelError,
@@ -27,10 +27,10 @@ from spook_tracker.engine.model_bodies import (
     product_of,
     urdf_bodies,
 )
-from spook_tracker.engine.model_file import Format, Watched
-from spook_tracker.engine.model_masses import wrong_mass
-from spook_tracker.engine.model_meshes import ENTITIES, harm_in
-from spook_tracker.engine.model_parts import attach, settle_joint_types
+from .model_file import Format, Watched
+from .model_masses import wrong_mass
+from .model_meshes import ENTITIES, harm_in
+from .model_parts import attach, settle_joint_types
 
 MOST_BYTES = 64_000_000  # of one file; the largest mesh of the robots people share has a third of that
 MOST_XML = 16_000_000  # bytes of a file that is read as text: elements take ten times their text in memory

@@ -11,8 +11,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from spook_tracker.engine.check import Vector, vector
-from spook_tracker.engine.errors import MethodError, SceneError
+from .check import Vector, vector
+from .errors import MethodError, SceneError
 
 MOST_POINTS = 100_000  # of one observation: 8 MB a sample
 

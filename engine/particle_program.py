@@ -8,17 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import _core
-from spook_tracker.engine.errors import MethodError
-from spook_tracker.engine.forces import CentralGravity, End, Load, Spring
-from spook_tracker.engine.joints import Distance
-from spook_tracker.engine.method import Method
-from spook_tracker.engine.observe import Observable
-from spook_tracker.engine.program import Program, observations, table
-from spook_tracker.engine.quantities import requests
-from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.smooth import check_smooth
-from spook_tracker.engine.watch import in_time, time_left
+from . import _core
+from .errors import MethodError
+from .forces import CentralGravity, End, Load, Spring
+from .joints import Distance
+from .method import Method
+from .observe import Observable
+from .program import Program, observations, table
+from .quantities import requests
+from .scene import Scene
+from .smooth import check_smooth
+from .watch import in_time, time_left
 
 _ORIGIN = (0.0, 0.0, 0.0)
 

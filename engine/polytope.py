@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from spook_tracker.engine.check import Rotation, Vector
+from .check import Rotation, Vector
 
 MOST_CORNERS = 64
 MOST_ROUND_A_FACE = 16

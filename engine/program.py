@@ -13,10 +13,10 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from spook_tracker.engine import _core, check
-from spook_tracker.engine.errors import MethodError
-from spook_tracker.engine.observe import Final, Maximum, MaximumAbsolute, Mean, Minimum, Observable, Trace
-from spook_tracker.engine.result import Array, Broken, Result
+from . import _core, check
+from .errors import MethodError
+from .observe import Final, Maximum, MaximumAbsolute, Mean, Minimum, Observable, Trace
+from .result import Array, Broken, Result
 
 MOST_NAMED = 8  # joints in one failure
 _REDUCTIONS: dict[type[Observable], str] = {

@@ -17,15 +17,15 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 import numpy.typing as npt
 
-from spook_tracker.engine.bodies import Particle, RigidBody
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.compiler import NOTHING
-from spook_tracker.engine.errors import EngineError, MethodError
-from spook_tracker.engine.forces import Force, Spring
-from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Joint, frictions
-from spook_tracker.engine.method import DEFAULT, Method
-from spook_tracker.engine.model_file import ModelRun
-from spook_tracker.engine.observe import (
+from .bodies import Particle, RigidBody
+from .build_info import BuildInfo
+from .compiler import NOTHING
+from .errors import EngineError, MethodError
+from .forces import Force, Spring
+from .joints import AxialJoint, Constraint, Distance, Joint, frictions
+from .method import DEFAULT, Method
+from .model_file import ModelRun
+from .observe import (
     ConstraintForce,
     ContactCount,
     ContactForce,
@@ -36,16 +36,16 @@ from spook_tracker.engine.observe import (
     Quantity,
     Violation,
 )
-from spook_tracker.engine.recording import (
+from .recording import (
     Recording,
     hinges_counted,
     needs_every_step,
     observed,
     wanted_samples,
 )
-from spook_tracker.engine.result import Result
-from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.shapes import Compound, Shape
+from .result import Result
+from .scene import Scene
+from .shapes import Compound, Shape
 
 RIGID = 1e-8  # m/N or rad/(N m): a softer row is a spring, which an engine must be able to hold as such
 NOWHERE = frozenset({"restitution of the slip"})  # no engine here has it

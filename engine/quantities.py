@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from spook_tracker.engine import _core
-from spook_tracker.engine.bodies import Body, Particle
-from spook_tracker.engine.check import Vector, unknown
-from spook_tracker.engine.couplings import Relation, Wire
-from spook_tracker.engine.errors import MethodError
-from spook_tracker.engine.joints import AxialJoint, Constraint, Distance
-from spook_tracker.engine.observe import (
+from . import _core
+from .bodies import Body, Particle
+from .check import Vector, unknown
+from .couplings import Relation, Wire
+from .errors import MethodError
+from .joints import AxialJoint, Constraint, Distance
+from .observe import (
     AngularMomentum,
     AngularVelocity,
     ConstraintForce,
@@ -30,8 +30,8 @@ from spook_tracker.engine.observe import (
     Velocity,
     Violation,
 )
-from spook_tracker.engine.program import distinct_quantities
-from spook_tracker.engine.scene import Scene
+from .program import distinct_quantities
+from .scene import Scene
 
 Shape = tuple[int, ...]
 

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, RigidBody
-from spook_tracker.engine.couplings import Relation, Wire
-from spook_tracker.engine.errors import MethodError
-from spook_tracker.engine.joints import (
+from .bodies import WORLD, RigidBody
+from .couplings import Relation, Wire
+from .errors import MethodError
+from .joints import (
     AxialJoint,
     Ball,
     Constraint,
@@ -20,10 +20,10 @@ from spook_tracker.engine.joints import (
     Prismatic,
     Universal,
 )
-from spook_tracker.engine.result import Array
-from spook_tracker.engine.rigid_program import normals
-from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.tyres import Tyre
+from .result import Array
+from .rigid_program import normals
+from .scene import Scene
+from .tyres import Tyre
 
 
 def cross(a: Array, b: Array) -> Array:

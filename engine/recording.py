@@ -12,13 +12,13 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from spook_tracker.engine import recorded_joints
-from spook_tracker.engine.bodies import Particle, RigidBody
-from spook_tracker.engine.check import unknown
-from spook_tracker.engine.errors import MethodError
-from spook_tracker.engine.forces import CentralGravity, Spring
-from spook_tracker.engine.joints import AxialJoint, Distance, Hinge
-from spook_tracker.engine.observe import (
+from . import recorded_joints
+from .bodies import Particle, RigidBody
+from .check import unknown
+from .errors import MethodError
+from .forces import CentralGravity, Spring
+from .joints import AxialJoint, Distance, Hinge
+from .observe import (
     AngularMomentum,
     AngularVelocity,
     ConstraintForce,
@@ -43,9 +43,9 @@ from spook_tracker.engine.observe import (
     Velocity,
     Violation,
 )
-from spook_tracker.engine.recorded_joints import cross, turned, turned_back
-from spook_tracker.engine.result import Array, Status
-from spook_tracker.engine.scene import Scene
+from .recorded_joints import cross, turned, turned_back
+from .result import Array, Status
+from .scene import Scene
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

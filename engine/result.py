@@ -13,12 +13,12 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from spook_tracker.engine.display import Figure, Shown, display, framed
-from spook_tracker.engine.errors import EngineError
+from .display import Figure, Shown, display, framed
+from .errors import EngineError
 
 if TYPE_CHECKING:
-    from spook_tracker.engine.method import Method
-    from spook_tracker.engine.scene import Scene
+    from .method import Method
+    from .scene import Scene
 
 Status = Literal["completed", "unsettled", "diverged", "not_finite", "timed_out"]
 Array = npt.NDArray[np.float64]

@@ -17,14 +17,14 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import _core
-from spook_tracker.engine.bodies import Particle, RigidBody
-from spook_tracker.engine.check import Vector
-from spook_tracker.engine.couplings import Relation, Wire
-from spook_tracker.engine.errors import MethodError
-from spook_tracker.engine.forces import CentralGravity, Fluid, Load, Spring
-from spook_tracker.engine.joint_tables import couplings, drives, or_default
-from spook_tracker.engine.joints import (
+from . import _core
+from .bodies import Particle, RigidBody
+from .check import Vector
+from .couplings import Relation, Wire
+from .errors import MethodError
+from .forces import CentralGravity, Fluid, Load, Spring
+from .joint_tables import couplings, drives, or_default
+from .joints import (
     AxialJoint,
     Constraint,
     Distance,
@@ -32,17 +32,17 @@ from spook_tracker.engine.joints import (
     Joint,
     Universal,
 )
-from spook_tracker.engine.method import Method
-from spook_tracker.engine.observe import Observable
-from spook_tracker.engine.particle_program import ends
-from spook_tracker.engine.program import Program, observations, table
-from spook_tracker.engine.quantities import requests
-from spook_tracker.engine.scene import Scene, wire_length
-from spook_tracker.engine.smooth import check_rigid, check_trees, check_wide_rows
-from spook_tracker.engine.surface_tables import Outlined, hull_tables, surfaces
-from spook_tracker.engine.time_functions import Ramp, Sinusoid, TimeFunction
-from spook_tracker.engine.tyres import Tyre
-from spook_tracker.engine.watch import in_time, time_left
+from .method import Method
+from .observe import Observable
+from .particle_program import ends
+from .program import Program, observations, table
+from .quantities import requests
+from .scene import Scene, wire_length
+from .smooth import check_rigid, check_trees, check_wide_rows
+from .surface_tables import Outlined, hull_tables, surfaces
+from .time_functions import Ramp, Sinusoid, TimeFunction
+from .tyres import Tyre
+from .watch import in_time, time_left
 
 _MOTIONS = {"dynamic": "dynamic", "static": "fixed", "kinematic": "kinematic"}
 _ORIGIN: Vector = (0.0, 0.0, 0.0)

@@ -26,21 +26,22 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine import check
-from spook_tracker.engine.bodies import RigidBody
-from spook_tracker.engine.check import Vector
-from spook_tracker.engine.compiler import compile
-from spook_tracker.engine.errors import MethodError, SceneError
-from spook_tracker.engine.forces import Load
-from spook_tracker.engine.joints import AxialJoint, Motor
-from spook_tracker.engine.method import DEFAULT, Method
-from spook_tracker.engine.observe import Final, Quantity
-from spook_tracker.engine.program import Program
-from spook_tracker.engine.result import Array, Result, SimulationFailed
-from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.snapshot import Snapshot
-from spook_tracker.engine.time_functions import at_start
 from spook_tracker.misuse import explained
+
+from . import check
+from .bodies import RigidBody
+from .check import Vector
+from .compiler import compile
+from .errors import MethodError, SceneError
+from .forces import Load
+from .joints import AxialJoint, Motor
+from .method import DEFAULT, Method
+from .observe import Final, Quantity
+from .program import Program
+from .result import Array, Result, SimulationFailed
+from .scene import Scene
+from .snapshot import Snapshot
+from .time_functions import at_start
 
 A_LITTLE = 0.04  # s: to read a run in whose time is over
 ROUNDING = 1e-12  # of the length of a quaternion that came out of a run

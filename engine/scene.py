@@ -8,16 +8,16 @@ import statistics
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from spook_tracker.engine import check
-from spook_tracker.engine.bodies import WORLD, Body, PairFriction, Particle, RigidBody
-from spook_tracker.engine.check import Vector, unknown
-from spook_tracker.engine.couplings import Relation, Wire
-from spook_tracker.engine.display import display, framed
-from spook_tracker.engine.errors import EngineError, SceneError
-from spook_tracker.engine.forces import CentralGravity, Fluid, Force, Load, Spring
-from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Hinge, Joint
-from spook_tracker.engine.time_functions import TimeFunction
-from spook_tracker.engine.tyres import Tyre
+from . import check
+from .bodies import WORLD, Body, PairFriction, Particle, RigidBody
+from .check import Vector, unknown
+from .couplings import Relation, Wire
+from .display import display, framed
+from .errors import EngineError, SceneError
+from .forces import CentralGravity, Fluid, Force, Load, Spring
+from .joints import AxialJoint, Constraint, Distance, Hinge, Joint
+from .time_functions import TimeFunction
+from .tyres import Tyre
 
 
 def _unique(kind: str, names: Iterable[str]) -> None:

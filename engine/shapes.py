@@ -11,9 +11,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple
 
-from spook_tracker.engine import check, polytope
-from spook_tracker.engine.check import Rotation, Vector
-from spook_tracker.engine.errors import SceneError
+from . import check, polytope
+from .check import Rotation, Vector
+from .errors import SceneError
 
 
 class Shape(ABC):

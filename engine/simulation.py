@@ -10,19 +10,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from spook_tracker.engine import check
-from spook_tracker.engine.books import kept, traces
-from spook_tracker.engine.compiler import NOTHING, compile
-from spook_tracker.engine.errors import MethodError
-from spook_tracker.engine.method import DEFAULT, Method
-from spook_tracker.engine.model_file import ModelRun
-from spook_tracker.engine.observe import Observable, Trace
-from spook_tracker.engine.program import Program
-from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.engine.result import Origin, Result
-from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.watch import until
 from spook_tracker.misuse import explained
+
+from . import check
+from .books import kept, traces
+from .compiler import NOTHING, compile
+from .errors import MethodError
+from .method import DEFAULT, Method
+from .model_file import ModelRun
+from .observe import Observable, Trace
+from .program import Program
+from .protocol import NotSupported
+from .result import Origin, Result
+from .scene import Scene
+from .watch import until
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,7 +140,7 @@ def _of_model(
 ) -> Result:
     """A model file as a scene, where MuJoCo is installed to read it."""
     try:
-        from spook_tracker.engine.peers.spook_file import READS, run_model
+        from .peers.spook_file import READS, run_model
     except ImportError as error:
         raise NotSupported(
             f"spook reads model files by MuJoCo's parser, which is not installed ({error}); "

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import math
 
-from spook_tracker.engine.bodies import WORLD, RigidBody
-from spook_tracker.engine.couplings import Relation, Wire
-from spook_tracker.engine.errors import MethodError
-from spook_tracker.engine.forces import Fluid, Load, Spring
-from spook_tracker.engine.joints import AxialJoint, Constraint, Distance, Joint, Universal, frictions
-from spook_tracker.engine.method import Method
-from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.time_functions import TimeFunction
-from spook_tracker.engine.tyres import Tyre
+from .bodies import WORLD, RigidBody
+from .couplings import Relation, Wire
+from .errors import MethodError
+from .forces import Fluid, Load, Spring
+from .joints import AxialJoint, Constraint, Distance, Joint, Universal, frictions
+from .method import Method
+from .scene import Scene
+from .time_functions import TimeFunction
+from .tyres import Tyre
 
 RIGID = 1e-7  # m/N or rad/(N m), the softest row a composition takes for rigid
 MOST_IN_TREES = 2000  # bodies

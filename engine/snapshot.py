@@ -8,10 +8,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from spook_tracker.engine import _core
-from spook_tracker.engine.build_info import build_info
-from spook_tracker.engine.errors import MethodError
-from spook_tracker.engine.result import Result
+from . import _core
+from .build_info import build_info
+from .errors import MethodError
+from .result import Result
 
 FORMAT = 1
 # For all formats: these letters, the format in two bytes, SHA-256 of what comes before and behind it, and the content.

@@ -23,10 +23,10 @@ from typing import ClassVar, Protocol
 
 import numpy as np
 
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.result import Array
+from .build_info import BuildInfo
+from .protocol import Capabilities, Configuration, NotSupported, Task
+from .recording import Recording
+from .result import Array
 
 __all__ = ["Capabilities", "Configuration", "NotSupported", "Stepped", "Task", "World", "of_checkout"]
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from spook_tracker.engine.bodies import RigidBody
-from spook_tracker.engine.meshes import HeightField, TriangleMesh
-from spook_tracker.engine.program import table
-from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.shapes import Compound, ConvexHull
+from .bodies import RigidBody
+from .meshes import HeightField, TriangleMesh
+from .program import table
+from .scene import Scene
+from .shapes import Compound, ConvexHull
 
 Outlined = ConvexHull | TriangleMesh | HeightField  # has corners and faces
 ORIGIN = (0.0, 0.0, 0.0)

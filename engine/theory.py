@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.result import Array
+from .result import Array
 
 
 @dataclass(frozen=True, slots=True)

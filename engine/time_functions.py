@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from spook_tracker.engine import check
-from spook_tracker.engine.errors import SceneError
+from . import check
+from .errors import SceneError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from spook_tracker.engine import check
-from spook_tracker.engine.bodies import WORLD
-from spook_tracker.engine.check import Vector
-from spook_tracker.engine.errors import SceneError
+from . import check
+from .bodies import WORLD
+from .check import Vector
+from .errors import SceneError
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

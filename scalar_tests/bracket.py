@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 
 from spook_tracker import engine
-from spook_tracker.scalar_tests import case
+
+from . import case
 
 WALK = 12  # grid values between easy and hard
 GROWTH = 2.0  # a quantity that doubles from the middle third of a run to the last is growing

@@ -10,11 +10,10 @@ from dataclasses import replace
 from functools import cache
 from importlib import import_module
 
-from spook_tracker.scalar_tests import case
+from . import case
 
-TOPICS: dict[
-    str, dict[str, str]
-] = {  # topic: name of each of its tests, and the module that holds it as TEST
+# topic: name of each of its tests, and the module of the topic's folder that holds it as TEST
+TOPICS: dict[str, dict[str, str]] = {
     "thesis": {
         "beam": "beam.question",
         "door": "door.question",
@@ -34,8 +33,8 @@ TOPICS: dict[
         "oscillator_damped": "oscillator.damped",
         "oscillator_filter": "oscillator.filter",
         "double_pendulum": "double_pendulum",
-        "bar_pendulum": "measured.bar_pendulum",
-        "seconds_pendulum": "measured.seconds_pendulum",
+        "bar_pendulum": "bar_pendulum",
+        "seconds_pendulum": "seconds_pendulum",
     },
     "impacts": {
         "bouncing_ball": "bouncing_ball",
@@ -45,8 +44,8 @@ TOPICS: dict[
         "billiards": "billiards",
         "cradle": "cradle",
         "near_miss": "near_miss",
-        "oblique_impact": "measured.oblique_impact",
-        "last_bounce": "measured.last_bounce",
+        "oblique_impact": "oblique_impact",
+        "last_bounce": "last_bounce",
     },
     "stacks and piles": {
         "solver_options": "solver_options",
@@ -84,7 +83,7 @@ TOPICS: dict[
         "spinning_top": "spinning_top",
         "rolling_coin": "rolling_coin",
         "bowl": "bowl",
-        "rolling_beats": "measured.rolling_beats",
+        "rolling_beats": "rolling_beats",
     },
     "mechanisms": {
         "swinging_door": "swinging_door",
@@ -126,14 +125,19 @@ TOPICS: dict[
         "humanoid": "humanoid",
     },
     "multibody library": {
-        "simple_pendulum": "multibody.simple_pendulum",
-        "four_bars": "multibody.four_bars",
-        "squeezer": "multibody.squeezer",
-        "bricard": "multibody.bricard",
-        "governor": "multibody.governor",
+        "simple_pendulum": "simple_pendulum",
+        "four_bars": "four_bars",
+        "squeezer": "squeezer",
+        "bricard": "bricard",
+        "governor": "governor",
     },
 }
-QUESTIONS = {name: module for tests in TOPICS.values() for name, module in tests.items()}
+FOLDERS = {"stacks and piles": "stacks", "ropes and wires": "ropes", "multibody library": "multibody"}
+QUESTIONS = {
+    name: f"{FOLDERS.get(topic, topic)}.{module}"
+    for topic, tests in TOPICS.items()
+    for name, module in tests.items()
+}
 TOPIC = {name: topic for topic, tests in TOPICS.items() for name in tests}
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from spook_tracker.scalar_tests import case
+from . import case
 
 ROUNDING = "closed form; rounding and the solver's tolerance remain"
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from spook_tracker.engine.method import PLAIN, Method
-from spook_tracker.scalar_tests import case
+
+from . import case
 
 METHODS = {
     **dict.fromkeys(("plain", "direct"), PLAIN),

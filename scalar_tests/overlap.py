@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from spook_tracker import engine
-from spook_tracker.scalar_tests import case
-from spook_tracker.scalar_tests.configurations import configured
+
+from . import case
+from .configurations import configured
 
 ARC = np.linspace(0.0, 0.5 * np.pi, 17)[1:-1]  # rad, of directions between two faces
 AROUND = np.linspace(0.0, 2.0 * np.pi, 9)[:-1]  # rad, where else a direction is tried

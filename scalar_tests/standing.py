@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from spook_tracker import engine
-from spook_tracker.scalar_tests import case
-from spook_tracker.scalar_tests.closed_form import error
+
+from . import case
+from .closed_form import error
 
 GRAVITY = 9.81  # m/s²
 STRAYED = 5e-3  # m, of a body that does no longer stand where it stood

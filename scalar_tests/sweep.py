@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from spook_tracker.engine.result import SimulationFailed
-from spook_tracker.scalar_tests import case
+
+from . import case
 
 
 def sweep(values: Iterable[float], measure: Callable[[float], float]) -> tuple[float, ...]:

@@ -1,4 +1,4 @@
-"""Imports are such as tools can follow: no circles, not even through functions, and relative within a room of the tracker.
+"""Imports are such as tools can follow: no circles, not even through functions, and relative within a room.
 
 The rooms are linked below `spook_tracker`: a name that is absolute there leads an editor away from the file that is open.
 """
@@ -60,21 +60,26 @@ def circle(texts: Sources) -> list[str]:
     return []
 
 
+def room_of(path: str) -> str:
+    """The engine and the scalar tests are a room each; the tracker has one a folder."""
+    folder = path.rpartition("/")[0]
+    return folder if path.startswith("tracker/") else path.partition("/")[0]
+
+
 def not_relative(texts: Sources) -> list[str]:
-    """Imports within a room of the tracker that are absolute, and relative ones that leave a room."""
+    """Imports within a room that are absolute, and relative ones that leave it."""
+    modules = {module_of(path): room_of(path) for path in texts}
     found = []
     for path, text in texts.items():
-        room = path.rpartition("/")[0]
-        for node in ast.walk(ast.parse(text)) if path.startswith("tracker/") else ():
-            if isinstance(node, ast.ImportFrom) and node.level > 1:
+        room = room_of(path)
+        below = path.removeprefix(room).count("/")
+        for node in ast.walk(ast.parse(text)):
+            if isinstance(node, ast.ImportFrom) and node.level > below:
                 found.append(f"{path}:{node.lineno}: say {ast.unparse(node)} absolutely")
             names = [alias.name for alias in node.names] if isinstance(node, ast.Import) else []
             if isinstance(node, ast.ImportFrom) and not node.level and node.module:
                 names = [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
-            inside = "spook_tracker." + room.replace("/", ".") + "."
-            if any(
-                f"{room}/{name.removeprefix(inside)}.py" in texts for name in names if name.startswith(inside)
-            ):
+            if any(modules.get(name) == room for name in names):
                 found.append(f"{path}:{node.lineno}: say {ast.unparse(node)} relatively")
     return found
 
@@ -117,18 +122,31 @@ def test_what_only_a_type_checker_reads_closes_no_circle() -> None:
     )
 
 
+TREE = ROOM | {
+    "engine/scene.py": "",
+    "engine/peers/jolt.py": "",
+    "scalar_tests/ropes/rope.py": "",
+    "scalar_tests/case.py": "",
+}
+
+
 @pytest.mark.parametrize(
-    ("line", "said"),
+    ("path", "line", "said"),
     [
-        ("from spook_tracker.tracker.store.git import tags", "relatively"),
-        ("from spook_tracker.tracker.store import git", "relatively"),
-        ("import spook_tracker.tracker.store.git as git", "relatively"),
-        ("from ..judge.lane import gather", "absolutely"),
-        ("from .git import tags", ""),
-        ("from spook_tracker.tracker.judge.lane import gather", ""),
+        ("tracker/store/head.py", "from spook_tracker.tracker.store.git import tags", "relatively"),
+        ("tracker/store/head.py", "from spook_tracker.tracker.store import git", "relatively"),
+        ("tracker/store/head.py", "import spook_tracker.tracker.store.git as git", "relatively"),
+        ("tracker/store/head.py", "from ..judge.lane import gather", "absolutely"),
+        ("tracker/store/head.py", "from .git import tags", ""),
+        ("tracker/store/head.py", "from spook_tracker.tracker.judge.lane import gather", ""),
+        ("engine/peers/jolt.py", "from spook_tracker.engine.scene import Scene", "relatively"),
+        ("engine/peers/jolt.py", "from ..scene import Scene", ""),
+        ("scalar_tests/ropes/rope.py", "from spook_tracker.scalar_tests import case", "relatively"),
+        ("scalar_tests/ropes/rope.py", "from ...engine.scene import Scene", "absolutely"),
+        ("scalar_tests/ropes/rope.py", "from spook_tracker.engine.scene import Scene", ""),
     ],
 )
-def test_a_planted_breach_of_the_form_is_seen(line: str, said: str) -> None:
-    found = not_relative(ROOM | {"tracker/store/head.py": f"def late():\n    {line}\n"})
+def test_a_planted_breach_of_the_form_is_seen(path: str, line: str, said: str) -> None:
+    found = not_relative(TREE | {path: f"def late():\n    {line}\n"})
 
     assert [one.rpartition(" ")[2] for one in found] == ([said] if said else [])

@@ -16,21 +16,21 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic
-from spook_tracker.engine.meshes import HeightField, TriangleMesh
-from spook_tracker.engine.observe import ConstraintForce, ContactCount, ContactForce, Penetration
-from spook_tracker.engine.peers.frames import drive, ends_of
-from spook_tracker.engine.peers.joint_tree import turn_of
-from spook_tracker.engine.peers.stepped import Kept, stepped
-from spook_tracker.engine.peers.surfaces import pairs_apart
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recorded_joints import product
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.result import Array
-from spook_tracker.engine.shapes import Box, Capsule, Compound, ConvexHull, Plane, Shape, Sphere
+from ..bodies import WORLD, Particle, RigidBody
+from ..build_info import BuildInfo
+from ..forces import CentralGravity, Load, Spring
+from ..joints import Ball, Distance, Hinge, Joint, Lock, Prismatic
+from ..meshes import HeightField, TriangleMesh
+from ..observe import ConstraintForce, ContactCount, ContactForce, Penetration
+from ..protocol import Capabilities, Configuration, NotSupported, Task
+from ..recorded_joints import product
+from ..recording import Recording
+from ..result import Array
+from ..shapes import Box, Capsule, Compound, ConvexHull, Plane, Shape, Sphere
+from .frames import drive, ends_of
+from .joint_tree import turn_of
+from .stepped import Kept, stepped
+from .surfaces import pairs_apart
 
 VERSION, COMMIT = "0.1.0", "30c67b5e6d0a3a66f0f506c69ce9e9e0587e3b7c"
 PLACE = Path("build/engines/box3d/libspook_box3d.so")  # of .ci/box3d, below where one stands

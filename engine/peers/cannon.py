@@ -8,18 +8,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from spook_tracker.engine.bodies import WORLD
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import CentralGravity, Load
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Lock
-from spook_tracker.engine.observe import ConstraintForce
-from spook_tracker.engine.peers import node
-from spook_tracker.engine.peers.described import described as common
-from spook_tracker.engine.peers.described import numbered
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recorded_joints import joint_point
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.shapes import Box, Plane, Sphere
+from ..bodies import WORLD
+from ..build_info import BuildInfo
+from ..forces import CentralGravity, Load
+from ..joints import Ball, Distance, Hinge, Lock
+from ..observe import ConstraintForce
+from ..protocol import Capabilities, Configuration, NotSupported, Task
+from ..recorded_joints import joint_point
+from ..recording import Recording
+from ..shapes import Box, Plane, Sphere
+from . import node
+from .described import described as common
+from .described import numbered
 
 PACKAGE = "cannon-es"
 SCRIPT = Path(__file__).with_suffix(".mjs")

@@ -15,10 +15,10 @@ from typing import Any
 import dartpy as dart
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import (
+from ..bodies import WORLD, Particle, RigidBody
+from ..build_info import BuildInfo
+from ..forces import CentralGravity, Load, Spring
+from ..joints import (
     Ball,
     Distance,
     Hinge,
@@ -28,10 +28,15 @@ from spook_tracker.engine.joints import (
     Universal,
     frictions,
 )
-from spook_tracker.engine.observe import ConstraintForce, ContactCount, ContactForce, Penetration
-from spook_tracker.engine.peers.dart_file import READS, run_model
-from spook_tracker.engine.peers.frames import drive
-from spook_tracker.engine.peers.joint_tree import (
+from ..observe import ConstraintForce, ContactCount, ContactForce, Penetration
+from ..protocol import Capabilities, Configuration, NotSupported, Task
+from ..recorded_joints import cross, joint_point, turned
+from ..recording import Recording
+from ..result import Array
+from ..shapes import Box, Capsule, Plane, Shape, Sphere
+from .dart_file import READS, run_model
+from .frames import drive
+from .joint_tree import (
     Node,
     alone,
     below,
@@ -45,14 +50,9 @@ from spook_tracker.engine.peers.joint_tree import (
     spins,
     turn_of,
 )
-from spook_tracker.engine.peers.pushes import Pushes
-from spook_tracker.engine.peers.stepped import Kept, quiet, stepped
-from spook_tracker.engine.peers.surfaces import one_friction, one_restitution, pairs_apart, solid
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recorded_joints import cross, joint_point, turned
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.result import Array
-from spook_tracker.engine.shapes import Box, Capsule, Plane, Shape, Sphere
+from .pushes import Pushes
+from .stepped import Kept, quiet, stepped
+from .surfaces import one_friction, one_restitution, pairs_apart, solid
 
 POINT_INERTIA = 1e-9  # kg m²: DART wants one of every body that turns
 HALF_HINGE = 0.5  # m from a hinge to each of the two points that hold it where it is a constraint

@@ -15,8 +15,10 @@ from typing import Any
 import dartpy as dart
 import numpy as np
 
-from spook_tracker.engine.model_file import ModelRun, Watched
-from spook_tracker.engine.peers.model_loop import (
+from ..model_file import ModelRun, Watched
+from ..protocol import NotSupported
+from ..result import Result
+from .model_loop import (
     Array,
     LoadedModel,
     elsewhere,
@@ -25,9 +27,7 @@ from spook_tracker.engine.peers.model_loop import (
     resident,
     said,
 )
-from spook_tracker.engine.peers.stepped import overheard, quiet
-from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.engine.result import Result
+from .stepped import overheard, quiet
 
 READS = ("URDF", "SDF", "MJCF")
 NOTE = re.compile(  # colours, the kind and line before each of what it writes, and its own functions

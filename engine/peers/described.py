@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import Joint
-from spook_tracker.engine.meshes import HeightField, TriangleMesh
-from spook_tracker.engine.peers import node
-from spook_tracker.engine.protocol import Task
-from spook_tracker.engine.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Plane, Shape, Sphere
+from ..bodies import WORLD, Particle, RigidBody
+from ..forces import CentralGravity, Load, Spring
+from ..joints import Joint
+from ..meshes import HeightField, TriangleMesh
+from ..protocol import Task
+from ..shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Plane, Shape, Sphere
+from . import node
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 

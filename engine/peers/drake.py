@@ -15,17 +15,17 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.bodies import Particle
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Lock, Prismatic, Universal
-from spook_tracker.engine.observe import ConstraintForce, ContactForce
-from spook_tracker.engine.peers.drake_file import READS, run_model
-from spook_tracker.engine.peers.drake_model import Model
-from spook_tracker.engine.peers.stepped import Kept, stepped
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.shapes import Box, Capsule, Plane, Sphere
+from ..bodies import Particle
+from ..build_info import BuildInfo
+from ..forces import CentralGravity, Load, Spring
+from ..joints import Ball, Distance, Hinge, Lock, Prismatic, Universal
+from ..observe import ConstraintForce, ContactForce
+from ..protocol import Capabilities, Configuration, NotSupported, Task
+from ..recording import Recording
+from ..shapes import Box, Capsule, Plane, Sphere
+from .drake_file import READS, run_model
+from .drake_model import Model
+from .stepped import Kept, stepped
 
 logging.getLogger("drake").setLevel(
     logging.ERROR

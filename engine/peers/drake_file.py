@@ -17,9 +17,11 @@ from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from spook_tracker.engine.errors import EngineError
-from spook_tracker.engine.model_file import ModelRun, Watched
-from spook_tracker.engine.peers.model_loop import (
+from ..errors import EngineError
+from ..model_file import ModelRun, Watched
+from ..protocol import NotSupported
+from ..result import Result
+from .model_loop import (
     Array,
     LoadedModel,
     elsewhere,
@@ -28,9 +30,7 @@ from spook_tracker.engine.peers.model_loop import (
     resident,
     said,
 )
-from spook_tracker.engine.peers.stepped import quiet
-from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.engine.result import Result
+from .stepped import quiet
 
 READS = ("URDF", "SDF", "MJCF")
 

@@ -45,11 +45,15 @@ from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 from pydrake.systems.framework import DiagramBuilder
 from pydrake.systems.primitives import SymbolicVectorSystem
 
-from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Lock, Prismatic, Universal
-from spook_tracker.engine.peers.described import upwards
-from spook_tracker.engine.peers.joint_tree import (
+from ..bodies import WORLD, Particle, RigidBody
+from ..forces import CentralGravity, Load, Spring
+from ..joints import Ball, Distance, Hinge, Lock, Prismatic, Universal
+from ..protocol import NotSupported, Task
+from ..recorded_joints import joint_point, turned_back
+from ..result import Array
+from ..shapes import Box, Capsule, Plane, Shape, Sphere
+from .described import upwards
+from .joint_tree import (
     Node,
     alone,
     closing,
@@ -62,11 +66,7 @@ from spook_tracker.engine.peers.joint_tree import (
     spins,
     turn_of,
 )
-from spook_tracker.engine.peers.surfaces import one_friction, pairs_apart, solid
-from spook_tracker.engine.protocol import NotSupported, Task
-from spook_tracker.engine.recorded_joints import joint_point, turned_back
-from spook_tracker.engine.result import Array
-from spook_tracker.engine.shapes import Box, Capsule, Plane, Shape, Sphere
+from .surfaces import one_friction, pairs_apart, solid
 
 POINT_INERTIA = 1e-9  # kg m²: Drake wants one of every moving body
 HALF_HINGE = 0.5  # m from a hinge to each of the two points that hold it where it is a constraint

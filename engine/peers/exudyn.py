@@ -16,15 +16,15 @@ import exudyn
 import numpy as np
 from exudyn.rigidBodyUtilities import RigidBodyInertia
 
-from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import Load, Spring
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Lock, Prismatic
-from spook_tracker.engine.observe import ConstraintForce
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recorded_joints import joint_point, turned
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.result import Array
+from ..bodies import WORLD, Particle, RigidBody
+from ..build_info import BuildInfo
+from ..forces import Load, Spring
+from ..joints import Ball, Distance, Hinge, Lock, Prismatic
+from ..observe import ConstraintForce
+from ..protocol import Capabilities, Configuration, NotSupported, Task
+from ..recorded_joints import joint_point, turned
+from ..recording import Recording
+from ..result import Array
 
 exudyn.config.printToConsole = False  # it tells of every solve that fails, by the screenful
 exudyn.config.suppressWarnings = True

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, Particle
-from spook_tracker.engine.joints import Prismatic, frictions
-from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.engine.recorded_joints import conjugate, joint_point, product, turned_back
-from spook_tracker.engine.result import Array
-from spook_tracker.engine.scene import Scene
+from ..bodies import WORLD, Particle
+from ..joints import Prismatic, frictions
+from ..protocol import NotSupported
+from ..recorded_joints import conjugate, joint_point, product, turned_back
+from ..result import Array
+from ..scene import Scene
 
 RIGID_DRIVE = 1e6  # N s/m or N m s, at least
 FIRM = 1e3  # 1: what a drive resists in a step, over what is to be moved

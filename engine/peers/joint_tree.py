@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
-from spook_tracker.engine.joints import Constraint, Distance, Joint
-from spook_tracker.engine.recorded_joints import joint_point
-from spook_tracker.engine.result import Array
-from spook_tracker.engine.scene import Scene
+from ..bodies import WORLD, Particle, RigidBody
+from ..joints import Constraint, Distance, Joint
+from ..recorded_joints import joint_point
+from ..result import Array
+from ..scene import Scene
 
 UPRIGHT = np.array([1.0, 0.0, 0.0, 0.0])
 

@@ -13,22 +13,22 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.couplings import Relation
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import AxialJoint, Ball, Distance, Hinge, Joint, Lock, Prismatic, frictions
-from spook_tracker.engine.meshes import HeightField, TriangleMesh
-from spook_tracker.engine.observe import ConstraintForce, Penetration
-from spook_tracker.engine.peers import node
-from spook_tracker.engine.peers.described import UPRIGHT, numbered
-from spook_tracker.engine.peers.described import described as common
-from spook_tracker.engine.peers.frames import drive
-from spook_tracker.engine.protocol import RIGID, Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recorded_joints import joint_point, turned_back
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Plane, Sphere
+from ..bodies import WORLD, Particle, RigidBody
+from ..build_info import BuildInfo
+from ..couplings import Relation
+from ..forces import CentralGravity, Load, Spring
+from ..joints import AxialJoint, Ball, Distance, Hinge, Joint, Lock, Prismatic, frictions
+from ..meshes import HeightField, TriangleMesh
+from ..observe import ConstraintForce, Penetration
+from ..protocol import RIGID, Capabilities, Configuration, NotSupported, Task
+from ..recorded_joints import joint_point, turned_back
+from ..recording import Recording
+from ..scene import Scene
+from ..shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Plane, Sphere
+from . import node
+from .described import UPRIGHT, numbered
+from .described import described as common
+from .frames import drive
 
 PACKAGE = "jolt-physics"
 SCRIPT = Path(__file__).with_suffix(".mjs")

@@ -7,12 +7,12 @@ from xml.dom.minidom import parseString
 
 import mujoco
 
-from spook_tracker.engine.couplings import Relation, Wire
-from spook_tracker.engine.forces import Spring
-from spook_tracker.engine.peers.mujoco import CAREFUL, ENGINE, STIFF, start_speeds
-from spook_tracker.engine.peers.mujoco_model import model, numbers
-from spook_tracker.engine.protocol import NotSupported, is_spring, unsupported
-from spook_tracker.engine.scene import Scene
+from ..couplings import Relation, Wire
+from ..forces import Spring
+from ..protocol import NotSupported, is_spring, unsupported
+from ..scene import Scene
+from .mujoco import CAREFUL, ENGINE, STIFF, start_speeds
+from .mujoco_model import model, numbers
 
 CAN = replace(  # a file has no forces but of springs and actuators, and no servo that knows its step
     ENGINE.capabilities,

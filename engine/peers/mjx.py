@@ -16,15 +16,15 @@ import mujoco
 import numpy as np
 from mujoco import mjx
 
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import Load
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Lock, Prismatic, Universal
-from spook_tracker.engine.observe import ContactCount, Penetration
-from spook_tracker.engine.peers import mujoco as through_c
-from spook_tracker.engine.peers.stepped import quiet, stepped
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task, Worlds
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.shapes import Box, Capsule, Plane, Sphere
+from ..build_info import BuildInfo
+from ..forces import Load
+from ..joints import Ball, Distance, Hinge, Lock, Prismatic, Universal
+from ..observe import ContactCount, Penetration
+from ..protocol import Capabilities, Configuration, NotSupported, Task, Worlds
+from ..recording import Recording
+from ..shapes import Box, Capsule, Plane, Sphere
+from . import mujoco as through_c
+from .stepped import quiet, stepped
 
 jax.config.update("jax_enable_x64", True)
 CAREFUL = 'cone="elliptic" impratio="100" tolerance="1e-12" iterations="200"'

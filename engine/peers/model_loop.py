@@ -20,10 +20,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from spook_tracker.engine.errors import EngineError
-from spook_tracker.engine.model_file import ModelRun
-from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.engine.result import Result
+from ..errors import EngineError
+from ..model_file import ModelRun
+from ..protocol import NotSupported
+from ..result import Result
 
 Array = npt.NDArray[np.float64]
 CALM = 1e-3  # of the size a second: nothing faster, nothing turning faster than that at its rim

@@ -17,19 +17,19 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import Load
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Lock, Prismatic, Universal
-from spook_tracker.engine.observe import ContactCount
-from spook_tracker.engine.peers.mujoco_model import model
-from spook_tracker.engine.peers.stepped import Kept, overheard, quiet, stepped
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task, Worlds
-from spook_tracker.engine.recorded_joints import cross, joint_point, turned
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.result import Array
-from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Sphere
+from ..bodies import WORLD, Particle, RigidBody
+from ..build_info import BuildInfo
+from ..forces import Load
+from ..joints import Ball, Distance, Hinge, Lock, Prismatic, Universal
+from ..observe import ContactCount
+from ..protocol import Capabilities, Configuration, NotSupported, Task, Worlds
+from ..recorded_joints import cross, joint_point, turned
+from ..recording import Recording
+from ..result import Array
+from ..scene import Scene
+from ..shapes import Box, Capsule, Cylinder, Plane, Sphere
+from .mujoco_model import model
+from .stepped import Kept, overheard, quiet, stepped
 
 with quiet():  # it says whether it is profiled
     import motrixsim

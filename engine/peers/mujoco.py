@@ -16,20 +16,20 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.couplings import Relation, Wire
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, Universal
-from spook_tracker.engine.observe import ConstraintForce, ContactCount, ContactForce, Penetration
-from spook_tracker.engine.peers.mujoco_file import READS, run_model
-from spook_tracker.engine.peers.mujoco_model import HALF_HINGE, Model, held_first, model
-from spook_tracker.engine.peers.stepped import Kept, stepped
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recorded_joints import cross, joint_point, product, turned
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.result import Array
-from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.shapes import Box, Capsule, Compound, Cylinder, Plane, Sphere
+from ..build_info import BuildInfo
+from ..couplings import Relation, Wire
+from ..forces import CentralGravity, Load, Spring
+from ..joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, Universal
+from ..observe import ConstraintForce, ContactCount, ContactForce, Penetration
+from ..protocol import Capabilities, Configuration, NotSupported, Task
+from ..recorded_joints import cross, joint_point, product, turned
+from ..recording import Recording
+from ..result import Array
+from ..scene import Scene
+from ..shapes import Box, Capsule, Compound, Cylinder, Plane, Sphere
+from .mujoco_file import READS, run_model
+from .mujoco_model import HALF_HINGE, Model, held_first, model
+from .stepped import Kept, stepped
 
 SURFACES_MOVE = hasattr(mujoco.MjModel, "geom_surfacevel")  # since 4.0
 BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")

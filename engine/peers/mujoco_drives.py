@@ -11,9 +11,9 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from spook_tracker.engine.joints import JointSpring
-from spook_tracker.engine.peers.lacking import Lacks
-from spook_tracker.engine.peers.mujoco_rails import ALONG_JOINT, FADING, spring, summed, wraps
+from ..joints import JointSpring
+from .lacking import Lacks
+from .mujoco_rails import ALONG_JOINT, FADING, spring, summed, wraps
 
 Array = npt.NDArray[np.float64]
 BY_JOINT = tuple(int(getattr(mujoco.mjtTrn, f"mjTRN_{kind}")) for kind in ("JOINT", "JOINTINPARENT"))

@@ -17,13 +17,13 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from spook_tracker.engine.errors import EngineError
-from spook_tracker.engine.model_file import Drive, ModelRun, Watched
-from spook_tracker.engine.peers.lacking import place_in, place_of, texts_of
-from spook_tracker.engine.peers.model_loop import Array, LoadedModel, elsewhere
-from spook_tracker.engine.peers.mujoco_shown import Shown
-from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.engine.result import Result
+from ..errors import EngineError
+from ..model_file import Drive, ModelRun, Watched
+from ..protocol import NotSupported
+from ..result import Result
+from .lacking import place_in, place_of, texts_of
+from .model_loop import Array, LoadedModel, elsewhere
+from .mujoco_shown import Shown
 
 BAD = ("mjWARN_BADQPOS", "mjWARN_BADQVEL", "mjWARN_BADQACC")
 FULL = ("mjWARN_CONTACTFULL", "mjWARN_CNSTRFULL")

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from spook_tracker.engine.peers.mujoco_scene import Placed, matrix
+from .mujoco_scene import Placed, matrix
 
 Array = npt.NDArray[np.float64]
 LEAST = 1e-15  # kg, kg m²: bodies below it have no box

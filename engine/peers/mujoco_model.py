@@ -11,10 +11,10 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, Material, Particle, RigidBody
-from spook_tracker.engine.couplings import Relation, Wire
-from spook_tracker.engine.forces import End, Spring
-from spook_tracker.engine.joints import (
+from ..bodies import WORLD, Material, Particle, RigidBody
+from ..couplings import Relation, Wire
+from ..forces import End, Spring
+from ..joints import (
     AxialJoint,
     Ball,
     Constraint,
@@ -26,7 +26,12 @@ from spook_tracker.engine.joints import (
     Universal,
     frictions,
 )
-from spook_tracker.engine.peers.joint_tree import (
+from ..protocol import NotSupported
+from ..recorded_joints import conjugate, joint_point, product, turned_back
+from ..result import Array
+from ..scene import Scene
+from ..shapes import Box, Capsule, Compound, Cylinder, Plane, Shape, Sphere
+from .joint_tree import (
     UPRIGHT,
     Node,
     alone,
@@ -36,11 +41,6 @@ from spook_tracker.engine.peers.joint_tree import (
     rod_axes,
     turn_of,
 )
-from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.engine.recorded_joints import conjugate, joint_point, product, turned_back
-from spook_tracker.engine.result import Array
-from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.shapes import Box, Capsule, Compound, Cylinder, Plane, Shape, Sphere
 
 POINT_INERTIA = 1e-12  # kg m²: MuJoCo wants one of every moving body; a point mass has none
 UNBOUNDED = 1e10  # N or N m

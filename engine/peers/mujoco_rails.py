@@ -15,10 +15,10 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from spook_tracker.engine.bodies import WORLD, RigidBody
-from spook_tracker.engine.couplings import Relation, Wire
-from spook_tracker.engine.joints import JointSpring, Limit, Prismatic
-from spook_tracker.engine.peers.lacking import Lacks
+from ..bodies import WORLD, RigidBody
+from ..couplings import Relation, Wire
+from ..joints import JointSpring, Limit, Prismatic
+from .lacking import Lacks
 
 Array = npt.NDArray[np.float64]
 ALONG_JOINT, AT_SITE = (int(getattr(mujoco.mjtWrap, f"mjWRAP_{kind}")) for kind in ("JOINT", "SITE"))

@@ -21,17 +21,17 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from spook_tracker.engine.bodies import WORLD, PairFriction, RigidBody
-from spook_tracker.engine.check import Rotation
-from spook_tracker.engine.couplings import Relation
-from spook_tracker.engine.forces import Force, Load
-from spook_tracker.engine.joints import Ball, Constraint, Hinge, JointSpring, Limit, Lock, Motor, Prismatic
-from spook_tracker.engine.peers.lacking import Lacks, texts_of
-from spook_tracker.engine.peers.mujoco_drives import Drives
-from spook_tracker.engine.peers.mujoco_rails import FADING, Rails, relaxation, servo_name
-from spook_tracker.engine.peers.mujoco_surfaces import surfaces
-from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.engine.scene import Scene
+from ..bodies import WORLD, PairFriction, RigidBody
+from ..check import Rotation
+from ..couplings import Relation
+from ..forces import Force, Load
+from ..joints import Ball, Constraint, Hinge, JointSpring, Limit, Lock, Motor, Prismatic
+from ..protocol import NotSupported
+from ..scene import Scene
+from .lacking import Lacks, texts_of
+from .mujoco_drives import Drives
+from .mujoco_rails import FADING, Rails, relaxation, servo_name
+from .mujoco_surfaces import surfaces
 
 Array = npt.NDArray[np.float64]
 LIGHT = 1e-7  # of its mass and inertia, what stands between two joints of one body

@@ -12,10 +12,10 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from spook_tracker.engine import polytope
-from spook_tracker.engine.model_file import SHOWN_AS
-from spook_tracker.engine.peers.model_loop import Array
-from spook_tracker.engine.shapes import Cylinder
+from .. import polytope
+from ..model_file import SHOWN_AS
+from ..shapes import Cylinder
+from .model_loop import Array
 
 SHOWN_GROUPS = 3  # the first so many
 CORNERS = 600  # of all hulls together

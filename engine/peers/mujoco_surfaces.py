@@ -13,11 +13,10 @@ import mujoco
 import numpy as np
 import numpy.typing as npt
 
-from spook_tracker.engine.bodies import Material, PairFriction, RigidBody
-from spook_tracker.engine.errors import SceneError
-from spook_tracker.engine.meshes import HeightField
-from spook_tracker.engine.peers.lacking import Lacks
-from spook_tracker.engine.shapes import (
+from ..bodies import Material, PairFriction, RigidBody
+from ..errors import SceneError
+from ..meshes import HeightField
+from ..shapes import (
     Box,
     Capsule,
     Compound,
@@ -28,6 +27,7 @@ from spook_tracker.engine.shapes import (
     Shape,
     Sphere,
 )
+from .lacking import Lacks
 
 Array = npt.NDArray[np.float64]
 MOST_CORNERS = 64  # of a hull of ours, 16 of them round a face

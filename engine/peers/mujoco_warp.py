@@ -12,16 +12,16 @@ from typing import Any
 
 import mujoco
 
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import Load
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Lock, Prismatic, Universal
-from spook_tracker.engine.observe import ContactCount, Penetration
-from spook_tracker.engine.peers import mujoco as through_c
-from spook_tracker.engine.peers.stepped import stepped
-from spook_tracker.engine.peers.warp_graph import MADE, overflowed, replayed, room, silent
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task, Worlds
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Sphere
+from ..build_info import BuildInfo
+from ..forces import Load
+from ..joints import Ball, Distance, Hinge, Lock, Prismatic, Universal
+from ..observe import ContactCount, Penetration
+from ..protocol import Capabilities, Configuration, NotSupported, Task, Worlds
+from ..recording import Recording
+from ..shapes import Box, Capsule, Cylinder, Plane, Sphere
+from . import mujoco as through_c
+from .stepped import stepped
+from .warp_graph import MADE, overflowed, replayed, room, silent
 
 with silent():
     import mujoco_warp

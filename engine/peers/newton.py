@@ -15,23 +15,23 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import Ball, Constraint, Distance, Hinge, Joint, Lock, Prismatic
-from spook_tracker.engine.observe import ContactCount, ContactForce, Penetration
-from spook_tracker.engine.peers import joint_tree
-from spook_tracker.engine.peers.described import upwards
-from spook_tracker.engine.peers.frames import End, along, ends_of, xyzw
-from spook_tracker.engine.peers.pushes import Pushes
-from spook_tracker.engine.peers.stepped import Kept, stepped
-from spook_tracker.engine.peers.surfaces import one_friction, one_restitution, pairs_apart
-from spook_tracker.engine.peers.warp_graph import DEVICE, MADE, overflowed, replayed, room, silent
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task, Worlds
-from spook_tracker.engine.recorded_joints import conjugate, product, turned
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.result import Array
-from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Sphere
+from ..bodies import WORLD, Particle, RigidBody
+from ..build_info import BuildInfo
+from ..forces import CentralGravity, Load, Spring
+from ..joints import Ball, Constraint, Distance, Hinge, Joint, Lock, Prismatic
+from ..observe import ContactCount, ContactForce, Penetration
+from ..protocol import Capabilities, Configuration, NotSupported, Task, Worlds
+from ..recorded_joints import conjugate, product, turned
+from ..recording import Recording
+from ..result import Array
+from ..shapes import Box, Capsule, Cylinder, Plane, Sphere
+from . import joint_tree
+from .described import upwards
+from .frames import End, along, ends_of, xyzw
+from .pushes import Pushes
+from .stepped import Kept, stepped
+from .surfaces import one_friction, one_restitution, pairs_apart
+from .warp_graph import DEVICE, MADE, overflowed, replayed, room, silent
 
 with silent():
     import newton

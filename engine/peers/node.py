@@ -26,8 +26,8 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.result import Array
+from ..recording import Recording
+from ..result import Array
 
 GRACE = 20.0  # s beyond its time limit in which a process must start and answer
 HEAP = 2048  # MB that JavaScript may take

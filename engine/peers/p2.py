@@ -11,19 +11,19 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import CentralGravity, Load
-from spook_tracker.engine.joints import Distance, Hinge, Lock
-from spook_tracker.engine.observe import ConstraintForce
-from spook_tracker.engine.peers import node
-from spook_tracker.engine.peers.described import described as common
-from spook_tracker.engine.peers.described import numbered
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recorded_joints import joint_point, turned, turned_back
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.result import Array
-from spook_tracker.engine.scene import Scene
+from ..bodies import WORLD, Particle, RigidBody
+from ..build_info import BuildInfo
+from ..forces import CentralGravity, Load
+from ..joints import Distance, Hinge, Lock
+from ..observe import ConstraintForce
+from ..protocol import Capabilities, Configuration, NotSupported, Task
+from ..recorded_joints import joint_point, turned, turned_back
+from ..recording import Recording
+from ..result import Array
+from ..scene import Scene
+from . import node
+from .described import described as common
+from .described import numbered
 
 PACKAGE = "p2-es"
 SCRIPT = Path(__file__).with_suffix(".mjs")

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from spook_tracker.engine.bodies import Particle
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.recorded_joints import cross, turned
-from spook_tracker.engine.result import Array
-from spook_tracker.engine.scene import Scene
+from ..bodies import Particle
+from ..forces import CentralGravity, Load, Spring
+from ..recorded_joints import cross, turned
+from ..result import Array
+from ..scene import Scene
 
 
 class Pushes:

@@ -14,20 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.bodies import Particle
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Lock, Prismatic
-from spook_tracker.engine.observe import ConstraintForce, ContactCount, ContactForce, Penetration
-from spook_tracker.engine.peers.joint_tree import (
-    fixed,
-    turn_of,
-)
-from spook_tracker.engine.peers.pybullet_file import READS, run_model
-from spook_tracker.engine.peers.pybullet_model import HALF_HINGE, Model
-from spook_tracker.engine.peers.stepped import Kept, quiet, stepped
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recorded_joints import (
+from ..bodies import Particle
+from ..build_info import BuildInfo
+from ..forces import CentralGravity, Load, Spring
+from ..joints import Ball, Distance, Hinge, Lock, Prismatic
+from ..observe import ConstraintForce, ContactCount, ContactForce, Penetration
+from ..protocol import Capabilities, Configuration, NotSupported, Task
+from ..recorded_joints import (
     conjugate,
     cross,
     joint_point,
@@ -35,9 +28,16 @@ from spook_tracker.engine.recorded_joints import (
     turned,
     turned_back,
 )
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.result import Array
-from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Sphere
+from ..recording import Recording
+from ..result import Array
+from ..shapes import Box, Capsule, Cylinder, Plane, Sphere
+from .joint_tree import (
+    fixed,
+    turn_of,
+)
+from .pybullet_file import READS, run_model
+from .pybullet_model import HALF_HINGE, Model
+from .stepped import Kept, quiet, stepped
 
 with quiet():  # it says when it was built
     import pybullet as bullet

@@ -13,8 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.model_file import ModelRun, Watched
-from spook_tracker.engine.peers.model_loop import (
+from ..model_file import ModelRun, Watched
+from ..protocol import NotSupported
+from ..result import Result
+from .model_loop import (
     Array,
     LoadedModel,
     elsewhere,
@@ -22,10 +24,8 @@ from spook_tracker.engine.peers.model_loop import (
     resident,
     said,
 )
-from spook_tracker.engine.peers.pybullet_model import SEEN_FROM
-from spook_tracker.engine.peers.stepped import overheard, quiet
-from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.engine.result import Result
+from .pybullet_model import SEEN_FROM
+from .stepped import overheard, quiet
 
 with quiet():  # it says when it was built
     import pybullet as bullet

@@ -7,10 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, frictions
-from spook_tracker.engine.peers.frames import drive
-from spook_tracker.engine.peers.joint_tree import (
+from ..bodies import WORLD, Particle, RigidBody
+from ..joints import Ball, Distance, Hinge, Joint, Lock, Prismatic, frictions
+from ..protocol import NotSupported, Task
+from ..recorded_joints import conjugate, joint_point, turned_back
+from ..result import Array
+from ..shapes import Box, Capsule, Cylinder, Plane, Shape, Sphere
+from .frames import drive
+from .joint_tree import (
     Node,
     alone,
     below,
@@ -23,13 +27,9 @@ from spook_tracker.engine.peers.joint_tree import (
     spins,
     turn_of,
 )
-from spook_tracker.engine.peers.pushes import Pushes
-from spook_tracker.engine.peers.stepped import quiet
-from spook_tracker.engine.peers.surfaces import one_restitution, pairs_apart, shares
-from spook_tracker.engine.protocol import NotSupported, Task
-from spook_tracker.engine.recorded_joints import conjugate, joint_point, turned_back
-from spook_tracker.engine.result import Array
-from spook_tracker.engine.shapes import Box, Capsule, Cylinder, Plane, Shape, Sphere
+from .pushes import Pushes
+from .stepped import quiet
+from .surfaces import one_restitution, pairs_apart, shares
 
 with quiet():  # it says when it was built
     import pybullet as bullet

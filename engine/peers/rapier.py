@@ -15,21 +15,21 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, RigidBody
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import AxialJoint, Ball, Hinge, Joint, Lock, Prismatic
-from spook_tracker.engine.meshes import HeightField, TriangleMesh
-from spook_tracker.engine.observe import ContactForce
-from spook_tracker.engine.peers import node
-from spook_tracker.engine.peers.described import described as common
-from spook_tracker.engine.peers.described import numbered
-from spook_tracker.engine.peers.frames import drive, drive_damping, ends_of
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recorded_joints import turned
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.scene import Scene
-from spook_tracker.engine.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Plane, Sphere
+from ..bodies import WORLD, RigidBody
+from ..build_info import BuildInfo
+from ..forces import CentralGravity, Load, Spring
+from ..joints import AxialJoint, Ball, Hinge, Joint, Lock, Prismatic
+from ..meshes import HeightField, TriangleMesh
+from ..observe import ContactForce
+from ..protocol import Capabilities, Configuration, NotSupported, Task
+from ..recorded_joints import turned
+from ..recording import Recording
+from ..scene import Scene
+from ..shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Plane, Sphere
+from . import node
+from .described import described as common
+from .described import numbered
+from .frames import drive, drive_damping, ends_of
 
 PACKAGE = "@dimforge/rapier3d-compat"
 SCRIPT = Path(__file__).with_suffix(".mjs")

@@ -16,21 +16,21 @@ from typing import Any
 import numpy as np
 import rapier3d as rapier
 
-from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import Ball, Hinge, Joint, Lock, Prismatic
-from spook_tracker.engine.meshes import HeightField, TriangleMesh
-from spook_tracker.engine.observe import ContactCount, ContactForce, Penetration
-from spook_tracker.engine.peers.frames import drive, drive_damping, ends_of, xyzw
-from spook_tracker.engine.peers.pushes import Pushes
-from spook_tracker.engine.peers.stepped import Kept, stepped
-from spook_tracker.engine.peers.surfaces import solid
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recorded_joints import product, turned
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.result import Array
-from spook_tracker.engine.shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Plane, Shape, Sphere
+from ..bodies import WORLD, Particle, RigidBody
+from ..build_info import BuildInfo
+from ..forces import CentralGravity, Load, Spring
+from ..joints import Ball, Hinge, Joint, Lock, Prismatic
+from ..meshes import HeightField, TriangleMesh
+from ..observe import ContactCount, ContactForce, Penetration
+from ..protocol import Capabilities, Configuration, NotSupported, Task
+from ..recorded_joints import product, turned
+from ..recording import Recording
+from ..result import Array
+from ..shapes import Box, Capsule, Compound, ConvexHull, Cylinder, Plane, Shape, Sphere
+from .frames import drive, drive_damping, ends_of, xyzw
+from .pushes import Pushes
+from .stepped import Kept, stepped
+from .surfaces import solid
 
 POINT_INERTIA = 1e-6  # kg m²: every moving body wants one; a particle that turns is not seen to
 WITHOUT_BOUND = 1e18  # m/s; its square is a number of single precision, too

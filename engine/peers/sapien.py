@@ -16,18 +16,18 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Joint, Lock, Prismatic
-from spook_tracker.engine.observe import ContactCount, ContactForce, Penetration
-from spook_tracker.engine.peers.frames import along, drive, drive_damping, ends_of, turned_inertia
-from spook_tracker.engine.peers.pushes import Pushes
-from spook_tracker.engine.peers.stepped import Kept, quiet, stepped
-from spook_tracker.engine.peers.surfaces import one_friction, one_restitution, solid
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.shapes import Box, Capsule, Plane, Shape, Sphere
+from ..bodies import WORLD, Particle, RigidBody
+from ..build_info import BuildInfo
+from ..forces import CentralGravity, Load, Spring
+from ..joints import Ball, Distance, Hinge, Joint, Lock, Prismatic
+from ..observe import ContactCount, ContactForce, Penetration
+from ..protocol import Capabilities, Configuration, NotSupported, Task
+from ..recording import Recording
+from ..shapes import Box, Capsule, Plane, Shape, Sphere
+from .frames import along, drive, drive_damping, ends_of, turned_inertia
+from .pushes import Pushes
+from .stepped import Kept, quiet, stepped
+from .surfaces import one_friction, one_restitution, solid
 
 with quiet(), warnings.catch_warnings():  # it looks for a display
     warnings.simplefilter("ignore")

@@ -12,18 +12,18 @@ from importlib.metadata import version
 
 import numpy as np
 
-from spook_tracker.engine.bodies import Particle
-from spook_tracker.engine.build_info import BuildInfo
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Lock, Prismatic, Universal
-from spook_tracker.engine.observe import ConstraintForce, ContactForce
-from spook_tracker.engine.peers.joint_tree import fixed, hung_at
-from spook_tracker.engine.peers.simbody_model import Model, array
-from spook_tracker.engine.peers.stepped import Kept, quiet, stepped
-from spook_tracker.engine.protocol import Capabilities, Configuration, NotSupported, Task
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.result import Array
-from spook_tracker.engine.shapes import Box, Plane, Sphere
+from ..bodies import Particle
+from ..build_info import BuildInfo
+from ..forces import CentralGravity, Load, Spring
+from ..joints import Ball, Distance, Hinge, Lock, Prismatic, Universal
+from ..observe import ConstraintForce, ContactForce
+from ..protocol import Capabilities, Configuration, NotSupported, Task
+from ..recording import Recording
+from ..result import Array
+from ..shapes import Box, Plane, Sphere
+from .joint_tree import fixed, hung_at
+from .simbody_model import Model, array
+from .stepped import Kept, quiet, stepped
 
 
 class Simbody:

@@ -7,12 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, Particle, RigidBody
-from spook_tracker.engine.forces import CentralGravity, Load, Spring
-from spook_tracker.engine.joints import Ball, Distance, Hinge, Lock, Prismatic, Universal
-from spook_tracker.engine.peers.described import upwards
-from spook_tracker.engine.peers.frames import along
-from spook_tracker.engine.peers.joint_tree import (
+from ..bodies import WORLD, Particle, RigidBody
+from ..forces import CentralGravity, Load, Spring
+from ..joints import Ball, Distance, Hinge, Lock, Prismatic, Universal
+from ..protocol import NotSupported, Task
+from ..recorded_joints import joint_point, turned, turned_back
+from ..result import Array
+from ..shapes import Box, Plane, Sphere
+from .described import upwards
+from .frames import along
+from .joint_tree import (
     Node,
     below,
     closing,
@@ -25,12 +29,8 @@ from spook_tracker.engine.peers.joint_tree import (
     spins,
     turn_of,
 )
-from spook_tracker.engine.peers.stepped import quiet
-from spook_tracker.engine.peers.surfaces import one_friction, pairs_apart, solid
-from spook_tracker.engine.protocol import NotSupported, Task
-from spook_tracker.engine.recorded_joints import joint_point, turned, turned_back
-from spook_tracker.engine.result import Array
-from spook_tracker.engine.shapes import Box, Plane, Sphere
+from .stepped import quiet
+from .surfaces import one_friction, pairs_apart, solid
 
 with quiet():
     import opensim

@@ -11,12 +11,12 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from spook_tracker.engine.errors import MethodError
-from spook_tracker.engine.forces import Load
-from spook_tracker.engine.joints import AxialJoint
-from spook_tracker.engine.method import DEFAULT, Method
-from spook_tracker.engine.model_file import ModelRun
-from spook_tracker.engine.observe import (
+from ..errors import MethodError
+from ..forces import Load
+from ..joints import AxialJoint
+from ..method import DEFAULT, Method
+from ..model_file import ModelRun
+from ..observe import (
     ContactForce,
     JointCoordinate,
     KineticEnergy,
@@ -25,8 +25,12 @@ from spook_tracker.engine.observe import (
     Quantity,
     Violation,
 )
-from spook_tracker.engine.peers.model_loop import Array, LoadedModel, elsewhere, resident
-from spook_tracker.engine.peers.mujoco_file import (
+from ..protocol import NotSupported
+from ..result import Result, SimulationFailed
+from ..run import Run, start
+from ..scene import Scene
+from .model_loop import Array, LoadedModel, elsewhere, resident
+from .mujoco_file import (
     LOADS,
     alter,
     bodies_of,
@@ -36,15 +40,11 @@ from spook_tracker.engine.peers.mujoco_file import (
     size_of,
     start_at,
 )
-from spook_tracker.engine.peers.mujoco_medium import Medium
-from spook_tracker.engine.peers.mujoco_rails import servo_name
-from spook_tracker.engine.peers.mujoco_scene import Placed, Translated, matrix, translate
-from spook_tracker.engine.peers.mujoco_shown import Shown
-from spook_tracker.engine.peers.mujoco_surfaces import hull_of
-from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.engine.result import Result, SimulationFailed
-from spook_tracker.engine.run import Run, start
-from spook_tracker.engine.scene import Scene
+from .mujoco_medium import Medium
+from .mujoco_rails import servo_name
+from .mujoco_scene import Placed, Translated, matrix, translate
+from .mujoco_shown import Shown
+from .mujoco_surfaces import hull_of
 
 READS = ("MJCF", "URDF")
 # The most accurate settings, from the best on: the first that a scene allows

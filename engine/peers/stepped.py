@@ -15,10 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.engine.protocol import Task
-from spook_tracker.engine.recorded_joints import coordinate
-from spook_tracker.engine.recording import Recording
-from spook_tracker.engine.result import Array
+from ..protocol import Task
+from ..recorded_joints import coordinate
+from ..recording import Recording
+from ..result import Array
 
 TURN = 2.0 * math.pi  # rad
 BLOCK = 1000  # steps between two looks at the clock where nothing is recorded between, at most

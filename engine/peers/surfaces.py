@@ -8,10 +8,10 @@ from itertools import combinations, combinations_with_replacement
 
 import numpy as np
 
-from spook_tracker.engine.bodies import WORLD, Material, RigidBody
-from spook_tracker.engine.joints import Joint
-from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.engine.scene import Scene
+from ..bodies import WORLD, Material, RigidBody
+from ..joints import Joint
+from ..protocol import NotSupported
+from ..scene import Scene
 
 
 def solid(scene: Scene) -> list[RigidBody]:

@@ -11,7 +11,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from spook_tracker.engine.peers.stepped import quiet
+from .stepped import quiet
 
 with quiet():  # it says which devices it has found
     import warp

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.scalar_tests import case
-from spook_tracker.scalar_tests.model_file.facts import BEYOND, PUSH, Asked, simulated, spread
+from .. import case
+from .facts import BEYOND, PUSH, Asked, simulated, spread
 
 LASTS = 1.0  # s
 SAMPLES = 20

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from spook_tracker.scalar_tests import case
-from spook_tracker.scalar_tests.model_file.facts import Asked, simulated
+from .. import case
+from .facts import Asked, simulated
 
 TIMED = 1.0  # s of simulated time
 REPEATED = 2.0  # s of each of three runs

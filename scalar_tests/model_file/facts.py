@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from spook_tracker.engine.model_file import ModelFile, ModelRun
 from spook_tracker.engine.result import Result
-from spook_tracker.scalar_tests import case
+
+from .. import case
 
 Array = npt.NDArray[np.float64]
 CHECKPOINTS = (0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0)  # s: they grow, as what differs does

@@ -6,17 +6,9 @@ from functools import partial
 
 import numpy as np
 
-from spook_tracker.scalar_tests import case
-from spook_tracker.scalar_tests.model_file.facts import (
-    PUSH,
-    UNPREDICTABLE,
-    Asked,
-    apart,
-    pushed,
-    times_of,
-    watched,
-)
-from spook_tracker.scalar_tests.sweep import line
+from .. import case
+from ..sweep import line
+from .facts import PUSH, UNPREDICTABLE, Asked, apart, pushed, times_of, watched
 
 
 def places(asked: Asked, simulate: case.Simulate) -> case.Drawing:

@@ -12,8 +12,9 @@ import numpy as np
 from spook_tracker.engine.method import PLAIN, Method
 from spook_tracker.engine.protocol import NotSupported
 from spook_tracker.engine.result import Result, SimulationFailed
-from spook_tracker.scalar_tests import case
-from spook_tracker.scalar_tests.model_file.facts import Asked, apart, simulated
+
+from .. import case
+from .facts import Asked, apart, simulated
 
 LASTS = 0.5  # s that the runs of the ladder last
 RUNGS = (4.0, 2.0, 1.0, 0.5, 0.25)  # times the file's own step

@@ -9,8 +9,9 @@ from functools import partial
 import numpy as np
 
 from spook_tracker.engine.result import Result
-from spook_tracker.scalar_tests import case
-from spook_tracker.scalar_tests.model_file.facts import (
+
+from .. import case
+from .facts import (
     BEYOND,
     GRID,
     PUSH,

@@ -8,9 +8,10 @@ from functools import partial
 
 from spook_tracker.engine.errors import SceneError
 from spook_tracker.engine.model_file import ModelFile
-from spook_tracker.scalar_tests import case
-from spook_tracker.scalar_tests.model_file import books, cost, figures, ladder, motion, rest
-from spook_tracker.scalar_tests.model_file.facts import LONGEST_REST, PUSH, Asked
+
+from .. import case
+from . import books, cost, figures, ladder, motion, rest
+from .facts import LONGEST_REST, PUSH, Asked
 
 Measure = Callable[[Asked, case.Simulate], Mapping[str, float]]
 

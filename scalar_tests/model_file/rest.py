@@ -9,19 +9,9 @@ from typing import Any
 import numpy as np
 
 from spook_tracker.engine.result import Result
-from spook_tracker.scalar_tests import case
-from spook_tracker.scalar_tests.model_file.facts import (
-    BEYOND,
-    LONGEST_REST,
-    PUSH,
-    PUSHED,
-    Asked,
-    pushed,
-    settles,
-    spread,
-    turns,
-    watched,
-)
+
+from .. import case
+from .facts import BEYOND, LONGEST_REST, PUSH, PUSHED, Asked, pushed, settles, spread, turns, watched
 
 CALM = 0.5  # s of calm that make a rest; creep is measured over it
 READ = {

@@ -8,19 +8,10 @@ from typing import Literal
 import numpy as np
 
 from spook_tracker import engine
-from spook_tracker.scalar_tests import case
-from spook_tracker.scalar_tests.bracket import break_point, table
-from spook_tracker.scalar_tests.multibody.library import (
-    FIRST_ORDER,
-    GRAVITY,
-    HIGH,
-    LOW,
-    error_metric,
-    ladders,
-    library_error,
-    rod,
-    turned,
-)
+
+from .. import case
+from ..bracket import break_point, table
+from .library import FIRST_ORDER, GRAVITY, HIGH, LOW, error_metric, ladders, library_error, rod, turned
 
 POINTS = np.array([(0, 0, 0), (1, 0, 0), (1, -1, 0), (1, -1, 1), (0, -1, 1), (0, 0, 1)], dtype=float)  # m
 AXES = ((0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (1.0, 0.0, 0.0)) * 2

@@ -10,17 +10,10 @@ from typing import Any, Literal
 import numpy as np
 
 from spook_tracker import engine
-from spook_tracker.scalar_tests import case
-from spook_tracker.scalar_tests.bracket import break_count, break_point
-from spook_tracker.scalar_tests.multibody.library import (
-    GRAVITY,
-    LOW,
-    PLAIN_CONFIGURATION,
-    error_metric,
-    ladders,
-    library_error,
-    tightly,
-)
+
+from .. import case
+from ..bracket import break_count, break_point
+from .library import GRAVITY, LOW, PLAIN_CONFIGURATION, error_metric, ladders, library_error, tightly
 
 LENGTH, MASS, PUSH = 1.0, 1.0, 1.0  # m, kg, m/s
 THIN = 1e-3  # kg m², about a rod's own axis: nothing turns about it

@@ -8,18 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from spook_tracker import engine
-from spook_tracker.scalar_tests import case
-from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.multibody.library import (
-    FIRST_ORDER,
-    GRAVITY,
-    HIGH,
-    LOW,
-    SECOND_ORDER,
-    error_metric,
-    ladders,
-    library_error,
-)
+
+from .. import case
+from ..bracket import break_point
+from .library import FIRST_ORDER, GRAVITY, HIGH, LOW, SECOND_ORDER, error_metric, ladders, library_error
 
 SPIN = 2.0 * math.pi  # rad/s, of the shaft at the start
 LEAN = math.radians(30.0)  # of the rods below the level

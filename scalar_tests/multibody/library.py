@@ -14,7 +14,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from spook_tracker import engine
-from spook_tracker.scalar_tests import case
+
+from .. import case
 
 GRAVITY = 9.81  # m/s²
 LOW, HIGH = 1e-1, 1e-3  # allowed errors of the two classes

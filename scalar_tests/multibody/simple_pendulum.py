@@ -9,10 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from spook_tracker import engine
-from spook_tracker.scalar_tests import case
-from spook_tracker.scalar_tests.bracket import break_point
-from spook_tracker.scalar_tests.multibody.library import HIGH, LOW, error_metric, ladders, library_error
-from spook_tracker.scalar_tests.pendulum.scene import GRAVITY, LENGTH, angle, scene
+
+from .. import case
+from ..bracket import break_point
+from ..thesis.pendulum.scene import GRAVITY, LENGTH, angle, scene
+from .library import HIGH, LOW, error_metric, ladders, library_error
 
 DURATION, EVERY = 2000.0, 0.5  # s: 4000 outputs
 LADDER_DURATION = 100.0  # s

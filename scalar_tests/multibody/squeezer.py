@@ -11,18 +11,11 @@ import numpy as np
 
 from spook_tracker import engine
 from spook_tracker.engine.observe import Observable
-from spook_tracker.scalar_tests import case
-from spook_tracker.scalar_tests.bracket import break_point, unbroken
-from spook_tracker.scalar_tests.heavier import heavier
-from spook_tracker.scalar_tests.multibody.library import (
-    HIGH,
-    LOW,
-    PLAIN_CONFIGURATION,
-    SECOND_ORDER,
-    error_metric,
-    ladders,
-    library_error,
-)
+
+from .. import case
+from ..bracket import break_point, unbroken
+from ..heavier import heavier
+from .library import HIGH, LOW, PLAIN_CONFIGURATION, SECOND_ORDER, error_metric, ladders, library_error
 
 DURATION = 0.03  # s
 LONGEST = DURATION / 212.5  # s, between 213 steps and 212

@@ -15,7 +15,7 @@ from spook_tracker.engine import PLAIN, Method, simulate
 from spook_tracker.engine.find import find
 from spook_tracker.engine.result import SimulationFailed
 from spook_tracker.scalar_tests.case import Simulate
-from spook_tracker.scalar_tests.hanging_chain.stability import predicted_break
+from spook_tracker.scalar_tests.ropes.hanging_chain.stability import predicted_break
 from tests.places import ROOT
 
 PAGE = ROOT / "docs" / "engines.md"

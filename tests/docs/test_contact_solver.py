@@ -7,7 +7,7 @@ import re
 import pytest
 
 from spook_tracker.engine import PLAIN, Method, simulate
-from spook_tracker.scalar_tests import pile, resting_stack
+from spook_tracker.scalar_tests.stacks import pile, resting_stack
 from tests.docs.test_site import DOCS
 
 SAID = " ".join((DOCS / "explanation" / "method.md").read_text(encoding="utf-8").split())

@@ -11,7 +11,7 @@ import pytest
 
 from spook_tracker.engine import AngularVelocity, Hinge, JointCoordinate, Load, Method, Scene, start
 from spook_tracker.engine.observe import Quantity
-from spook_tracker.scalar_tests import robot_arm
+from spook_tracker.scalar_tests.robots import robot_arm
 
 JOINTS = range(len(robot_arm.LINKS))
 AMPLITUDE = np.array([0.5, 0.4, -0.6, 0.7, 0.5, -0.9])  # rad

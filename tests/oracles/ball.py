@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from spook_tracker.scalar_tests import bouncing_ball
+from spook_tracker.scalar_tests.impacts import bouncing_ball
 
 
 def dropped(

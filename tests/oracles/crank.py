@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from spook_tracker.scalar_tests import slider_crank
+from spook_tracker.scalar_tests.mechanisms import slider_crank
 
 
 def cranked(crank: float, speed: float, steps: int, guided: bool = False) -> np.ndarray:

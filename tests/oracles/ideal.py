@@ -28,7 +28,7 @@ from spook_tracker.engine import (
 from spook_tracker.engine.build_info import BuildInfo
 from spook_tracker.engine.protocol import Capabilities, Configuration, Task
 from spook_tracker.engine.recording import Recording
-from spook_tracker.scalar_tests import humanoid, quadruped
+from spook_tracker.scalar_tests.robots import humanoid, quadruped
 from tests.oracles import constrained
 from tests.oracles import ideal_contacts as contacts
 from tests.oracles import ideal_motions as motions

@@ -12,9 +12,9 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import nnls
 
 from spook_tracker.engine import ConvexHull, Hinge, Lock, RigidBody, Scene
-from spook_tracker.scalar_tests import rover
-from spook_tracker.scalar_tests.door.scene import least_norm_forces
 from spook_tracker.scalar_tests.standing import Robot
+from spook_tracker.scalar_tests.thesis.door.scene import least_norm_forces
+from spook_tracker.scalar_tests.vehicles import rover
 from tests.oracles import constrained
 from tests.oracles.ideal_motions import Found
 

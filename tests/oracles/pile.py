@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
-from spook_tracker.scalar_tests import pile
+from spook_tracker.scalar_tests.stacks import pile
 
 STEP = 1e-3  # s
 STIFFNESS = 2e4  # N/m

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spook_tracker.scalar_tests import arm_path, robot_arm
 from spook_tracker.scalar_tests.bracket import break_point
+from spook_tracker.scalar_tests.robots import arm_path, robot_arm
 from tests.scalar_tests.limits import band, measurement
 
 STILL = np.zeros(6)

@@ -9,15 +9,16 @@ import pytest
 
 from spook_tracker.engine import PLAIN, Method
 from spook_tracker.engine.theory import one_row_matrix
-from spook_tracker.scalar_tests import loaded_rods, spinning_top
-from spook_tracker.scalar_tests.beam import stability as beam
 from spook_tracker.scalar_tests.bracket import break_point
 from spook_tracker.scalar_tests.case import StabilityStudy
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.multibody import bricard
-from spook_tracker.scalar_tests.n_pendulum import stability as chain
-from spook_tracker.scalar_tests.pendulum import stability as pendulum
-from spook_tracker.scalar_tests.planetarium.scene import GAUSS, PERIOD, SPEED
+from spook_tracker.scalar_tests.ropes import loaded_rods
+from spook_tracker.scalar_tests.rotation import spinning_top
+from spook_tracker.scalar_tests.thesis.beam import stability as beam
+from spook_tracker.scalar_tests.thesis.n_pendulum import stability as chain
+from spook_tracker.scalar_tests.thesis.pendulum import stability as pendulum
+from spook_tracker.scalar_tests.thesis.planetarium.scene import GAUSS, PERIOD, SPEED
 from tests.oracles import chain as oracle_chain
 from tests.oracles import simulate as oracle_simulate
 from tests.oracles.loop_theory import off

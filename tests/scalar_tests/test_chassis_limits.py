@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from spook_tracker.scalar_tests import suspension
+from spook_tracker.scalar_tests.vehicles import suspension
 from tests.scalar_tests.limits import measurement
 
 

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from spook_tracker.scalar_tests import rolling_coin
+from spook_tracker.scalar_tests.rotation import rolling_coin
 from tests.scalar_tests.limits import measurement
 
 MASS, RADIUS, THICKNESS = rolling_coin.MASS, rolling_coin.RADIUS, rolling_coin.THICKNESS

@@ -11,33 +11,32 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import linprog
 
-from spook_tracker.scalar_tests import (
+from spook_tracker.scalar_tests.fluids import sinking_sphere
+from spook_tracker.scalar_tests.friction import edge_roll, grain, rolling_friction, seams
+from spook_tracker.scalar_tests.impacts import (
     between_walls,
     blow,
     bounce_grid,
     bouncing_ball,
-    bowl,
     cradle,
-    edge_roll,
+    last_bounce,
+    oblique_impact,
+)
+from spook_tracker.scalar_tests.mechanisms import gears
+from spook_tracker.scalar_tests.rotation import bowl, rolling_beats, rolling_sphere
+from spook_tracker.scalar_tests.stacks import (
     falling_pile,
-    gears,
-    grain,
     leaning_cards,
     overhang,
     pile,
     resting_ball,
     resting_box,
     resting_grid,
-    rolling_friction,
-    rolling_sphere,
-    seams,
-    sinking_sphere,
-    vehicle,
 )
-from spook_tracker.scalar_tests.inclined_plane import force_ratio, slip_angle, slope_grid
-from spook_tracker.scalar_tests.inclined_plane import friction as plane
-from spook_tracker.scalar_tests.inclined_plane.scene import EDGE, FRICTION
-from spook_tracker.scalar_tests.measured import last_bounce, oblique_impact, rolling_beats
+from spook_tracker.scalar_tests.thesis.inclined_plane import force_ratio, slip_angle, slope_grid
+from spook_tracker.scalar_tests.thesis.inclined_plane import friction as plane
+from spook_tracker.scalar_tests.thesis.inclined_plane.scene import EDGE, FRICTION
+from spook_tracker.scalar_tests.vehicles import vehicle
 from tests.places import ROOT
 from tests.scalar_tests.limits import band
 

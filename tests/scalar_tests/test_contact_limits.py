@@ -12,21 +12,12 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import linprog
 
 from spook_tracker.engine import RigidBody
-from spook_tracker.scalar_tests import (
-    bowl,
-    card_house,
-    climb,
-    falling_pile,
-    grain,
-    hanging_cable,
-    masonry_arch,
-    rolling_coin,
-    sorting,
-    stone_bridge,
-    turntable,
-    vehicle,
-)
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.scalar_tests.friction import grain, sorting, turntable
+from spook_tracker.scalar_tests.ropes import hanging_cable
+from spook_tracker.scalar_tests.rotation import bowl, rolling_coin
+from spook_tracker.scalar_tests.stacks import card_house, falling_pile, masonry_arch, stone_bridge
+from spook_tracker.scalar_tests.vehicles import climb, vehicle
 from tests.scalar_tests.limits import band, measurement
 
 

@@ -12,9 +12,11 @@ import pytest
 from scipy.optimize import brentq
 
 from spook_tracker.engine import Method, Scene, SimulationFailed, simulate
-from spook_tracker.scalar_tests import between_walls, billiards, edge_roll, overhang
 from spook_tracker.scalar_tests.case import Simulate
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.scalar_tests.friction import edge_roll
+from spook_tracker.scalar_tests.impacts import between_walls, billiards
+from spook_tracker.scalar_tests.stacks import overhang
 from tests.toys.broken_engines import scaled, with_scene
 
 

@@ -13,33 +13,26 @@ from scipy.linalg import eigh
 from scipy.optimize import brentq
 from scipy.special import ellipj, ellipk
 
-from spook_tracker.scalar_tests import (
-    card_house,
-    conveyor,
-    grasp,
-    leaning_cards,
-    loaded_rods,
-    rolling_friction,
-    rope,
-    rotating_box,
-    scissor_lift,
-    seams,
-    sorting,
-    suspension,
-)
-from spook_tracker.scalar_tests.beam import scene as beam
-from spook_tracker.scalar_tests.cantilever import scene as cantilever
-from spook_tracker.scalar_tests.cantilever import statics
 from spook_tracker.scalar_tests.case import Metric
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
-from spook_tracker.scalar_tests.chain import small_motion
-from spook_tracker.scalar_tests.inclined_plane import scene as inclined_plane
-from spook_tracker.scalar_tests.inclined_plane import slip_angle
+from spook_tracker.scalar_tests.friction import conveyor, rolling_friction, seams, sorting
+from spook_tracker.scalar_tests.mechanisms import scissor_lift
 from spook_tracker.scalar_tests.multibody import simple_pendulum
 from spook_tracker.scalar_tests.multibody.library import library_error
-from spook_tracker.scalar_tests.n_pendulum import measure as chain
-from spook_tracker.scalar_tests.pendulum.scene import angle
-from spook_tracker.scalar_tests.planetarium import scene as planetarium
+from spook_tracker.scalar_tests.robots import grasp
+from spook_tracker.scalar_tests.ropes import loaded_rods, rope
+from spook_tracker.scalar_tests.ropes.chain import small_motion
+from spook_tracker.scalar_tests.rotation import rotating_box
+from spook_tracker.scalar_tests.stacks import card_house, leaning_cards
+from spook_tracker.scalar_tests.thesis.beam import scene as beam
+from spook_tracker.scalar_tests.thesis.cantilever import scene as cantilever
+from spook_tracker.scalar_tests.thesis.cantilever import statics
+from spook_tracker.scalar_tests.thesis.inclined_plane import scene as inclined_plane
+from spook_tracker.scalar_tests.thesis.inclined_plane import slip_angle
+from spook_tracker.scalar_tests.thesis.n_pendulum import measure as chain
+from spook_tracker.scalar_tests.thesis.pendulum.scene import angle
+from spook_tracker.scalar_tests.thesis.planetarium import scene as planetarium
+from spook_tracker.scalar_tests.vehicles import suspension
 from tests.oracles import chain as oracle_chain
 from tests.oracles import rigid_simulate as oracle_rigid_simulate
 from tests.oracles import simulate as oracle_simulate

@@ -13,18 +13,18 @@ import pytest
 
 from spook_tracker.engine import simulate, theory
 from spook_tracker.engine.theory import one_row_matrix
-from spook_tracker.scalar_tests import double_pendulum
-from spook_tracker.scalar_tests.beam import scene as beam
-from spook_tracker.scalar_tests.cantilever import statics
 from spook_tracker.scalar_tests.case import Measurement, Simulate
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
-from spook_tracker.scalar_tests.chain import GRAVITY
-from spook_tracker.scalar_tests.hanging_chain import scene as hanging
-from spook_tracker.scalar_tests.oscillator import damped
-from spook_tracker.scalar_tests.oscillator import scene as oscillator
-from spook_tracker.scalar_tests.pendulum import scene as pendulum
-from spook_tracker.scalar_tests.planetarium.metrics import OUR_SET_POINT
-from spook_tracker.scalar_tests.planetarium.scene import (
+from spook_tracker.scalar_tests.oscillators import double_pendulum
+from spook_tracker.scalar_tests.oscillators.oscillator import damped
+from spook_tracker.scalar_tests.oscillators.oscillator import scene as oscillator
+from spook_tracker.scalar_tests.ropes.chain import GRAVITY
+from spook_tracker.scalar_tests.ropes.hanging_chain import scene as hanging
+from spook_tracker.scalar_tests.thesis.beam import scene as beam
+from spook_tracker.scalar_tests.thesis.cantilever import statics
+from spook_tracker.scalar_tests.thesis.pendulum import scene as pendulum
+from spook_tracker.scalar_tests.thesis.planetarium.metrics import OUR_SET_POINT
+from spook_tracker.scalar_tests.thesis.planetarium.scene import (
     DURATION,
     GAUSS,
     SPEED,

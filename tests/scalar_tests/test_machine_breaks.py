@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import PLAIN, simulate
-from spook_tracker.scalar_tests import falling_chain, floating_box, slider_crank, wires
 from spook_tracker.scalar_tests.bracket import is_stable
 from spook_tracker.scalar_tests.case import StabilityMap
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.scalar_tests.fluids import floating_box
+from spook_tracker.scalar_tests.mechanisms import slider_crank
+from spook_tracker.scalar_tests.ropes import falling_chain, wires
 from tests.oracles.crank import cranked
 from tests.scalar_tests.limits import band
 

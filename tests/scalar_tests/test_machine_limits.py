@@ -8,20 +8,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from spook_tracker.scalar_tests import (
-    bowl,
-    cornering,
-    floating_box,
-    grasp,
-    loose_bearing,
-    motor,
-    robot_arm,
-    rolling_log,
-    rope,
-    scissor_lift,
-    sinking_sphere,
-    slider_crank,
-)
+from spook_tracker.scalar_tests.fluids import floating_box, rolling_log, sinking_sphere
+from spook_tracker.scalar_tests.mechanisms import loose_bearing, motor, scissor_lift, slider_crank
+from spook_tracker.scalar_tests.robots import grasp, robot_arm
+from spook_tracker.scalar_tests.ropes import rope
+from spook_tracker.scalar_tests.rotation import bowl
+from spook_tracker.scalar_tests.vehicles import cornering
 from tests.oracles.crank import cranked, stepped
 from tests.scalar_tests.limits import band, measurement
 

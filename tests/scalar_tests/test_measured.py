@@ -11,14 +11,10 @@ from msgspec import structs
 from scipy.stats import chi2
 
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
-from spook_tracker.scalar_tests.measured import (
-    bar_pendulum,
-    last_bounce,
-    oblique_impact,
-    rolling_beats,
-    seconds_pendulum,
-)
-from spook_tracker.scalar_tests.measured.readings import Reading, deviation, farthest
+from spook_tracker.scalar_tests.impacts import last_bounce, oblique_impact
+from spook_tracker.scalar_tests.oscillators import bar_pendulum, seconds_pendulum
+from spook_tracker.scalar_tests.readings import Reading, deviation, farthest
+from spook_tracker.scalar_tests.rotation import rolling_beats
 from spook_tracker.tracker.website.nights import book
 from spook_tracker.tracker.website.page_index import index
 from tests.histories.synthetic import history

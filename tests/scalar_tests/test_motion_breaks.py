@@ -9,22 +9,21 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from spook_tracker.engine.theory import one_row_matrix
-from spook_tracker.scalar_tests import (
-    between_walls,
-    double_pendulum,
-    falling_object,
-    lock_ring,
-    motor,
-    rotating_box,
-    steady_turns,
-    thrown_die,
+from spook_tracker.scalar_tests.impacts import between_walls
+from spook_tracker.scalar_tests.mechanisms import lock_ring, motor
+from spook_tracker.scalar_tests.oscillators import bar_pendulum, double_pendulum, seconds_pendulum
+from spook_tracker.scalar_tests.oscillators.oscillator import filter as low_pass
+from spook_tracker.scalar_tests.oscillators.oscillator.scene import (
+    MASS,
+    START,
+    TIME_STEP,
+    stiffness_of_period,
 )
-from spook_tracker.scalar_tests.cantilever import stability as column
-from spook_tracker.scalar_tests.cantilever.scene import DENSITY, deflection
-from spook_tracker.scalar_tests.measured import bar_pendulum, seconds_pendulum
-from spook_tracker.scalar_tests.oscillator import filter as low_pass
-from spook_tracker.scalar_tests.oscillator.scene import MASS, START, TIME_STEP, stiffness_of_period
-from spook_tracker.scalar_tests.planetarium import measure as planetarium
+from spook_tracker.scalar_tests.rotation import rotating_box, steady_turns, thrown_die
+from spook_tracker.scalar_tests.thesis import falling_object
+from spook_tracker.scalar_tests.thesis.cantilever import stability as column
+from spook_tracker.scalar_tests.thesis.cantilever.scene import DENSITY, deflection
+from spook_tracker.scalar_tests.thesis.planetarium import measure as planetarium
 from tests.scalar_tests.limits import band
 
 

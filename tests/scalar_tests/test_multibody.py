@@ -10,7 +10,7 @@ import pytest
 from spook_tracker.engine import simulate
 from spook_tracker.scalar_tests.multibody import bricard, four_bars, governor, squeezer
 from spook_tracker.scalar_tests.multibody.library import library_error, turned
-from spook_tracker.scalar_tests.pendulum.scene import angle
+from spook_tracker.scalar_tests.thesis.pendulum.scene import angle
 
 
 def test_the_error_measure_is_relative_except_near_zero() -> None:

@@ -10,7 +10,7 @@ import pytest
 
 from spook_tracker.engine import Method, simulate
 from spook_tracker.scalar_tests.case import BreakPoint, Simulate
-from spook_tracker.scalar_tests.solver_options import TEST
+from spook_tracker.scalar_tests.stacks.solver_options import TEST
 
 
 def taking(change: Callable[[Method], Method], longer: float = 0.0) -> Simulate:

@@ -14,9 +14,11 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import Final, Method, Particle, Position, Scene, Spring, Velocity, simulate
-from spook_tracker.scalar_tests import double_pendulum, spinning_top, swinging_door
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.scalar_tests.mechanisms import swinging_door
 from spook_tracker.scalar_tests.multibody import four_bars
+from spook_tracker.scalar_tests.oscillators import double_pendulum
+from spook_tracker.scalar_tests.rotation import spinning_top
 
 STAGES = {"order4": 5, "order6": 9, "order8": 17}
 ROUNDING = 2e-15  # of a joint's size: where a stage counts as held

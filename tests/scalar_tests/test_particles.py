@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import Particle, Position, Scene, SimulationFailed, simulate
-from spook_tracker.scalar_tests import chain
 from spook_tracker.scalar_tests.case import Metric, Simulate
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
-from spook_tracker.scalar_tests.oscillator import scene as oscillator
-from spook_tracker.scalar_tests.pendulum import scene as pendulum_scene
-from spook_tracker.scalar_tests.planetarium import scene as planetarium_scene
+from spook_tracker.scalar_tests.oscillators.oscillator import scene as oscillator
+from spook_tracker.scalar_tests.ropes import chain
+from spook_tracker.scalar_tests.thesis.pendulum import scene as pendulum_scene
+from spook_tracker.scalar_tests.thesis.planetarium import scene as planetarium_scene
 from tests.scenes.seen import finals
 from tests.toys.broken_engines import deaf, off_by, scaled, with_scene
 

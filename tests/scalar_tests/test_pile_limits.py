@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from spook_tracker.scalar_tests import pile
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.scalar_tests.stacks import pile
 from tests.oracles.pile import missing_loads
 
 COUNTS = {

@@ -10,12 +10,12 @@ import pytest
 
 from spook_tracker.engine import PLAIN, RigidBody, Scene, simulate
 from spook_tracker.engine.joints import Joint
-from spook_tracker.scalar_tests import resting_box, resting_stack
-from spook_tracker.scalar_tests.beam import scene as beam_scene
-from spook_tracker.scalar_tests.cantilever import scene as cantilever
-from spook_tracker.scalar_tests.cantilever import statics
 from spook_tracker.scalar_tests.case import Measurement, Simulate
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.scalar_tests.stacks import resting_box, resting_stack
+from spook_tracker.scalar_tests.thesis.beam import scene as beam_scene
+from spook_tracker.scalar_tests.thesis.cantilever import scene as cantilever
+from spook_tracker.scalar_tests.thesis.cantilever import statics
 from tests.toys.broken_engines import lopsided, off_by, with_scene
 
 SLOW = {("beam", 2000.0)}  # a beam of 250 m takes seconds; every night runs it

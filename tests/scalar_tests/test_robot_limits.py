@@ -8,8 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from spook_tracker.scalar_tests import box_push, coin_field, humanoid, latch, quadruped, rover
+from spook_tracker.scalar_tests.friction import coin_field
+from spook_tracker.scalar_tests.mechanisms import latch
+from spook_tracker.scalar_tests.robots import box_push, humanoid, quadruped
 from spook_tracker.scalar_tests.standing import GRAVITY, Robot
+from spook_tracker.scalar_tests.vehicles import rover
 from tests.scalar_tests.limits import band, measurement
 
 TINY = 1e-4  # s, between the places of a motion that differences are taken of

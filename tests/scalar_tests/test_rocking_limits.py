@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from spook_tracker.scalar_tests import rocking_block, shaken_block
+from spook_tracker.scalar_tests.stacks import rocking_block, shaken_block
 from tests.scalar_tests.limits import measurement
 
 

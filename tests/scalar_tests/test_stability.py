@@ -16,7 +16,11 @@ from spook_tracker.engine.theory import one_row_matrix
 from spook_tracker.scalar_tests.bracket import break_count, break_point, cell, is_stable
 from spook_tracker.scalar_tests.case import BreakPoint, Simulate, StabilityMap, StabilityStudy
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
-from spook_tracker.scalar_tests.oscillator.stability import growth_error, measured_growth, predicted_growth
+from spook_tracker.scalar_tests.oscillators.oscillator.stability import (
+    growth_error,
+    measured_growth,
+    predicted_growth,
+)
 
 KINDS = {"settled", "bounded", "growing", "diverged", "not_finite"}
 STUDIES = [(name, study) for name, test in CATALOGUE.items() for study in test.stability]

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from scipy.linalg import eigh
 
-from spook_tracker.scalar_tests import falling_chain, hanging_cable, rope, taut_rope
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
+from spook_tracker.scalar_tests.ropes import falling_chain, hanging_cable, rope, taut_rope
 from tests.scalar_tests.limits import measurement
 
 

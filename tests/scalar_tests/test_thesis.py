@@ -8,12 +8,17 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import simulate
-from spook_tracker.scalar_tests.beam.scene import COUNT, SIZE, sag_of_compliant_beam
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
-from spook_tracker.scalar_tests.door.measure import SINGLE
-from spook_tracker.scalar_tests.inclined_plane.friction import PRESSED, STEEP
-from spook_tracker.scalar_tests.inclined_plane.scene import FRICTION, MODELS, force_ratio, unloaded
-from spook_tracker.scalar_tests.n_pendulum.figures import OTHER_DURATION, OTHER_LINK, other_reading, swing
+from spook_tracker.scalar_tests.thesis.beam.scene import COUNT, SIZE, sag_of_compliant_beam
+from spook_tracker.scalar_tests.thesis.door.measure import SINGLE
+from spook_tracker.scalar_tests.thesis.inclined_plane.friction import PRESSED, STEEP
+from spook_tracker.scalar_tests.thesis.inclined_plane.scene import FRICTION, MODELS, force_ratio, unloaded
+from spook_tracker.scalar_tests.thesis.n_pendulum.figures import (
+    OTHER_DURATION,
+    OTHER_LINK,
+    other_reading,
+    swing,
+)
 from tests.oracles import chain as oracle_chain
 
 

@@ -7,16 +7,11 @@ import math
 import numpy as np
 import pytest
 
-from spook_tracker.scalar_tests import (
-    capstan,
-    climb,
-    scissor_lift,
-    shaken_block,
-    sorting,
-    suspension,
-    taut_rope,
-    turntable,
-)
+from spook_tracker.scalar_tests.friction import capstan, sorting, turntable
+from spook_tracker.scalar_tests.mechanisms import scissor_lift
+from spook_tracker.scalar_tests.ropes import taut_rope
+from spook_tracker.scalar_tests.stacks import shaken_block
+from spook_tracker.scalar_tests.vehicles import climb, suspension
 from tests.scalar_tests.limits import band
 
 

@@ -23,7 +23,7 @@ from spook_tracker.engine import (
     Sphere,
     Spring,
 )
-from spook_tracker.scalar_tests import pile
+from spook_tracker.scalar_tests.stacks import pile
 from tests.scenes import corpus
 
 H = 1 / 60  # s

@@ -11,7 +11,7 @@ from spook_tracker.engine.method import PLAIN, Method
 from spook_tracker.engine.observe import Final, Position
 from spook_tracker.scalar_tests.bracket import break_count
 from spook_tracker.scalar_tests.case import BreakPoint, Configuration, Ladder, Measurement, Metric, Simulate
-from spook_tracker.scalar_tests.resting_stack import scene
+from spook_tracker.scalar_tests.stacks.resting_stack import scene
 
 COUNT, STEPS = 200, 60
 SWEEPS = Method(solver="iterative", iterations=50)

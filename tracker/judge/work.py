@@ -110,7 +110,9 @@ def with_work(
         definition, sample = pair
         if sample.counters:
             test, configuration = definition.test, definition.configuration
-            if key != definition.key and key.count("/") >= 2:  # measured under an earlier name; a key may be any text
+            if (
+                key != definition.key and key.count("/") >= 2
+            ):  # measured under an earlier name; a key may be any text
                 test, configuration, *_ = key.split("/")
             grouped.setdefault((test, configuration, FAMILIES[definition.kind]), []).append((key, pair))
     found = dict(samples)

@@ -20,7 +20,7 @@ from spook_tracker.engine import (
     simulate,
 )
 from spook_tracker.engine.result import Array
-from spook_tracker.scalar_tests import falling_pile
+from spook_tracker.scalar_tests.stacks import falling_pile
 from tests.scenes.seen import traces
 
 TURNED = np.array(

@@ -18,7 +18,7 @@ from spook_tracker.engine import (
     Velocity,
     simulate,
 )
-from spook_tracker.scalar_tests import masonry_arch
+from spook_tracker.scalar_tests.stacks import masonry_arch
 from tests.scenes.contact import DOWN, TIME_STEP, cube, ground
 from tests.scenes.seen import finals, traces
 

@@ -7,7 +7,7 @@ import pytest
 
 from spook_tracker.engine import Method, Penetration, Plane, RigidBody, Scene, Sphere, Velocity, simulate
 from spook_tracker.engine.bodies import Material
-from spook_tracker.scalar_tests import falling_pile, pile
+from spook_tracker.scalar_tests.stacks import falling_pile, pile
 from tests.scenes.corpus import solid
 from tests.scenes.seen import finals, traces
 

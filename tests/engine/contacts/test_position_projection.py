@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import Box, Maximum, Penetration, Position, RigidBody, Scene, Trace, simulate
-from spook_tracker.scalar_tests import loose_bearing
+from spook_tracker.scalar_tests.mechanisms import loose_bearing
 from tests.scenes.corpus import solid
 
 

@@ -24,7 +24,7 @@ from spook_tracker.engine import (
     Velocity,
     simulate,
 )
-from spook_tracker.scalar_tests import bouncing_ball
+from spook_tracker.scalar_tests.impacts import bouncing_ball
 from tests.oracles.ball import dropped
 from tests.scenes.contact import DOWN, GRAVITY, TIME_STEP, ball, ground
 from tests.scenes.seen import finals, maxima, traces

@@ -29,8 +29,9 @@ from spook_tracker.engine import (
     simulate,
     start,
 )
-from spook_tracker.scalar_tests import pile, scissor_lift
-from spook_tracker.scalar_tests.beam.scene import scene as beam
+from spook_tracker.scalar_tests.mechanisms import scissor_lift
+from spook_tracker.scalar_tests.stacks import pile
+from spook_tracker.scalar_tests.thesis.beam.scene import scene as beam
 from tests.engine.test_symmetries import heap
 from tests.scenes.contact import DOWN, TIME_STEP, cube, ground
 from tests.scenes.corpus import solid

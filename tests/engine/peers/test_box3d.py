@@ -30,8 +30,8 @@ from spook_tracker.engine import (
     Velocity,
 )
 from spook_tracker.engine.find import EngineMissing, find
-from spook_tracker.scalar_tests import resting_stack
-from spook_tracker.scalar_tests.inclined_plane.scene import scene as inclined
+from spook_tracker.scalar_tests.stacks import resting_stack
+from spook_tracker.scalar_tests.thesis.inclined_plane.scene import scene as inclined
 
 try:
     BOX3D = find("box3d")

@@ -21,7 +21,7 @@ from spook_tracker.engine import (
     Scene,
 )
 from spook_tracker.engine.find import find
-from spook_tracker.scalar_tests import rolling_friction
+from spook_tracker.scalar_tests.friction import rolling_friction
 from tests.scenes import peer as peer_scenes
 
 pytest.importorskip(

@@ -36,8 +36,11 @@ from spook_tracker.engine import (
 )
 from spook_tracker.engine.find import find
 from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.scalar_tests import humanoid, latch, resting_stack, rolling_friction
-from spook_tracker.scalar_tests.inclined_plane.scene import scene as inclined
+from spook_tracker.scalar_tests.friction import rolling_friction
+from spook_tracker.scalar_tests.mechanisms import latch
+from spook_tracker.scalar_tests.robots import humanoid
+from spook_tracker.scalar_tests.stacks import resting_stack
+from spook_tracker.scalar_tests.thesis.inclined_plane.scene import scene as inclined
 
 pytest.importorskip("mujoco", reason="the extra mujoco is not installed: pip install 'spook-tracker[mujoco]'")
 GRAVITY = (0.0, 0.0, -9.81)

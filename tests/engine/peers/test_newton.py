@@ -13,7 +13,7 @@ import bench.engine_facts as engine_facts
 from spook_tracker.engine import ContactForce, Final, Load, Position, Scene, SimulationFailed, Trace
 from spook_tracker.engine.find import find
 from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.scalar_tests import resting_grid
+from spook_tracker.scalar_tests.stacks import resting_grid
 from tests.scenes import peer as peer_scenes
 
 pytest.importorskip("newton", reason="the extra newton is not installed: pip install 'spook-tracker[newton]'")

@@ -22,7 +22,7 @@ from spook_tracker.engine import (
 from spook_tracker.engine.find import find
 from spook_tracker.engine.peers.surfaces import shares
 from spook_tracker.engine.protocol import NotSupported
-from spook_tracker.scalar_tests import rolling_friction
+from spook_tracker.scalar_tests.friction import rolling_friction
 from tests.scenes import peer as peer_scenes
 from tests.scenes.corpus import fixed, solid
 

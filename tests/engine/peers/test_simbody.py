@@ -31,7 +31,8 @@ from spook_tracker.engine import (
     Violation,
 )
 from spook_tracker.engine.find import find
-from spook_tracker.scalar_tests import loaded_rods, lock_ring
+from spook_tracker.scalar_tests.mechanisms import lock_ring
+from spook_tracker.scalar_tests.ropes import loaded_rods
 from tests.scenes import peer as peer_scenes
 
 pytest.importorskip(

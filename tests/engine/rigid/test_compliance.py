@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from spook_tracker.engine import Distance, Hinge, Lock, Orientation, Position, Scene, Trace, joints, simulate
-from spook_tracker.scalar_tests.beam import scene as beam
 from spook_tracker.scalar_tests.multibody import bricard, squeezer
 from spook_tracker.scalar_tests.multibody.library import turned
+from spook_tracker.scalar_tests.thesis.beam import scene as beam
 from tests.places import ROOT
 
 PAGE = (ROOT / "docs" / "explanation" / "compliance.md").read_text(encoding="utf-8")

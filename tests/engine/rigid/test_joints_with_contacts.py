@@ -27,9 +27,9 @@ from spook_tracker.engine import (
     simulate,
     start,
 )
-from spook_tracker.scalar_tests import loose_bearing
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
 from spook_tracker.scalar_tests.heavier import heavier
+from spook_tracker.scalar_tests.mechanisms import loose_bearing
 from tests.scenes.corpus import solid
 from tests.scenes.seen import finals, maxima, traces
 

@@ -29,10 +29,10 @@ from spook_tracker.engine import (
     Sinusoid,
     simulate,
 )
-from spook_tracker.scalar_tests import scissor_lift
-from spook_tracker.scalar_tests.door import scene as door
+from spook_tracker.scalar_tests.mechanisms import scissor_lift
 from spook_tracker.scalar_tests.multibody import bricard
 from spook_tracker.scalar_tests.multibody.library import turned
+from spook_tracker.scalar_tests.thesis.door import scene as door
 from tests.scenes.seen import finals, traces
 
 G = 9.81  # m/s²

@@ -36,7 +36,8 @@ from spook_tracker.engine import (
     compile,
     simulate,
 )
-from spook_tracker.scalar_tests import spinning_top, swinging_door
+from spook_tracker.scalar_tests.mechanisms import swinging_door
+from spook_tracker.scalar_tests.rotation import spinning_top
 from tests.oracles.rigid_composition import assert_dense_steps, oracle_of
 from tests.scenes.corpus import solid
 from tests.scenes.rigid import EVERY_JOINT, one_joint

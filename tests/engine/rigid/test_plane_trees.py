@@ -10,7 +10,7 @@ import pytest
 
 from spook_tracker import engine
 from spook_tracker.engine import WORLD, Hinge, Method, Prismatic, RigidBody, Scene, simulate
-from spook_tracker.scalar_tests import swinging_door
+from spook_tracker.scalar_tests.mechanisms import swinging_door
 from spook_tracker.scalar_tests.multibody import four_bars
 from tests.engine.test_symmetries import rotation, turned
 from tests.oracles.rigid_composition import STATE, assert_dense_steps

@@ -20,7 +20,7 @@ from spook_tracker.engine import (
     Scene,
     simulate,
 )
-from spook_tracker.scalar_tests import cornering
+from spook_tracker.scalar_tests.vehicles import cornering
 
 TIME_STEP = 1.0 / 60.0
 GRAVITY = (0.0, 0.0, -9.81)

@@ -37,7 +37,7 @@ from spook_tracker.engine import (
 )
 from spook_tracker.engine.protocol import Capabilities, unsupported
 from spook_tracker.engine.theory import one_row_matrix
-from spook_tracker.scalar_tests import cornering
+from spook_tracker.scalar_tests.vehicles import cornering
 from tests.scenes.corpus import solid
 
 H = 1.0 / 240.0

@@ -14,7 +14,12 @@ from click.testing import CliRunner
 from spook_tracker import engine
 from spook_tracker.scalar_tests.case import Part, Reason, StabilityMap
 from spook_tracker.scalar_tests.catalogue import CATALOGUE
-from spook_tracker.scalar_tests.oscillator.scene import decay, growth, run_map, stiffness_of_period
+from spook_tracker.scalar_tests.oscillators.oscillator.scene import (
+    decay,
+    growth,
+    run_map,
+    stiffness_of_period,
+)
 from spook_tracker.tracker.cli.main import main
 from spook_tracker.tracker.cli.report_catalogue import coverage_rows, coverage_table
 from spook_tracker.tracker.document.coverage import HEADINGS, Rungs, rungs

@@ -1,0 +1,1 @@
+"""What floats and sinks."""

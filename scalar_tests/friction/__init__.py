@@ -1,0 +1,1 @@
+"""What holds, slides, rolls and sorts by friction."""

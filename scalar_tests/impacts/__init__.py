@@ -1,0 +1,1 @@
+"""What rebounds, once or a thousand times."""

@@ -1,0 +1,1 @@
+"""Joints with motors, stops and play."""

@@ -1,0 +1,1 @@
+"""Springs and pendulums whose motion is known in closed form or was measured."""

@@ -1,0 +1,1 @@
+"""Arms, hands and legs."""

@@ -1,0 +1,1 @@
+"""Chains, ropes, cables and wires."""

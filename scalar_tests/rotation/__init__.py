@@ -1,0 +1,1 @@
+"""What spins, tumbles and rolls."""

@@ -1,0 +1,1 @@
+"""What stands or leans by its weight, or falls to a heap."""

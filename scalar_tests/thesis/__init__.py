@@ -1,0 +1,1 @@
+"""The scalar tests of Sundling's thesis (2016), and grids of the same slope."""

@@ -1,0 +1,1 @@
+"""What drives, on tyres or wheels."""
