@@ -11,7 +11,7 @@ from bench import robots
 from spook_tracker.engine import Energy, Trace, simulate
 
 
-@pytest.mark.parametrize("number", [51, 255, 456, 465, 558, 663, 684, 1104, 1176])
+@pytest.mark.parametrize("number", [51, 255, 456, 465, 558, 663, 1104, 1176])
 def test_a_heap_on_joints_of_masses_a_hundred_times_apart_loses_energy(number: int) -> None:
     """In an impact a light link is turned by a radian in a step, or (456) jammed between heavy ones, as flat as a toggle joint; from
     558 on links begin inside each other where stops and hinges do not let them part."""

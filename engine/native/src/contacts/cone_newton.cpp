@@ -66,17 +66,18 @@ void ConeNewton::prepare(MixedSystem& system, const std::vector<FrictionPoint>& 
     mass_.find(system.mass, [this](std::size_t b) { mass_inverse_[b] = inverse_six(mass_[b]); });
     std::vector<const FrictionPoint*>& friction = friction_;
     friction.assign(system.rows.size(), nullptr);
-    for (const FrictionPoint& point : points) friction[point.block] = &point;
+    for (const FrictionPoint& point : points)
+        if (!turns(point)) friction[point.block] = &point;
     units_.clear();
     fours_.clear();
+    turning_.clear();
+    std::size_t next = 0;
     for (std::size_t k = 0; k < system.rows.size(); ++k) {
         RowBlock& given = system.rows[k];
         const bool rough = friction[k] && friction[k]->coefficient > 0.0;
-        int rows = given.size;
-        if (friction[k] && !rough) {  // smooth: its tangents carry nothing
-            given.multiplier[1] = given.multiplier[2] = 0.0;
-            rows = 1;
-        }
+        const int rows = rough ? 3 : friction[k] || given.is_contact ? 1 : given.size;
+        const Vec6 start = given.multiplier;
+        for (int row = rows; row < given.size; ++row) given.multiplier[row] = 0.0;  // smooth
         const int size = rough ? 3 : 1;
         for (int row = 0; row < rows; row += size) {
             if (BilateralRows::is_bilateral(given, row)) continue;
@@ -89,6 +90,14 @@ void ConeNewton::prepare(MixedSystem& system, const std::vector<FrictionPoint>& 
             unit.row = row;
             unit.size = size;
             read(given, friction[k], unit, fours_.back(), fours_.back().count++);
+        }
+        const int normal = static_cast<int>(units_.size()) - 1;
+        for (; next < points.size() && points[next].block == static_cast<int>(k); ++next) {
+            const FrictionPoint& point = points[next];
+            if (!turns(point)) continue;
+            for (int row = point.row; row < point.row + point.size; ++row) given.multiplier[row] = start[row];
+            turning_.read(given, point, mass_, static_cast<int>(fours_.size()) - 1, fours_.back().count - 1,
+                          normal);
         }
     }
     joints_.read(system, mass_);
@@ -132,9 +141,10 @@ void ConeNewton::connect() {
 
 /// The square of the smoothed map a part of the way along Newton's direction and the path; past `enough` a part of it.
 double ConeNewton::merit(double blur, double length, double along, double enough) const {
-    const double joints = joints_.merit(length, along);
-    if (joints > enough) return joints;
-    return joints + laws_->merit(fours_, {blur, hold_, frozen_}, length, along, enough - joints);
+    const ConeAid aid{blur, hold_, frozen_};
+    const double beside = joints_.merit(length, along) + turning_.merit(fours_, aid, length, along);
+    if (beside > enough) return beside;
+    return beside + laws_->merit(fours_, aid, length, along, enough - beside);
 }
 
 /// Newton's direction, by a factor of M + Σ Gᵀ K G.
@@ -143,6 +153,8 @@ bool ConeNewton::step(const MixedSystem& system, double blur) {
     for (int b = 0; b < bodies_; ++b) std::copy_n(system.mass[b].data(), 36, matrix_.diagonal(b));
     laws_->linearise(fours_, {blur, hold_, frozen_});
     laws_->add(fours_, units_);
+    turning_.linearise(fours_, {blur, hold_, frozen_});
+    turning_.add(fours_, units_);
     joints_.fill(bodies_, matrix_);
     ++factorisations_;
     block_operations_ += static_cast<std::uint64_t>(matrix_.operations());
@@ -160,22 +172,25 @@ void ConeNewton::scale(double share, const ConeFour::Each* from, ConeFour::Each*
 bool ConeNewton::find_directions(double blur) {
     for (ConeFour& four : fours_) scale(-1.0, four.map, four.lack);
     joints_.ask(true);
+    turning_.ask(true, blur);
     if (!answer(&ConeFour::dz, &ConeFour::du, true, refined)) return false;
     if (blur == 0.0) {  // a jump: there is no path
         for (ConeFour& four : fours_)
             for (int k = 0; k < 3; ++k) std::fill_n(four.tz[k], 4, 0.0), std::fill_n(four.tu[k], 4, 0.0);
         joints_.forget_path();
+        turning_.forget_path();
         return true;
     }
     for (ConeFour& four : fours_) scale(blur, four.bend, four.lack);
     joints_.ask(false);
+    turning_.ask(false, blur);
     return answer(&ConeFour::tz, &ConeFour::tu, false, roughly);
 }
 
 /// The dz and du that answer what the units' laws lack, refined while that helps and more than `enough` is left.
 bool ConeNewton::answer(ConeFour::Each (ConeFour::*dz)[3], ConeFour::Each (ConeFour::*du)[3], bool newton,
                         double enough) {
-    double asked = joints_.asked();
+    double asked = joints_.asked() + turning_.asked();
     for (const ConeFour& four : fours_)
         for (int i = 0; i < four.count; ++i) {
             const double a = four.lack[0][i], b = four.lack[1][i], c = four.lack[2][i];
@@ -185,13 +200,16 @@ bool ConeNewton::answer(ConeFour::Each (ConeFour::*dz)[3], ConeFour::Each (ConeF
     for (int round = 0; round < 3; ++round) {
         image_.assign(mass_inverse_.size() + joints_.nodes(), Vec6{});
         laws_->respond(fours_, units_, image_.data());
+        turning_.respond(fours_, image_.data());
         joints_.respond(image_.data() + bodies_);
         matrix_.solve(image_[0].data());
         change_.assign(mass_inverse_.size(), Vec6{});
         laws_->turn(fours_, units_, image_.data(), change_.data());
+        turning_.turn(fours_, image_.data(), change_.data());
         joints_.turn(image_.data() + bodies_, change_.data());
         laws_->map_bodies(mass_inverse_, change_.data());
-        const double left = joints_.remain(change_.data()) + laws_->remain(fours_, units_, change_.data());
+        const double left = joints_.remain(change_.data()) + turning_.remain(fours_, change_.data()) +
+                            laws_->remain(fours_, units_, change_.data());
         if (!std::isfinite(left)) return false;
         if (round > 0 && !(left < before)) break;
         for (ConeFour& four : fours_)
@@ -202,6 +220,7 @@ bool ConeNewton::answer(ConeFour::Each (ConeFour::*dz)[3], ConeFour::Each (ConeF
                     u = (round == 0 ? 0.0 : u) + four.turn[k][i];
                 }
         joints_.take(newton, round == 0);
+        turning_.take(newton, round == 0);
         if (left <= enough * asked) break;
         before = left;
     }
@@ -213,16 +232,23 @@ void ConeNewton::measure(const MixedSystem& system) {
     velocity_ = system.momentum;
     laws_->push(fours_, units_, velocity_.data());
     joints_.push(velocity_.data());
+    turning_.push(velocity_.data());
     for (std::size_t b = 0; b < velocity_.size(); ++b) solve_six(mass_[b], velocity_[b]);
     laws_->measure(fours_, units_, velocity_.data());
     joints_.measure(velocity_.data());
+    turning_.measure(velocity_.data());
 }
 
 ConeNewton::Left ConeNewton::worst() const {
+    Left left = turning_.worst(fours_, frozen_);
+    const auto add = [&left](double map, double speed) {  // not a number stays
+        if (left.map <= map || std::isnan(map)) left.map = map;
+        if (left.speed <= speed || std::isnan(speed)) left.speed = speed;
+    };
     const Left laws = laws_->worst(fours_, frozen_);
     const BilateralRows::Left joints = joints_.worst();
-    return {laws.map <= joints.map ? joints.map : laws.map,
-            laws.speed <= joints.speed ? joints.speed : laws.speed};
+    add(laws.map, laws.speed), add(joints.map, joints.speed);
+    return left;
 }
 
 /// What is lost of a speed beside the largest impulse: bodies squeezed without a way out push ever harder.
@@ -236,7 +262,7 @@ double ConeNewton::rounding() const {
 
 /// The speeds there are without contacts, and those that rows ask for.
 double ConeNewton::speed_of(const MixedSystem& system) const {
-    double speed = joints_.largest_right();
+    double speed = std::max(joints_.largest_right(), turning_.largest_right());
     for (std::size_t b = 0; b < system.momentum.size(); ++b) {
         Vec6 v = system.momentum[b];
         solve_six(mass_[b], v);
@@ -250,7 +276,7 @@ double ConeNewton::speed_of(const MixedSystem& system) const {
 
 /// The next point: on along the path as far as it stays near, else towards it.
 ConeNewton::Search ConeNewton::search(double blur) const {
-    const double wide = near_ * near_ * static_cast<double>(units_.size() + joints_.rows());
+    const double wide = near_ * near_ * static_cast<double>(units_.size() + joints_.rows() + turning_.rows());
     for (const double share : {1e-3, 1e-2, 0.1, 0.3, 0.6, 0.9}) {
         const double next = share * blur, room = wide * next * next;
         if (merit(next, 1.0, 1.0 - share, room) <= room) return {next, 1.0, 1.0 - share};
@@ -275,6 +301,7 @@ void ConeNewton::hold() {
             four.held[2][i] = four.z[2][i] * four.along[i];
             four.load[i] = std::abs(four.held[0][i]);
         }
+    turning_.hold(fours_);
 }
 
 void ConeNewton::move(const MixedSystem& system, const Search& found) {
@@ -284,6 +311,7 @@ void ConeNewton::move(const MixedSystem& system, const Search& found) {
             for (int i = 0; i < ConeFour::most; ++i)
                 four.z[k][i] += found.length * four.dz[k][i] + found.along * four.tz[k][i];
     joints_.move(found.length, found.along);
+    turning_.move(found.length, found.along);
     measure(system);
 }
 
@@ -315,6 +343,7 @@ void ConeNewton::let_go_behind(const Left& left, const Left& before, double blur
 void ConeNewton::keep_met() {
     for (ConeFour& four : fours_) scale(1.0, four.z, four.met);
     joints_.keep_met();
+    turning_.keep_met();
 }
 
 /// Where the path is begun again, which was met last at the blur `met`: the blur, further from the end.
@@ -323,6 +352,7 @@ double ConeNewton::back_from(double met, double blur, const MixedSystem& system)
     near_ *= nearer;
     for (ConeFour& four : fours_) scale(1.0, four.met, four.z);
     joints_.back_to_met();
+    turning_.back_to_met();
     measure(system);
     return back * met;
 }
@@ -340,6 +370,7 @@ void ConeNewton::take_best(MixedSystem& system) {
         }
     }
     joints_.deliver(system);
+    turning_.deliver(system);
     measure(system);  // what is handed over, not what led to it
     system.velocity = velocity_;
 }
@@ -398,13 +429,18 @@ ConeReport ConeNewton::solve(MixedSystem& system, const std::vector<FrictionPoin
     return report;
 }
 
+void ConeNewton::back_to_best(const MixedSystem& system) {
+    for (std::size_t k = 0; k < fours_.size(); ++k) scale(1.0, best_[k].z, fours_[k].z);
+    joints_.back_to_best();
+    turning_.back_to_best();
+    measure(system);
+}
+
 /// Where the path ends for Coulomb's law, which may have several answers, De Saxcé's term is frozen: what is left is convex
 /// and has one path. Its end gives the next term; a fixed point is an answer. Between, a few of Newton's steps on the law
 /// itself, which finish.
 ConeNewton::Left ConeNewton::follow_frozen(MixedSystem& system, ConeReport& report, Left best) {
-    for (std::size_t k = 0; k < fours_.size(); ++k) scale(1.0, best_[k].z, fours_[k].z);
-    joints_.back_to_best();
-    measure(system);
+    back_to_best(system);
     for (int outer = 0; outer < max_frozen && !(best.speed <= near_enough * speed_); ++outer) {
         Watch::look();
         for (ConeFour& four : fours_)
@@ -412,6 +448,7 @@ ConeNewton::Left ConeNewton::follow_frozen(MixedSystem& system, ConeReport& repo
                 four.slide[i] = four.size < 3
                                     ? 0.0
                                     : four.root[i] * four.friction[i] * length(four.u[1][i], four.u[2][i]);
+        turning_.freeze();
         const double off = worst().map, met = best.speed;  // of the law itself
         for (const bool frozen : {true, false}) {
             frozen_ = frozen;
@@ -439,9 +476,7 @@ ConeNewton::Left ConeNewton::follow_frozen(MixedSystem& system, ConeReport& repo
             const Left left = worst();
             if (left.speed < best.speed) best = left, keep();
             if (!frozen && !(left.map < off)) {
-                for (std::size_t k = 0; k < fours_.size(); ++k) scale(1.0, best_[k].z, fours_[k].z);
-                joints_.back_to_best();
-                measure(system);
+                back_to_best(system);
             }
         }
         if (!(best.speed < 0.5 * met)) break;
@@ -451,6 +486,7 @@ ConeNewton::Left ConeNewton::follow_frozen(MixedSystem& system, ConeReport& repo
 
 void ConeNewton::keep() {
     joints_.keep_best();
+    turning_.keep_best();
     best_.resize(fours_.size());
     for (std::size_t k = 0; k < fours_.size(); ++k) {
         scale(1.0, fours_[k].z, best_[k].z);

@@ -11,7 +11,7 @@
 // to the path and the way along it, and b falls as far as the next point still is near the path. In a step all
 // multipliers are eliminated, contact by contact; what is left is a system in the velocities with one 6×6 block per
 // body and one pair per pair of bodies that touch, however many points they touch at. It is not symmetric, since
-// friction is not.
+// friction is not. Rolling and torsional friction, whose bound is a part of nu, follow after it (contacts/turning_friction.hpp).
 //
 // Where a point sticks, dz/dv is infinite, and where points are redundant z is not one. So y is held, lightly, where
 // it was: w + hold (y − y before) in place of w, anew in every iteration (a proximal method). At rest nothing is held,
@@ -33,6 +33,7 @@
 #include "contacts/cone_unit.hpp"
 #include "contacts/friction_point.hpp"
 #include "contacts/mass_factors.hpp"
+#include "contacts/turning_friction.hpp"
 #include "linear/block_lu.hpp"
 
 namespace spook {
@@ -83,6 +84,7 @@ private:
     double speed_of(const MixedSystem& system) const;
     void keep();
     void keep_met();
+    void back_to_best(const MixedSystem& system);
     double relative(double speed) const noexcept;
     double goal_from(const Left& start) const noexcept;
     int patience(const Left& best) const noexcept;
@@ -100,6 +102,7 @@ private:
     std::vector<int> sizes_;                      // of the blocks of matrix_, and which are joints
     std::vector<std::uint8_t> is_constraint_;
     BilateralRows joints_;
+    TurningFriction turning_;
     std::vector<ConeUnit> units_;
     std::vector<ConeFour> fours_;  // their laws
     const ConeLaws* laws_ = nullptr;

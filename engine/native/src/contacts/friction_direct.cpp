@@ -5,6 +5,7 @@
 
 #include "contacts/friction_acceleration.hpp"
 #include "contacts/friction_pgs.hpp"
+#include "contacts/jointed_friction.hpp"
 #include "contacts/tolerances.hpp"
 #include "linear/elementary.hpp"
 #include "linear/vec.hpp"
@@ -172,7 +173,6 @@ void finish_by_pgs(MixedSystem& system, MixedSystem& start, std::vector<Friction
 bool is_for_newton(const MixedSystem& system, const std::vector<FrictionPoint>& points, FrictionModel model) {
     if (model != FrictionModel::cone && !points.empty()) return false;
     if (points.empty() && system.rows.size() <= few_blocks) return false;
-    if (std::any_of(points.begin(), points.end(), turns)) return false;
     // Its units tie two bodies; bilateral rows may tie more.
     return std::all_of(system.rows.begin(), system.rows.end(), [&](const RowBlock& block) {
         if (points.empty()) return block.lower[0] == 0.0 && block.further.empty();
@@ -196,6 +196,7 @@ void start_near(MixedSystem& system, const std::vector<FrictionPoint>& points,
     for (RowBlock& block : system.rows)
         block.state[0] = block.multiplier[0] > 0.0 ? RowState::free : RowState::at_lower;
     for (std::size_t k = 0; k < points.size(); ++k) {
+        if (points[k].size != 2) continue;
         RowBlock& block = system.rows[points[k].block];
         step_cone(block, points[k], scale[k], points[k].coefficient * block.multiplier[0], -1.0,
                   direction_hysteresis, system.velocity);
@@ -406,61 +407,6 @@ bool solve_by_newton(MixedSystem& system, std::vector<FrictionPoint>& points, Fr
     return false;
 }
 
-/// Joints and contacts, or contacts with friction of turning: the joints are eliminated, and iterations and Newton's method go
-/// over contacts alone, in turns with more iterations each from the best so far, which is the answer. Newton's method on the
-/// whole, which knows no friction of turning and costs a factor of all bodies an iteration, shares loads of redundant points
-/// evenly: it comes before where these are many, and no few for so many bodies, else after the first turn, from the start.
-/// Joints that are led back against a jam ask for what no impulse gives: where the first turn does not settle and one with them as far
-/// open as they are does, they stay so for the step.
-/// `kept`: work() has a copy of the system already.
-void solve_beside_joints(MixedSystem& system, std::vector<FrictionPoint>& points, DirectSolver& direct,
-                         bool kept, FrictionReport& report) {
-    MixedSystem &best = work().best, &start = work().start;
-    best = system;
-    report.residual = unbounded;
-    const auto take = [&](double residual) {
-        if (!(residual < report.residual)) {
-            if (!(report.residual <= fair)) system = best;
-            return;
-        }
-        report.residual = residual;
-        if (!(residual <= fair)) best = system;
-    };
-    const auto by_newton = [&] {
-        direct.newton.near_enough = fair;
-        direct.newton.max_losses = 1;
-        direct.newton.max_frozen = points.size() < many_points ? max_frozen : 0;
-        const ConeReport found = direct.newton.solve(system, points);
-        direct.newton.max_losses = ConeNewton{}.max_losses, direct.newton.max_frozen = 0;
-        report.rounds += found.iterations;
-        take(found.residual);
-    };
-    const auto reduced = [&](int turn, double most = unbounded) {
-        const ReducedContacts::Report found =
-            direct.reduced.solve(system, points, first_iterations << (2 * turn));
-        report.rounds += found.newton_steps, report.pgs_iterations += found.iterations;
-        take(found.residual <= most ? found.residual : unbounded);
-    };
-    const bool newton = is_for_newton(system, points, FrictionModel::cone);
-    const bool redundant = newton && is_redundant(system);
-    const bool first =
-        redundant && points.size() >= many_points && points.size() * bodies_a_point > system.mass.size();
-    const bool later = newton && !first;
-    if (later && !kept) start = system;
-    if (first) by_newton();
-    const int turns = std::any_of(points.begin(), points.end(), spook::turns) ? turning_turns : joint_turns;
-    const double enough = points.size() < few_points ? fair : near;
-    for (int turn = 0; turn < turns && !(report.residual <= (turn == 0 ? fair : enough)); ++turn) {
-        reduced(turn);
-        if (turn == 0 && !(report.residual <= near)) ReducedContacts::leave_open(system), reduced(0, near);
-        if (later && turn == 0 && !(report.residual <= (redundant ? fair : near)))
-            system = start, by_newton();
-    }
-    report.converged = report.residual <= fair;
-    report.finite = std::isfinite(report.residual);
-    for (FrictionPoint& point : points) point.normal = system.rows[point.block].multiplier[0];
-}
-
 }  // namespace
 
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
@@ -471,8 +417,11 @@ FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPo
     const IterationBudget full_budget{max_rounds};
     if ((model == FrictionModel::cone || points.empty()) && ReducedContacts::takes(system, points)) {
         bool kept = false;
-        if (!settle_quickly(system, points, model, direct, true, false, kept, report))
-            solve_beside_joints(system, points, direct, kept, report);
+        if (settle_quickly(system, points, model, direct, true, false, kept, report)) return report;
+        const bool newton = is_for_newton(system, points, FrictionModel::cone);
+        if (newton && !kept) start = system;
+        JointedFriction beside{system, points, direct, report, start, work().best};
+        beside.solve(newton, newton && is_redundant(system));
         return report;
     }
     if (is_for_newton(system, points, model)) {

@@ -34,10 +34,8 @@ struct DirectSolver {
 /// (`contacts/cone_newton.hpp`), where that ends beyond 1e-6 of the speeds (3e-5 where points are redundant, 1e-9 up to 24
 /// blocks) to 100 iterations and Newton's method again, and up to 24 blocks to a few rounds more, which share loads evenly. The best within
 /// 1e-4 of the speeds is the answer, and converged within 1e-9; else iterations finish.
-/// Beside joints the cone, and systems without friction under any law, get a few rounds; then contacts alone are solved, the joints
-/// eliminated (`contacts/reduced_contacts.hpp`), up to three times from the best so far; where joints that are led back jam what is
-/// between them, they stay open for the step. Newton's method with the joints in its
-/// factor comes before them where points are redundant and more than one in two bodies (of 64 or more: in four), else after the first.
+/// Beside joints, and where few points resist turning, the cone, and systems without friction under any law, get a few rounds; then
+/// contacts alone are solved, the joints eliminated, in turns with Newton's method on the whole (`contacts/jointed_friction.hpp`).
 /// On return FrictionPoint::normal is the normal impulse; for the box it stays what bounds friction.
 FrictionReport solve_friction_direct(MixedSystem& system, std::vector<FrictionPoint>& points,
                                      FrictionModel model, DirectSolver& direct, int max_rounds = 60);

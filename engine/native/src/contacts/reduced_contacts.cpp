@@ -42,12 +42,14 @@ void put(const RowBlock& block, int row, double z, double* p) {
 bool ReducedContacts::takes(const MixedSystem& system, const std::vector<FrictionPoint>& points) {
     int bounded = 0, touching = 0;
     const bool turning = std::any_of(points.begin(), points.end(), turns);
-    bool reduces = turning;
+    bool jointed = false;
     for (const RowBlock& block : system.rows)
         for (int i = 0; i < block.size; ++i)
-            if (BilateralRows::is_bilateral(block, i)) reduces = true;
+            if (BilateralRows::is_bilateral(block, i)) jointed = true;
             else ++bounded, touching += block.is_contact ? 1 : 0;
-    return reduces && bounded > 0 && bounded <= most_bounded_rows && (turning || touching <= most_rows);
+    if (bounded == 0 || !(jointed || turning)) return false;
+    if (!jointed) return bounded <= most_turning_rows;
+    return bounded <= most_bounded_rows && (turning || touching <= most_rows);
 }
 
 void ReducedContacts::leave_open(MixedSystem& system) noexcept {

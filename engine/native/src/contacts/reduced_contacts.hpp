@@ -10,7 +10,7 @@
 // there is an answer, whose residual is told.
 //
 // Beyond `most_rows` W is too large to be dense, and Newton's method on the whole is asked (contacts/cone_newton.hpp).
-// Rolling and torsional friction, which that does not know, is found here without joints, too.
+// Few points with rolling and torsional friction are found here without joints, too.
 //
 // Sources: Featherstone 2008, ch. 11 (contacts by the inverse of the operational-space inertia); Alart, Curnier 1991 (the
 // laws as a root); Horak, Trinkle 2019 (how solvers of robots' contacts compare).
@@ -28,16 +28,16 @@ namespace spook {
 
 class ReducedContacts : private ReducedNewton {
 public:
-    static constexpr int most_rows = 120;  // of contacts: three of one with friction
-    // With stops and drives, few of which are at their bounds; and of friction of turning, which no other Newton knows.
-    static constexpr int most_bounded_rows = 400;
+    static constexpr int most_rows = 120;          // of contacts: three of one with friction
+    static constexpr int most_turning_rows = 48;   // the same without joints, where points resist turning
+    static constexpr int most_bounded_rows = 400;  // with stops and drives, few of which are at their bounds
 
     struct Report {
         int iterations = 0, newton_steps = 0;
         double residual = unbounded;  // of the worst row, relative to the speeds in the system
     };
 
-    /// Whether the system has joints to eliminate, or friction of turning, and few enough rows between bounds.
+    /// Whether the system has joints to eliminate, or points that resist turning, and few enough rows between bounds.
     static bool takes(const MixedSystem& system, const std::vector<FrictionPoint>& points);
 
     /// Joints that are led back stay as far open as they are; impulses met so far, which a jam multiplies, are forgotten.

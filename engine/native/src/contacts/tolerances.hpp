@@ -111,16 +111,21 @@ inline constexpr std::size_t few_blocks = 24;  // pivoting shares their loads ev
 inline constexpr int plain_rounds = 3;         // most systems settle within these
 inline constexpr double poor = 1e-4;           // a residual, of the speeds: beyond it another way is tried
 inline constexpr double fair = 1e-10;          // one that is an answer
-inline constexpr double near = 1e-6, redundant_near = 3e-5;  // residuals, of the speeds: answers
+inline constexpr double near = 1e-6, redundant_near = 3e-5;     // residuals, of the speeds: answers
+inline constexpr int pgs_turns = 1, iterations_per_turn = 100;  // where Newton's path ends without an answer
+}  // namespace tolerances::friction_direct
+
+// jointed_friction.cpp
+namespace tolerances::jointed_friction {
 // Beside joints Newton's method, which takes a factor of all bodies an iteration, comes first from so many points on, redundant ones,
 // if there is one in so many bodies; and follows no convex part then.
 inline constexpr std::size_t many_points = 16, bodies_a_point = 2;
 inline constexpr std::size_t few_points = 9;  // below, a turn costs little: only a fair answer ends them
 // Beside joints: iterations, four times as many each turn, and paths of the convex part where points are few.
 inline constexpr int joint_turns = 3, first_iterations = 8, max_frozen = 8;
-inline constexpr int turning_turns = 4;                         // the same with friction of turning
-inline constexpr int pgs_turns = 1, iterations_per_turn = 100;  // where Newton's path ends without an answer
-}  // namespace tolerances::friction_direct
+inline constexpr double turning_near =
+    1e-7;  // with friction of turning: an answer of Newton's method on the whole
+}  // namespace tolerances::jointed_friction
 
 // impact_search.cpp
 namespace tolerances::impact_search {
