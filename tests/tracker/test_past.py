@@ -273,7 +273,7 @@ def test_what_a_changed_definition_hides_is_told_by_the_old_one(tmp_path: Path) 
     shutil.copytree(
         Path(questions.__file__).parent, folder / "scalar_tests", ignore=shutil.ignore_patterns("__pycache__")
     )
-    asked = folder / "scalar_tests" / "falling_object.py"
+    asked = folder / "scalar_tests" / "thesis" / "falling_object.py"
     text = asked.read_text(encoding="utf-8")
     assert "DURATION = " in text
     asked.write_text(text.replace("DURATION = ", "DURATION = 0.5 * "), encoding="utf-8")
