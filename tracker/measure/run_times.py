@@ -38,11 +38,11 @@ def perform_timing(source: Questions, piece: TimingPiece) -> Timed:
     """Take the times of one piece in this process."""
     tests = {piece.test: source.tests()[piece.test]}
     simulate = replace(source, patience=None).simulate()  # what gave a value is worth its time
+    module = source.module()
+    prepare = getattr(module, "prepare", None) if simulate is module.simulate else None
     if piece.kind == "ladders":
-        module = source.module()
-        prepare = getattr(module, "prepare", None) if simulate is module.simulate else None
         return ladders.timed_series(tests, piece.errors, simulate, piece.repeats, prepare), {}
-    found, out = step_costs(piece.test, tests[piece.test], simulate, getattr(source.module(), "start", None))
+    found, out = step_costs(piece.test, tests[piece.test], simulate, getattr(module, "start", None), prepare)
     return found, {} if out is None else {piece.test: out}
 
 

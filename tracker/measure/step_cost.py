@@ -26,7 +26,7 @@ from spook_tracker.tracker.document.json_form import Number
 from spook_tracker.tracker.document.run_document import Sample, Saving, SeriesDefinition
 
 from .question import Outcome, Witness, ask, judged_sample, metric_series
-from .timing import stage_seconds
+from .timing import Prepare, stage_seconds
 
 LIMIT = 60.0  # s of a run
 ROUNDS = 5
@@ -65,8 +65,8 @@ class LeavingOut:
 OneRun = Callable[[Simulate], Result]
 
 
-def leaving_out(test: ScalarTest, simulate: Simulate) -> LeavingOut | None:
-    """Of the test's example scene; None where it cannot be run."""
+def leaving_out(test: ScalarTest, simulate: Simulate, prepare: Prepare | None = None) -> LeavingOut | None:
+    """Of the test's example scene; None where it cannot be run. `prepare` is the engine's, where it compiles apart from running."""
     example = ask(test.example).value
     kept = _stages_of(example, (), simulate) if example is not None else ()
     if example is None or not kept:
@@ -79,10 +79,11 @@ def leaving_out(test: ScalarTest, simulate: Simulate) -> LeavingOut | None:
     if not added:
         return LeavingOut()
     every = tuple(added)
-    steps, repeats = _length(example, simulate)
+    run = functools.partial(_run, example, simulate, prepare)
+    steps, repeats = _length(example, run)
     ways: list[tuple[str, ...]] = [(), *((option,) for option in added), *([every] if len(every) > 1 else [])]
-    runs = [(example_run(example, steps, way), example_run(example, 1, way)) for way in ways]
-    rounds = [[_taken(run, first, simulate, repeats) for run, first in runs] for _ in range(ROUNDS)]
+    runs = [(run(steps, way), run(1, way)) for way in ways]
+    rounds = [[_taken(whole, first, repeats) for whole, first in runs] for _ in range(ROUNDS)]
     whole = [[one for one in taken if one is not None] for taken in rounds]
     if any(len(taken) < len(runs) for taken in whole):
         return None
@@ -94,7 +95,20 @@ def leaving_out(test: ScalarTest, simulate: Simulate) -> LeavingOut | None:
     return LeavingOut(tuple(added.values()), saved, times, _difference(example, every, simulate))
 
 
-def _length(example: Example, simulate: Simulate) -> tuple[int, int]:
+def _run(
+    example: Example, simulate: Simulate, prepare: Prepare | None, steps: int, stages: tuple[str, ...]
+) -> Callable[[], Result]:
+    """The test's example scene with nothing observed and some stages forced in; compiled once, where that can be."""
+    scene, step, method = example.scene, example.time_step, replace(example.method, force_stages=stages)
+    if prepare is None:
+        return lambda: simulate(
+            scene, time_step=step, steps=steps, method=method, observe={}, time_limit=LIMIT
+        )
+    kept = ask(lambda: prepare(scene, time_step=step, steps=steps, method=method, observe={})).value
+    return lambda: kept.run(time_limit=LIMIT)
+
+
+def _length(example: Example, run: Callable[[int, tuple[str, ...]], Callable[[], Result]]) -> tuple[int, int]:
     """Steps of a run that is long enough for the clock, and how many runs are: a scene is over when its motion is, and what has died
     away is in denormal numbers, with which a step of oscillator_filter costs five times as much."""
     steps, more, last, taken = (
@@ -104,7 +118,7 @@ def _length(example: Example, simulate: Simulate) -> tuple[int, int]:
         math.inf,
     )
     while more <= last:
-        found = _once(example_run(example, more, ()), simulate)
+        found = _once(run(more, ()))
         if found is None:  # a scene that ends, as a path does: no longer than it lasts
             break
         steps, more, taken = more, 2 * more, found
@@ -113,17 +127,17 @@ def _length(example: Example, simulate: Simulate) -> tuple[int, int]:
     return steps, max(1, min(MOST_RUNS, math.ceil(SHORTEST / taken)))
 
 
-def _taken(run: OneRun, first: OneRun, simulate: Simulate, repeats: int) -> float | None:
+def _taken(run: Callable[[], Result], first: Callable[[], Result], repeats: int) -> float | None:
     """Mean seconds of so many runs beyond those of their first step: a scene of steps of 15 ns that is over after a hundred is
     timed by the clock's own calls else. None if one failed."""
-    each = [(_once(run, simulate), _once(first, simulate)) for _ in range(repeats)]
+    each = [(_once(run), _once(first)) for _ in range(repeats)]
     done = [whole - one for whole, one in each if whole is not None and one is not None]
     return max(math.fsum(done) / repeats, 1e-12) if len(done) == repeats else None
 
 
-def _once(run: OneRun, simulate: Simulate) -> float | None:
+def _once(run: Callable[[], Result]) -> float | None:
     """Seconds of the processor in the loop of one run, of the clock where the engine cannot tell; None if it failed."""
-    result = ask(lambda: run(functools.partial(simulate, time_limit=LIMIT))).value
+    result = ask(run).value
     if result is None or not result.completed:
         return None
     return float(result.cpu_seconds or result.seconds)
@@ -313,10 +327,14 @@ Pair = tuple[SeriesDefinition, Sample]
 
 
 def step_costs(
-    name: str, test: ScalarTest, simulate: Simulate, start: Callable[..., Run] | None
+    name: str,
+    test: ScalarTest,
+    simulate: Simulate,
+    start: Callable[..., Run] | None,
+    prepare: Prepare | None = None,
 ) -> tuple[list[Pair], LeavingOut | None]:
     """The series of a test's example scene, and what leaving out saves it."""
-    found = leaving_out(test, simulate)
+    found = leaving_out(test, simulate, prepare)
     values: dict[str, float] = {} if found is None or not found.times else {"leaving_out": found.factor}
     example = ask(test.example).value
     if start is not None and example is not None:
