@@ -180,7 +180,7 @@ def test_what_a_process_answered_before_changes_no_bit(name: str) -> None:
 
     def answer(count: int, configuration: str) -> list[float]:
         run = engine.simulate(
-            swinging(count), time_step=1 / 60, steps=30, observe={}, configuration=configuration
+            swinging(count), time_step=1 / 60, steps=5, observe={}, configuration=configuration
         )
         return [float(x) for state in run.final_state.values() for x in state]
 
